@@ -1,1 +1,1 @@
-"""JSBSim models as data, the envelope type, and the reference equations that validate a model."""
+"""Aircraft: JSBSim models as data, the performance envelope, path limits, and the autopilot's tracking error."""

@@ -1,4 +1,9 @@
-"""The aircraft we know: metadata read from each model's TOML file, in SI units, and a folder for one of your own."""
+"""The known aircraft: metadata of each model in SI units, and folders for a user's own aircraft.
+
+An aircraft is a folder with ``<name>.xml`` (JSBSim) and ``<name>.toml`` (metadata: masses, speeds, limits, energy).
+`find_aircraft` reads an embedded aircraft or a folder, `model_hash` identifies a model's files, and `make_own_folder`
+copies an aircraft under a new name.
+"""
 
 import hashlib
 import math
@@ -14,10 +19,7 @@ from world.errors import FlightError
 from world.files import did_you_mean, read_at_most, read_toml, write_folder
 from world.scenario_tables import names_folder
 
-# ----------------------------------------------------------------------
-# The aircraft we know: metadata read from each model's TOML file, in SI units and radians.
-
-# An aircraft's XML file; JSBSim's own largest is 200 kB.
+# Maximum size of a model's file; JSBSim's own largest has 200 kB.
 MAX_MODEL_BYTES = 32 * 2**20
 _ROOT = Path(__file__).parent
 _DEGREE = math.pi / 180.0
@@ -40,27 +42,27 @@ _KEYS = {
     "surface_lag_s": ("surface_lag", 1.0),
     "motor_lag_s": ("motor_lag", 1.0),
 }
-# What it carries: one of these pairs.
+# Energy carried: one of these pairs.
 _BATTERY = ("battery_v", "battery_wh")
 _FUEL = ("fuel_kg", "fuel_mj_per_kg")
 
 
 @dataclass(frozen=True, slots=True)
 class Aircraft:
-    """One aircraft model: where its JSBSim files are, and what its users need to know.
+    """One aircraft model: its JSBSim files and its metadata.
 
     folder: holds ``<name>.xml`` (JSBSim) and ``<name>.toml``.
-    mass: kg.  wing_area: m^2.  wing_span: m.
-    airspeed: of cruise, m/s; this and the next three are true airspeeds.
-    airspeed_min, airspeed_max: the range that guidance may use, m/s.
-    stall_speed: of the slowest level trim at sea level, m/s.
-    max_bank: rad, for planned turns.
-    max_pitch: rad, commanded, either way.
-    max_elevator, max_aileron, max_rudder: rad, either way.
-    surface_rate: rad/s.  surface_lag, motor_lag: s, first order.
-    battery_voltage: V, 0 for an aircraft that burns fuel.
-    battery_energy: J, of the battery, or the heat of the fuel.
-    model: the properties of the JSBSim model.
+    mass: kg. wing_area: m^2. wing_span: m.
+    airspeed: cruise, m/s; this and the next three are true airspeeds.
+    airspeed_min, airspeed_max: range that guidance may use, m/s.
+    stall_speed: slowest level trim at sea level, m/s.
+    max_bank: for planned turns, rad.
+    max_pitch: commanded, either way, rad.
+    max_elevator, max_aileron, max_rudder: either way, rad.
+    surface_rate: rad/s. surface_lag, motor_lag: first-order time constants, s.
+    battery_voltage: V; 0 for an aircraft that burns fuel.
+    battery_energy: energy of the battery, or heat of the fuel, J.
+    model: properties of the JSBSim model.
     """
 
     name: str
@@ -87,14 +89,14 @@ class Aircraft:
 
     @property
     def model_file(self) -> Path:
-        """The JSBSim model."""
+        """The JSBSim model's XML file."""
         if shipped := self.model.shipped:
             return jsbsim_folder() / "aircraft" / shipped / f"{shipped}.xml"
         return self.folder / f"{self.name}.xml"
 
     @property
     def model_folders(self) -> tuple[Path, ...]:
-        """Where the files that the model brings in may stand."""
+        """Folders in which files included by the model may be."""
         if self.model.shipped:
             root = jsbsim_folder()
             return (root / "aircraft" / self.model.shipped, root / "engine", root / "systems")
@@ -103,12 +105,12 @@ class Aircraft:
 
     @property
     def embedded(self) -> bool:
-        """Whether it ships with planfly."""
+        """Whether the aircraft ships with planfly."""
         return self.folder.parent == _ROOT
 
 
 def jsbsim_folder() -> Path:
-    """The folder of JSBSim's own models, found without importing it."""
+    """Folder of JSBSim's own models, found without importing JSBSim."""
     spec = find_spec("jsbsim")
     return Path(spec.origin if spec and spec.origin else "jsbsim").parent
 
@@ -123,9 +125,10 @@ def aircraft_names() -> tuple[str, ...]:
 
 
 def load_aircraft(name: str) -> Aircraft:
-    """The embedded aircraft of this name.
+    """The embedded aircraft with this name.
 
-    Raises FlightError, in one line, for an unknown name or a metadata file with a missing, unknown or bad entry.
+    Raises FlightError with one line for an unknown name, or for a metadata file with a missing, unknown or invalid
+    entry.
 
     >>> aircraft = load_aircraft("aerosonde")
     >>> aircraft.mass, aircraft.airspeed
@@ -134,7 +137,7 @@ def load_aircraft(name: str) -> Aircraft:
     known = aircraft_names()
     if name not in known:
         near = did_you_mean(name, known)
-        # A folder's name alone is not how it is named.
+        # A folder must be given with a slash.
         near = near or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
         allowed = f"known are {', '.join(known)}, and folders, with a slash"
         message = f"no aircraft called {name!r}{near} ({allowed})"
@@ -143,9 +146,9 @@ def load_aircraft(name: str) -> Aircraft:
 
 
 def find_aircraft(name: str) -> Aircraft:
-    """The embedded aircraft of this name, or the one in this folder if the name has a slash.
+    """The embedded aircraft with this name, or the one in this folder if the name contains a slash.
 
-    Raises FlightError as `load_aircraft` does.
+    Raises FlightError as `load_aircraft`.
 
     >>> find_aircraft("c172x").airspeed
     50.0
@@ -156,7 +159,7 @@ def find_aircraft(name: str) -> Aircraft:
 def read_aircraft(folder: Path) -> Aircraft:
     """The aircraft described by ``<folder>/<folder's name>.toml``.
 
-    Raises FlightError as `load_aircraft` does.
+    Raises FlightError as `load_aircraft`.
     """
     file = folder / f"{folder.name}.toml"
     try:
@@ -190,7 +193,7 @@ def _numbers(table: dict[str, Any]) -> dict[str, float]:
     allowed = {*_KEYS, *store}
     missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
     near = did_you_mean(unknown[0], missing) if unknown else ""
-    # A key that is mistaken is missing, too: the mistake tells more.
+    # A misspelt key is missing as well; the spelling is the better message.
     if missing and not near:
         raise FlightError(f"missing {', '.join(missing)}", field=missing[0])
     if unknown:
@@ -208,10 +211,10 @@ def _numbers(table: dict[str, Any]) -> dict[str, float]:
 
 
 def model_hash(aircraft: Aircraft) -> str:
-    """SHA-256, as hex, over the names and contents of the model's XML and TOML files.
+    """SHA-256, as hex, of the names and contents of the model's XML and TOML files.
 
-    Any change of the model changes it, so a cached envelope or an old log can say which model it belongs to.
-    Other files in the folder, such as guidance gains, do not count.  Raises FlightError for a file that cannot be read.
+    It changes with any change of the model and so identifies the model of a cached envelope or an old log. Other files
+    in the folder, such as guidance gains, do not count. Raises FlightError for a file that cannot be read.
 
     >>> len(model_hash(load_aircraft("aerosonde")))
     64
@@ -228,7 +231,7 @@ def model_hash(aircraft: Aircraft) -> str:
 
 @cache
 def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> str:
-    # The stamps only tell the cache when a file has changed.
+    # The stamps are only part of the cache key.
     digest = hashlib.sha256()
     for file in files:
         data = read_at_most(file, MAX_MODEL_BYTES, "model")
@@ -237,22 +240,21 @@ def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) ->
     return digest.hexdigest()
 
 
-# ----------------------------------------------------------------------
-# A folder for an aircraft of one's own, made from one that is known.
+# --- Folders for a user's own aircraft ---
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
-# Names of files that every folder has.
+# Names that files in every folder have.
 _TAKEN = ("ardupilot", "gains", "README")
 _SUFFIXES = frozenset({".xml", ".toml", ".parm", ".md"})
 _SHIPPED = re.compile(r"^(\s*shipped_by_jsbsim\s*=\s*)true\b", re.MULTILINE)
 
 
 def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
-    """Make a folder that holds the same aircraft under the folder's name: whole, or not at all.
+    """Create a folder with the same aircraft under the folder's name, completely or not at all.
 
-    A model that JSBSim ships stays JSBSim's, and is named in the metadata.  Returns the names of its files, sorted.
-    Raises FlightError for a folder that exists, that has no place to stand, or whose name is none for a model, and
-    OSError where it cannot be written.
+    A model that ships with JSBSim stays there, and the metadata name it. Returns the names of the created files,
+    sorted. Raises FlightError if the folder exists, its parent does not, or its name is not valid for a model; OSError
+    if it cannot be written.
 
     >>> from tempfile import TemporaryDirectory
     >>> from aircraft.catalog import load_aircraft, read_aircraft
@@ -276,7 +278,7 @@ def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
 
 
 def _renamed(source: Aircraft, name: str) -> dict[str, bytes]:
-    """What the folder holds, by path within it: the aircraft's files, its own two under the new name."""
+    """Contents of the new folder by path: the aircraft's files, with its own two renamed."""
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     found = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     files = {}

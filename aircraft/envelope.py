@@ -1,4 +1,4 @@
-"""What an aircraft can do: steady climb, descent and speed over airspeed and height, with its interpolation."""
+"""Performance envelope of an aircraft: steady climb, descent, speed and power over airspeed and altitude."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,25 +11,25 @@ from world.kernels import compiled
 Floats = NDArray[np.float64]
 
 GRAVITY = 9.80665
-# Names of the tables of an `Envelope`, and of those of its power.
+# Names of the tables of an `Envelope`, and of its power tables.
 TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
 POWERS = ("power_idle", "power_level", "power_full")
 
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """Steady-flight limits from trims, in still air relative to the air mass.
+    """Limits of steady flight from trims, relative to the air mass.
 
-    aircraft, model_hash: of which model.
+    aircraft, model_hash: of the model.
     motor_braking: whether descent may drive the motor.
-    airspeed: (v,) m/s, amsl: (h,) m, both increasing.
-    climb, descent: (v, h) flight-path angles in rad, positive in the direction of their name (a negative climb means
-    that the aircraft cannot hold height there); NaN where no trim exists at all.
+    airspeed: (v,) m/s. amsl: (h,) m. Both increasing.
+    climb, descent: (v, h) flight-path angles, rad, positive in the direction of their name (a negative climb means that
+    the aircraft cannot hold altitude there); NaN where there is no trim.
     level_speed_min, level_speed_max: (h,) m/s.
-    max_bank: rad, the aircraft's own limit.
-    power_idle, power_level, power_full: (v, h) W from the battery, or of the fuel's heat, at the steepest descent, in
-    level flight and at the steepest climb; (0, 0) where it is not known.
-    volts: of the battery, 0 without one.
+    max_bank: the aircraft's own limit, rad.
+    power_idle, power_level, power_full: (v, h) electric power, or heat of the fuel per second, at the steepest descent,
+    in level flight and at the steepest climb, W; (0, 0) if unknown.
+    volts: battery voltage, 0 without one.
     """
 
     aircraft: str
@@ -48,17 +48,17 @@ class Envelope:
     volts: float = 0.0
 
     def __post_init__(self) -> None:
-        """Lock the tables."""
+        """Make the tables read-only."""
         for name in (*TABLES, *POWERS):
             table = np.array(getattr(self, name), dtype=np.float64)
             table.setflags(write=False)
             object.__setattr__(self, name, table)
 
     def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
-        """Steepest climb and descent relative to the air, rad, both positive, bilinear in the table.
+        """Steepest climb and descent relative to the air, rad, both positive, by bilinear interpolation.
 
-        NaN at an airspeed outside the table or below the slowest level flight; between that and the slowest trim of
-        the table the latter counts.  Above and below the table's heights its nearest edge counts.
+        NaN at an airspeed outside the table or below the slowest level flight; between that speed and the slowest trim
+        of the table the values of the latter are used. Altitudes outside the table use its nearest edge.
         """
         if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
             return math.nan, math.nan
@@ -70,10 +70,10 @@ class Envelope:
     def slope_limits(
         self, airspeed: float, amsl: float, tailwind: float = 0.0, crosswind: float = 0.0
     ) -> tuple[float, float]:
-        """Steepest climb and dive over the ground, rad, both positive, on a leg with this steady wind.
+        """Steepest climb and dive over the ground, rad, both positive, on a leg in this steady wind.
 
-        tailwind, crosswind: m/s along and across the leg's course.  A tailwind flattens the slope over the
-        ground, a headwind steepens it.  NaN if the aircraft cannot make way along the leg, or as `air_angles`.
+        tailwind, crosswind: m/s along and across the leg's course. A tailwind flattens the slope over the ground, a
+        headwind steepens it. NaN if the aircraft cannot make progress along the leg, or as `air_angles`.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (
@@ -82,10 +82,10 @@ class Envelope:
         )
 
     def power(self, airspeed: float, amsl: float, air_angle: float) -> float:
-        """Power (W) of steady flight at this path angle to the air (rad, climbing positive).
+        """Power (W) of steady flight at this path angle relative to the air (rad, positive in a climb).
 
-        The parabola through idle, level and full throttle, and beyond them theirs.  NaN where power is not known, or
-        the airspeed is outside the table.
+        Interpolated by the parabola through idle, level and full throttle, and constant beyond them. NaN if power is
+        unknown or the airspeed is outside the table.
         """
         if not self.power_level.size:
             return math.nan
@@ -104,7 +104,7 @@ class Envelope:
         )
 
     def level_speeds(self, amsl: float) -> tuple[float, float]:
-        """Slowest and fastest level flight at this height, m/s."""
+        """Slowest and fastest level flight at this altitude, m/s."""
         return (
             float(np.interp(amsl, self.amsl, self.level_speed_min)),
             float(np.interp(amsl, self.amsl, self.level_speed_max)),
@@ -115,14 +115,14 @@ class Envelope:
 def ground_slope(
     air_angle: float, airspeed: float, tailwind: float, crosswind: float
 ) -> float:  # pragma: no cover - compiled
-    """Path angle over the ground of a steady climb at ``air_angle`` to the air mass, rad; NaN if no way is made."""
+    """Path angle over the ground of a steady climb at ``air_angle`` to the air, rad; NaN without progress."""
     along = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
     return math.atan2(airspeed * math.sin(air_angle), along)
 
 
 @compiled
 def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:  # pragma: no cover - compiled
-    """Speed over the ground along a course that is held against the wind, m/s; NaN where it cannot be held."""
+    """Ground speed along a course held against the wind, m/s; NaN if the course cannot be held."""
     square = airspeed**2 - crosswind**2
     along = math.sqrt(square) + tailwind if square > 0.0 else -1.0
     return along if along > 0.0 else math.nan
@@ -142,13 +142,13 @@ def _bilinear(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> floa
 
 
 def _at(ys: Floats, table: Floats, y: float) -> Floats:
-    """``np.interp`` of every row of a table at one place, to the last bit: a call for each takes ten times as long."""
+    """``np.interp`` of every row of a table at one point, identical to the last bit but ten times faster."""
     k = min(max(0, int(np.searchsorted(ys, y, side="right")) - 1), ys.size - 1)
     if y <= ys[k] or k == ys.size - 1:
         return np.array(table[:, k])
     left, right = table[:, k], table[:, k + 1]
     slope = (right - left) / (ys[k + 1] - ys[k])
     rows = slope * (y - ys[k]) + left
-    # As there: from the other side where that is not a number, and for equal neighbours the neighbour.
+    # As in np.interp: interpolate from the other side if NaN, and take equal neighbours as they are.
     rows = np.where(np.isnan(rows), slope * (y - ys[k + 1]) + right, rows)
     return np.where(np.isnan(rows) & (left == right), left, rows)

@@ -1,4 +1,4 @@
-"""The JSBSim properties of a model: those behind the four commands, and those that are read back."""
+"""Properties of a JSBSim model: those that take the four commands, and those that are read back."""
 
 import math
 import re
@@ -15,9 +15,9 @@ _READINGS = (*_COMMANDS, "current", "power")
 
 @dataclass(frozen=True, slots=True)
 class CommandProperty:
-    """One command: a property, and how much of it a radian (or full throttle) is, above and below zero.
+    """One command: a property, and its change per radian (or full throttle) above and below zero.
 
-    Two factors, because a normalised stick often has unequal travels.
+    Two factors, because a normalised stick often has unequal travel.
     """
 
     name: str
@@ -27,7 +27,7 @@ class CommandProperty:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One reading: a property and its factor to SI.  An empty name reads as zero: the aircraft has no such thing."""
+    """One reading: a property and its factor to SI. An empty name reads as zero, for a quantity that does not exist."""
 
     name: str
     factor: float
@@ -35,10 +35,11 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """The properties of a JSBSim model, and what kind of model it is.
+    """Properties of a JSBSim model, and its kind.
 
-    shipped: the name of the model of JSBSim's own that it is; "" for one whose file stands in the aircraft's folder.
-    settles: its engine has a speed of its own, runs from the start and settles before anything is measured.
+    shipped: name of the model among those of JSBSim; "" for a model file in the aircraft's folder.
+    settles: whether the engine has a speed of its own, so that it is running from the start and must settle before
+    measurements.
     commands: elevator, aileron, rudder, throttle.
     readings: the same four, then battery current (A) and power (W).
     """
@@ -66,11 +67,11 @@ OURS = Model(
 
 
 def read_model(table: object, aircraft: str) -> Model:
-    """Return the model of a metadata file's ``[model]`` table.
+    """The model described by a metadata file's ``[model]`` table.
 
-    aircraft: its name, which is that of JSBSim's own model where the table does not name another.
+    aircraft: its name, which is also that of JSBSim's model unless the table names another.
 
-    Raises FlightError, in one line that begins with the key, for an unknown, missing or bad entry.
+    Raises FlightError with one line, which begins with the key, for an unknown, missing or invalid entry.
     """
     table = _table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
     commands = _table(table.get("command", {}), "model.command", _COMMANDS)
@@ -104,7 +105,7 @@ def _table(value: object, key: str, known: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _shipped(table: dict[str, Any], aircraft: str) -> str:
-    """The name of JSBSim's own model; it names a folder, and must not lead out of JSBSim's."""
+    """Name of JSBSim's own model; it names a folder and must not lead outside JSBSim's."""
     value = table.get("shipped_by_jsbsim", False)
     if isinstance(value, bool):
         return aircraft if value else ""
@@ -122,7 +123,7 @@ def _truth(table: dict[str, Any], name: str) -> bool:
 
 
 def _entry(value: object, key: str, numbers: int) -> tuple[Any, ...]:
-    """A property and its factors, none of them zero."""
+    """A property and its factors, all different from zero."""
     good = isinstance(value, list) and len(value) == 1 + numbers and isinstance(value[0], str)
     # JSBSim aborts the process over a name with a space in it.
     if good and isinstance(value, list):

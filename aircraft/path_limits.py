@@ -1,6 +1,7 @@
-"""What a path may ask of the aircraft: the tighter of the scenario's numbers and the envelope's.
+"""Limits of a path: the tighter of the scenario's numbers and the aircraft's envelope.
 
-The compiled functions are the one definition for a planner's candidate, for a certificate and for a route.
+Turn radii, turn lengths and slopes over the ground in wind. The compiled functions are the single definition of these
+limits for a planner's candidates, for certificates and for missions.
 """
 
 import math
@@ -18,24 +19,25 @@ from world.wind import W20, Wind, mean_wind_speed
 
 Floats = NDArray[np.float64]
 
-# Rolling from one bank into the other takes this long, s per rad, as far as it is more than the bank limit: that much
-# every turn rolls in from level.  From the shortest S-turn legs that flights hold (`benchmarks.limits`).
+# Time to roll from one bank angle into the opposite one, s per rad by which the change exceeds the bank limit: rolling
+# in from level is part of every turn. Measured on the shortest S-turn legs that are flown within tolerance
+# (`benchmarks.limits`).
 ROLL_TIME = 0.8
-# Vertical acceleration where one slope blends into the next, m/s^2.
+# Vertical acceleration in the blend between two slopes, m/s^2.
 BLEND_ACCELERATION = 1.0
 
 
 class PerformanceTable(NamedTuple):
-    """What an aircraft can do at one airspeed, bank limit and wind, in the form that compiled functions take.
+    """Performance of an aircraft at one airspeed, bank limit and wind, for compiled functions.
 
     airspeed: m/s.
     tan_max_bank: tangent of the bank limit.
     wind_speed: mean wind (m/s) at `wind_reference_amsl` (m).
-    wind_to: direction that the wind blows towards, rad clockwise from north.
-    wind_gradient: m/s more per metre of height, 1/s.
+    wind_to: direction towards which the wind blows, rad clockwise from north.
+    wind_gradient: increase per metre of height, 1/s.
     gust_sigma: standard deviation of the gusts, m/s.
-    amsl: (h,) m, increasing; the heights of the two tables.
-    climb, descent: (h,) rad, steepest angles to the air, positive in the direction of their name.
+    amsl: (h,) m, increasing; altitudes of the two tables.
+    climb, descent: (h,) rad, steepest angles relative to the air, positive in the direction of their name.
     """
 
     airspeed: float
@@ -56,11 +58,11 @@ class Limits:
 
     max_turn, max_climb, max_dive: rad, or None where the scenario leaves them to the aircraft.
     min_clearance: m above ground.
-    envelope: what the aircraft can do in still air.
+    envelope: performance of the aircraft in still air.
     airspeed: m/s.
     max_bank: rad, the tighter of scenario and aircraft.
     wind: over the whole area.
-    tracking: how far the autopilot strays from its legs, None where it holds its path.
+    tracking: tracking error of the autopilot, None if it follows its path exactly.
     """
 
     max_turn: float | None
@@ -74,21 +76,21 @@ class Limits:
     tracking: TrackingError | None = None
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
-        """Steepest climb and dive over the ground on a course (rad) at a height (m), rad, both positive.
+        """Steepest climb and dive over the ground on a course (rad) at an altitude (m), rad, both positive.
 
-        airspeed: m/s; the limits' own where none is given.  Both are 0 where the wind leaves no way along the course.
+        airspeed: m/s; None for that of the limits. Both are 0 where the aircraft cannot make progress along the course.
         """
         climb, dive = aircraft_slopes(self.performance(airspeed), course, amsl)
         return float(climb), float(dive)
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
-        """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed on the way."""
+        """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed in the turn."""
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
     def performance(self, airspeed: float | None = None) -> PerformanceTable:
-        """What the aircraft can do at an airspeed (m/s; the limits' own where none is given), for compiled functions.
+        """Performance at an airspeed (m/s; None for that of the limits), for compiled functions.
 
-        Climb and descent are NaN where `Envelope.air_angles` knows none.
+        Climb and descent are NaN where `Envelope.air_angles` is.
         """
         speed, heights, wind = self.airspeed if airspeed is None else airspeed, self.envelope.amsl, self.wind
         angles = np.array([self.envelope.air_angles(speed, float(amsl)) for amsl in heights])
@@ -108,7 +110,7 @@ class Limits:
 
 
 def derated(table: PerformanceTable, share: float) -> PerformanceTable:
-    """The same aircraft with only a share (0..1) of its climb and descent; an angle below 0, a loss of height, stays.
+    """The same aircraft with a share (0..1) of its climb and descent; negative angles, a loss of height, are unchanged.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
@@ -122,7 +124,7 @@ def derated(table: PerformanceTable, share: float) -> PerformanceTable:
 
 
 def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
-    """The same aircraft that climbs and sinks no faster than at these rates, m/s; inf for no limit.
+    """The same aircraft limited to these climb and sink rates, m/s; inf for no limit.
 
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, *(np.full(2, 0.3) for _ in range(3)))
     >>> slower = within_rates(table, 5.0, math.inf)
@@ -135,7 +137,7 @@ def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -
 
 
 def _locked(values: Floats) -> Floats:
-    # Contiguous and read-only, as every table: another layout would compile the kernels anew.
+    # Contiguous and read-only like every table: another layout would compile the kernels again.
     out = np.array(values, dtype=np.float64)
     out.setflags(write=False)
     return out
@@ -143,7 +145,7 @@ def _locked(values: Floats) -> Floats:
 
 @inlined
 def wind_speed_at(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
-    """Mean wind speed at a height, m/s."""
+    """Mean wind speed at an altitude, m/s."""
     return mean_wind_speed(table.wind_speed, table.wind_gradient, table.wind_reference_amsl, amsl)
 
 
@@ -157,7 +159,7 @@ def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> floa
 
 @inlined
 def downwind(table: PerformanceTable) -> tuple[float, float]:  # pragma: no cover - compiled
-    """East and north of the unit vector that the wind blows towards."""
+    """East and north components of the downwind unit vector."""
     return math.sin(table.wind_to), math.cos(table.wind_to)
 
 
@@ -165,13 +167,13 @@ def downwind(table: PerformanceTable) -> tuple[float, float]:  # pragma: no cove
 def slopes_along(
     table: PerformanceTable, tail_share: float, cross_share: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive over the ground, rad, with these shares of the wind along and across the course."""
+    """Steepest climb and dive over the ground, rad, for these shares of the wind along and across the course."""
     count = table.amsl.size
     wind = wind_speed_at(table, amsl)
     k = 0
     while k + 2 < count and table.amsl[k + 1] <= amsl:
         k += 1
-    # By hand: numba's np.interp of one number costs a microsecond.
+    # Written out: numba's np.interp of one number costs a microsecond.
     share = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
     climb = table.climb[k] + share * (table.climb[k + 1] - table.climb[k])
     dive = table.descent[k] + share * (table.descent[k + 1] - table.descent[k])
@@ -186,7 +188,7 @@ def slopes_along(
 def aircraft_slopes(
     table: PerformanceTable, course: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) where no way is made."""
+    """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) without progress."""
     angle = table.wind_to - course
     return slopes_along(table, math.cos(angle), math.sin(angle), amsl)
 
@@ -195,10 +197,10 @@ def aircraft_slopes(
 def _turn_radius(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
 ) -> float:  # pragma: no cover - compiled
-    """Arc radius between the unit courses u and v; w: downwind; side: of the turn, 0 for one flown either way."""
+    """Arc radius between the unit courses u and v; w: `downwind`; side: sign of the turn, 0 for either direction."""
     wind = wind_speed_at(table, amsl)
     if wind == 0.0:
-        # No way to be blown: the same speed on every course.
+        # Without wind the speed is the same on every course.
         fastest = table.airspeed
     else:
         before = ground_speed(table.airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
@@ -218,10 +220,10 @@ def _turn_radius(
 def turn_radius_between(
     table: PerformanceTable, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
-    """Arc radius at the bank limit for the highest ground speed between two courses; inf where one cannot be held.
+    """Arc radius at the bank limit for the highest ground speed between two courses; inf if one cannot be held.
 
-    In turbulence a standard deviation of the gusts comes on top: airspeed, and with it the bank that an arc
-    over the ground takes, swings by that much.
+    In turbulence one standard deviation of the gusts is added: the airspeed, and with it the bank that an arc over the
+    ground requires, varies by that much.
     """
     turn = wrap(course_out - course_in)
     ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
@@ -235,9 +237,9 @@ def turn_radius_between(
 def corner_tangent(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Length of leg that the fly-by arc between the unit courses u and v takes on either side, and its radius, m.
+    """Tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
 
-    R tan(theta/2) = R |sin| / (1 + cos); 0 for no turn, inf for a U-turn.  w: `downwind`.
+    R tan(theta/2) = R |sin| / (1 + cos); 0 without a turn, inf for a U-turn. w: `downwind`.
     """
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
     if abs(cross) < 1e-9 and dot > 0.0:
@@ -250,10 +252,10 @@ def corner_tangent(
 
 @inlined
 def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
-    """Tangent of the slope along a fly-by arc: the heights of its tangent points over the arc's own length.
+    """Tangent of the slope along a fly-by arc: height difference of its tangent points over the arc's length.
 
-    tan_in, tan_out: of the legs.  tangent = radius x tan(theta/2): the arc, radius x theta, is shorter than its two
-    tangents, and so steeper: by 1.27 at 90 degrees.
+    tan_in, tan_out: of the legs. tangent = radius x tan(theta/2): the arc, radius x theta, is shorter than its two
+    tangents and therefore steeper, by a factor of 1.27 at 90 degrees.
     """
     if tangent <= 0.0 or radius <= 0.0 or math.isinf(tangent):
         return 0.0
@@ -263,11 +265,12 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
 
 @inlined
 def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
-    """Run after a fly-over turn (rad), in radii; its greatest up to this angle, so that it never falls with the angle.
+    """Distance along the leg after a fly-over turn (rad) until the track is back on it, in radii.
 
-    With overshoot angle phi, cos phi = (1 + cos turn)/2, the track is back on the leg after sin turn + 2 sin phi.
+    With overshoot angle phi, cos phi = (1 + cos turn)/2, the distance is sin turn + 2 sin phi; beyond its maximum the
+    maximum is returned, so that it never decreases with the angle.
     """
-    # Where sin turn + 2 sin phi is greatest, 2 sqrt 2.
+    # The maximum of sin turn + 2 sin phi is 2 sqrt 2, at this angle.
     sharpest = min(turn, math.acos(-1.0 / 3.0))
     back = 0.5 * (1.0 + math.cos(sharpest))
     return math.sin(sharpest) + 2.0 * math.sqrt(max(0.0, 1.0 - back * back))
@@ -275,9 +278,9 @@ def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
 
 @compiled
 def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
-    """Length of leg that the fly-by arc at each waypoint uses on either side, (w,) m; 0 at the ends.
+    """Tangent length of the fly-by arc at each waypoint, (w,) m; 0 at the ends.
 
-    waypoints: (w, 3).  R tan(theta/2); a U-turn has no tangent point and gets inf.
+    waypoints: (w, 3). R tan(theta/2); inf for a U-turn, which has no tangent point.
     """
     count = waypoints.shape[0]
     out = np.zeros(count)
@@ -302,9 +305,9 @@ def roll_reversal_length(
     wx: float,
     wy: float,
 ) -> float:  # pragma: no cover - compiled
-    """Length of leg (m) that rolling from a turn into one the other way round takes, between arcs of these radii (m).
+    """Length of leg (m) for rolling from a turn into one to the other side, between arcs of these radii (m).
 
-    u: the leg's unit course.  w: `downwind`.  0 where the wind leaves no way along the leg.
+    u: the leg's unit course. w: `downwind`. 0 if the aircraft cannot make progress along the leg.
     """
     wind = wind_speed_at(table, amsl)
     speed = ground_speed(table.airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx)) + table.gust_sigma

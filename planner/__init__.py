@@ -1,1 +1,1 @@
-"""The path planner: encodings, criteria, preference, and the estimation of distribution algorithms."""
+"""The path planner: encodings, constraints and objectives, preference, and estimation of distribution algorithms."""

@@ -1,4 +1,8 @@
-"""A plan: waypoints, how they were evaluated, and the scenario they were made for."""
+"""A plan: the waypoints of a path, their scores and certificate, the scenario, and how the search found them.
+
+The file format is ``plan.json`` (schema planfly.plan/1): `plan_json` writes it, `read_plan` and `parse_plan` read it
+and check every field. `Certificate` is filled by `planner.evaluation.certify`.
+"""
 
 import json
 import math
@@ -24,12 +28,12 @@ Ints = NDArray[np.int64]
 
 
 PLAN_SCHEMA = "planfly.plan/1"
-# Ten thousand waypoints among as many threats are 4 MB.
+# Ten thousand waypoints with as many threats take 4 MB.
 MAX_BYTES = 64 * 2**20
 
 
 class Violation(IntEnum):
-    """Columns of a path's violation counts (eq. 1-7 of Yang, Tang and Lozano, CEC 2014)."""
+    """Columns of a path's violations (eq. 1-7 of Yang, Tang and Lozano, CEC 2014)."""
 
     TURN = 0
     SLOPE = 1
@@ -48,19 +52,20 @@ class Objective(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What the continuous check found along the whole path, not at six points a leg.
+    """Result of the continuous check along the whole path, not only at six points per leg.
 
     Margins are the smallest limit minus value, negative where the path fails.
 
     turn, slope: margins, rad.
-    available_length: least length of a leg between its two turns, m; inf where the flat turn limit alone counts.
-    clearance: least height above ground less the required clearance, m.
+    available_length: smallest length of a leg between its two turns, m; inf where only the fixed turn limit applies.
+    clearance: smallest height above ground minus the required clearance, m.
     bounds: margin to map, floor and ceiling, m.
-    kill_distance: between the path and the nearest missile sphere's surface, m; negative inside, inf without missiles.
-    zone_distance: outside exclusions and inside inclusions, m, on the map or in height; negative where one is violated,
+    kill_distance: between the path and the surface of the nearest missile sphere, m; negative inside, inf without
+    missiles.
+    zone_distance: outside exclusions and inside inclusions, horizontal or vertical, m; negative where one is violated,
     inf without zones.
-    headroom: greatest height above ground that is allowed less the path's, m; inf where none is.
-    problems: one line each of what failed, empty if the path is certified.
+    headroom: maximum height above ground minus the path's, m; inf without a maximum.
+    problems: one line per failure, empty if the path is certified.
     """
 
     turn: float
@@ -75,7 +80,7 @@ class Certificate:
 
     @property
     def ok(self) -> bool:
-        """No constraint is violated anywhere on the path."""
+        """Whether no constraint is violated anywhere on the path."""
         return not self.problems
 
 
@@ -83,16 +88,15 @@ class Certificate:
 class Plan:
     """A planned path.
 
-    scenario: what it was planned for.
+    scenario: for which it was planned.
     waypoints: (w, 3) world m.
-    violations, objectives: (4,) by `Violation` and (4,) by `Objective`, on the paper's six points a leg, whatever the
-    search looked at.
-    certificate: of the whole path, or of what follows the flown legs.
-    seed, algorithm, evaluations: how it was found.
-    history: (g, 3) after each generation, of the best path yet: length ratio, kill exposure and violations (the
-    graded algorithms count kinds of violations).
-    ended: "completed", or why the search ended before: "budget", "interrupted".
-    flown_legs: legs at the beginning that an earlier plan had and that are flown.
+    violations, objectives: (4,) by `Violation` and (4,) by `Objective`, always at the paper's six points per leg.
+    certificate: of the whole path, or of the part after the flown legs.
+    seed, algorithm, evaluations: of the search.
+    history: (g, 3) per generation, of the best path so far: length ratio, kill exposure and violations (for graded
+    algorithms the number of kinds violated).
+    ended: "completed", or why the search ended early: "budget", "interrupted".
+    flown_legs: number of legs at the beginning that were already flown under an earlier plan.
     """
 
     scenario: Scenario
@@ -121,12 +125,12 @@ class Plan:
 
     @property
     def feasible(self) -> bool:
-        """The path meets all four constraints, counted and continuously."""
+        """Whether the path meets all four constraints, at the paper's points and continuously."""
         return self.certificate.ok and not self.violations.any()
 
     @property
     def safe(self) -> bool:
-        """Feasible, and outside every missile sphere."""
+        """Whether the path is feasible and outside every missile sphere."""
         return self.feasible and self.certificate.kill_distance > 0.0
 
     @property
@@ -139,7 +143,7 @@ class Plan:
         return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {self.state}, {ratio:.4f} times straight>"
 
     def _repr_html_(self) -> str:
-        """How a notebook shows it."""
+        """HTML for notebooks."""
         return plan_html(self)
 
 
@@ -186,7 +190,7 @@ def _or_none(value: float) -> float | None:
 
 
 def _airspace_keys(certificate: Certificate) -> dict[str, float]:
-    """What a certificate says of zones and greatest height; nothing where the scenario has none."""
+    """The certificate's entries for zones and maximum height; empty if the scenario has neither."""
     values = {"zone_distance_m": certificate.zone_distance, "headroom_m": certificate.headroom}
     return {key: float(value) for key, value in values.items() if np.isfinite(value)}
 
@@ -236,18 +240,18 @@ def plan_json(plan: Plan) -> str:
 def parse_plan(
     text: str, source: str, *, base: Path | None = None, terrain: str | None = None, ground: Terrain | None = None
 ) -> Plan:
-    """The plan of the text of a ``plan.json``.
+    """The plan in the text of a ``plan.json``.
 
-    source: where the text is from, as an error's first words.
-    base: folder that its scenario's paths are relative to.
-    terrain: file that replaces its scenario's terrain.
-    ground: terrain already at hand (from a log); then no elevation file is opened.
+    source: origin of the text, with which error messages begin.
+    base: folder to which the scenario's paths are relative.
+    terrain: file that replaces the scenario's terrain.
+    ground: terrain already loaded (from a log); then no elevation file is opened.
 
     >>> parse_plan('{"schema": "planfly.plan/2"}', "plan.json")
     Traceback (most recent call last):
     world.errors.MissionError: plan.json: schema: "planfly.plan/2": Input should be 'planfly.plan/1' (and 11 more)
 
-    Raises MissionError (or the scenario's own errors) with one line: file, field, value, what is allowed.
+    Raises MissionError (or the scenario's own errors) with one line: file, field, value, allowed values.
     """
     try:
         data = json.loads(text, parse_constant=_refuse_constant)
@@ -260,7 +264,7 @@ def parse_plan(
     _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
     _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
     waypoints = np.array(file.waypoints_east_north_amsl_m)
-    # Over another terrain a plan's ends stay where they were planned.
+    # With another terrain the ends stay where they were planned.
     given = file.scenario if terrain is None else fixed_ends(file.scenario, waypoints[0], waypoints[-1])
     scenario = from_spec(given, source, base=base, terrain=terrain, ground=ground)
     saved = file.certificate
@@ -292,7 +296,7 @@ def parse_plan(
 
 
 def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
-    """The plan of a ``plan.json`` file; terrain: file that replaces its scenario's terrain.
+    """The plan in a ``plan.json`` file; terrain: file that replaces the scenario's terrain.
 
     >>> read_plan(Path("missing.json"))
     Traceback (most recent call last):
@@ -320,12 +324,8 @@ def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequenc
         raise MissionError.at(source, field, sorted(given), f"keys {sorted(wanted)} are expected")
 
 
-# ----------------------------------------------------------------------
-# A plan as a small table for a notebook.
-
-
 def plan_html(plan: Plan) -> str:
-    """What a plan is, how far it keeps from its limits, and what of it fails."""
+    """HTML table of a plan for notebooks: its state, margins and failures."""
     made = plan.certificate
     rows = [
         ("waypoints", len(plan.waypoints)),

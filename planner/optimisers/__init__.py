@@ -1,1 +1,1 @@
-"""Optimisers that see a box, samples and a ranking, and know no UAV."""
+"""General optimisers: they see a box, samples and a ranking, and nothing specific to paths."""

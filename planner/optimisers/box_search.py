@@ -1,7 +1,4 @@
-"""A search within a box by ask and tell: what every optimiser here begins with.
-
-It knows a box, samples and a ranking, and nothing of what they stand for.
-"""
+"""Ask-and-tell interface of a population-based search in a box, shared by all optimisers."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -14,14 +11,14 @@ Ints = NDArray[np.int64]
 
 
 class BoxSearch(ABC):
-    """A population in a box: `ask` gives rows that want scores, `tell` takes the scores and makes the next rows.
+    """A population in a box: `ask` returns samples to be scored, `tell` takes their scores and makes the next samples.
 
     lower, upper: (d,) box.
     rank: (n, c) scores -> (n,) ranks, smaller is better.
-    population: even number of rows.
-    initial: (population, d) first samples; None for uniform.
+    population: even number of samples.
+    initial: (population, d) first samples; None for uniform ones.
 
-    The whole population is asked for first, then half of it at a time.
+    The first call asks for the whole population, later calls for half of it.
     """
 
     def __init__(
@@ -45,9 +42,9 @@ class BoxSearch(ABC):
         self.scores: Floats = np.empty((0, 0))
 
     def ask(self) -> Floats:
-        """Rows (n, d) inside the box that want scores."""
+        """Samples (n, d) inside the box to be scored."""
         return self._asked
 
     @abstractmethod
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of what was asked, and make the next rows."""
+        """Take the scores (n, c) of the samples last asked for, and make the next ones."""

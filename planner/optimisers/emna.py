@@ -1,8 +1,7 @@
-"""EMNA: the estimation of multivariate normal algorithm, an EDA that learns how all variables depend on each other.
+"""EMNA: estimation of multivariate normal algorithm, with a full covariance of all variables.
 
-Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002, chapter 3 (EMNA-global): where
-`planner.optimisers.umda` fits one Gaussian to each variable, this fits one to all of them, covariances included.  It
-knows a box, samples and a ranking, and nothing of what they stand for.
+Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002, chapter 3 (EMNA-global). Where
+`planner.optimisers.umda` fits an independent Gaussian to each variable, this fits one multivariate Gaussian.
 """
 
 import numpy as np
@@ -11,12 +10,13 @@ from planner.optimisers.box_search import Floats
 from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
 from planner.optimisers.umda import Umda
 
-# Added to each variance, as a share of their mean: fewer rows than variables make a covariance singular.
+# Regularisation added to each variance, as a share of their mean: with fewer samples than variables a covariance is
+# singular.
 COVARIANCE_RIDGE = 1e-9
 
 
 class Emna(Umda):
-    """Ask and tell as `planner.optimisers.umda.Umda`, with a full covariance in place of independent marginals.
+    """Like `planner.optimisers.umda.Umda`, with a full covariance in place of independent marginals.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -31,9 +31,9 @@ class Emna(Umda):
     """
 
     def _sample(self, count: int) -> Floats:
-        """Rows from the Gaussian of most likelihood (1/N), redrawn and then clipped to the box."""
+        """Samples of the maximum-likelihood Gaussian (1/N), redrawn and finally clipped to the box."""
         mean = self.samples.mean(axis=0)
-        # Scaled to the box, so that metres of one variable do not drown those of another.
+        # Scaled to the box, so that the regularisation suits variables of different units.
         width = self.upper - self.lower
         rows = np.ascontiguousarray((self.samples - mean) / width)
         factor = cholesky(covariance(rows, 0, 0, mean.size), COVARIANCE_RIDGE)

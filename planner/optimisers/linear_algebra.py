@@ -1,6 +1,6 @@
-"""Products and factors of matrices with their sums in a fixed order.
+"""Matrix products and factorisations with a fixed order of summation.
 
-BLAS and LAPACK sum and round as the machine has it; a search must give the same samples on every machine.
+BLAS and LAPACK sum and round differently on different machines; a search must draw the same samples on all of them.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 @compiled
 def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:  # pragma: no cover - compiled
-    """Covariance (size, size) of two groups of columns of centred rows (n, d), by where the groups begin."""
+    """Covariance (size, size) of two groups of columns of centred rows (n, d), given the first column of each."""
     out = np.zeros((size, size))
     for n in range(rows.shape[0]):
         for i in range(size):
@@ -25,7 +25,7 @@ def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:  # p
 
 @compiled
 def cholesky(matrix: Floats, ridge: float) -> Floats:  # pragma: no cover - compiled
-    """Lower factor (d, d) of a covariance (d, d), ridge x mean variance added to its diagonal."""
+    """Lower Cholesky factor (d, d) of a covariance (d, d) with ridge x mean variance added to its diagonal."""
     size = matrix.shape[0]
     trace = 0.0
     for i in range(size):
@@ -47,7 +47,7 @@ def cholesky(matrix: Floats, ridge: float) -> Floats:  # pragma: no cover - comp
 
 @compiled
 def times_lower(rows: Floats, factor: Floats) -> Floats:  # pragma: no cover - compiled
-    """Rows (n, d) times the transpose of a lower triangle (d, d)."""
+    """Rows (n, d) times the transpose of a lower triangular matrix (d, d)."""
     out = np.zeros(rows.shape)
     for n in range(rows.shape[0]):
         for i in range(factor.shape[0]):
@@ -76,10 +76,9 @@ def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: n
 
 @compiled
 def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - compiled
-    """Fill the lower factor (d, b) of a positive definite band matrix (d, b).
+    """Fill the lower Cholesky factor (d, b) of a positive definite band matrix (d, b).
 
-    Entry [i, k] of either stands in row i and column i - k.  A pivot that rounding leaves below a trillionth of its
-    diagonal entry is taken for that.
+    Entry [i, k] of both is that of row i and column i - k. Pivots are at least 1e-12 times their diagonal entry.
     """
     size, wide = matrix.shape
     for i in range(size):
@@ -92,7 +91,7 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - co
 
 @compiled
 def solve_band(factor: Floats, right: Floats, out: Floats) -> None:  # pragma: no cover - compiled
-    """Fill the solution (d,) of the equations whose matrix has this band factor (d, b)."""
+    """Fill the solution (d,) of a linear system given the band factor (d, b) of its matrix."""
     size, wide = factor.shape
     for i in range(size):
         total = right[i]

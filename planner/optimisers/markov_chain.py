@@ -1,8 +1,8 @@
-"""UMDA with a Markov chain: each group of variables depends on the group before it, linearly and with Gaussian rest.
+"""An estimation of distribution algorithm with a Markov chain: each group of variables depends on the previous group.
 
-A path's waypoint goes the same way round an obstacle as the waypoint before it.  Independent marginals forget that; a
-chain keeps it with far fewer numbers than a full covariance, so that a small population can tell them.  It knows a
-box, groups of columns, samples and a ranking, and nothing of what they stand for.
+The dependence is linear with Gaussian residuals. A waypoint passes an obstacle on the same side as the waypoint before
+it. Independent marginals lose this dependence; a chain keeps it with far fewer parameters than a full covariance, so
+that a small population suffices to estimate it.
 """
 
 import numpy as np
@@ -12,12 +12,12 @@ from planner.optimisers.linear_algebra import cholesky, covariance
 from planner.optimisers.umda import Umda
 from world.kernels import compiled
 
-# Added to each variance of a group, as a share of their mean.
+# Regularisation added to each variance of a group, as a share of their mean.
 RIDGE = 1e-6
 
 
 class MarkovChain(Umda):
-    """Ask and tell as `planner.optimisers.umda.Umda`, its model a first-order chain over groups of variables.
+    """Like `planner.optimisers.umda.Umda`, with a first-order Markov chain over groups of variables.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -28,14 +28,14 @@ class MarkovChain(Umda):
     >>> bool(search.scores.min() < 1e-4)
     True
 
-    The arguments are those of `Umda`; `basis` and `floor` are unused.  The number of variables is a multiple of
-    `GROUP`, of which each consecutive group depends on the one before it.
+    The arguments are those of `Umda`; `basis` and `floor` are unused. The number of variables is a multiple of `GROUP`;
+    each group of consecutive variables depends on the previous one.
     """
 
     GROUP = 3
 
     def _sample(self, count: int) -> Floats:
-        """Rows drawn group by group, each given the one before; redrawn and then clipped to the box."""
+        """Samples drawn group by group, each conditional on the previous; redrawn and finally clipped to the box."""
         mean = self.samples.mean(axis=0)
         width = self.upper - self.lower
         slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, RIDGE)
@@ -46,7 +46,7 @@ class MarkovChain(Umda):
 
 @compiled
 def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
-    """Of each group (g, size, size): its regression on the group before, and the lower factor of what is left."""
+    """For each group (g, size, size): regression on the previous group, and Cholesky factor of the residuals."""
     groups = rows.shape[1] // size
     slope, spread = np.zeros((groups, size, size)), np.zeros((groups, size, size))
     spread[0] = cholesky(covariance(rows, 0, 0, size), ridge)
@@ -54,7 +54,7 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  
         before, here = (g - 1) * size, g * size
         factor = cholesky(covariance(rows, before, before, size), ridge)
         cross = covariance(rows, here, before, size)
-        # slope = cross (L L^T)^-1, by two substitutions a row.
+        # slope = cross (L L^T)^-1, by forward and back substitution for each row.
         for i in range(size):
             for j in range(size):
                 for k in range(j):
@@ -76,7 +76,7 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  
 
 @compiled
 def draw_chain(free: Floats, slope: Floats, spread: Floats) -> Floats:  # pragma: no cover - compiled
-    """Rows (n, g size) of the chain from independent standard numbers."""
+    """Samples (n, g size) of the chain from independent standard normal numbers."""
     groups, size, _ = slope.shape
     out = np.zeros(free.shape)
     for n in range(free.shape[0]):

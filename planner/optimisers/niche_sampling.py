@@ -1,10 +1,9 @@
-"""Samples of many groups of variables at once: each group keeps its best that lie apart, and samples around them.
+"""Sampling with niches: many groups of variables at once, each with a mixture of Gaussians around its best samples.
 
-Where `planner.optimisers.umda` fits one Gaussian to each variable, here a group's density is a sum of Gaussians, one
-about each row that is kept (Bosman and Thierens, "IDEAs based on the normal kernels probability density function",
-Utrecht University UU-CS-2000-11), and rows are kept apart by clearing (Petrowski, "A clearing procedure as a niching
-method for genetic algorithms", ICEC 1996).  So several ways round an obstacle live beside each other.  It knows boxes,
-rows, costs and which rows are allowed, and nothing of what they stand for.
+Where `planner.optimisers.umda` fits one Gaussian to each variable, the density of a group here is a sum of Gaussians
+around its selected samples (Bosman and Thierens, "IDEAs based on the normal kernels probability density function",
+Utrecht University UU-CS-2000-11). Selection keeps niches apart by clearing (Petrowski, "A clearing procedure as a
+niching method for genetic algorithms", ICEC 1996), so that several routes around an obstacle coexist.
 """
 
 from collections.abc import Callable
@@ -18,21 +17,21 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Draws of a row that is not allowed before it is taken as it is: of the first rows, and of later ones.
+# Redraws of an infeasible sample before it is accepted: of the first samples, and of later ones.
 FIRST_REDRAWS, REDRAWS = 8, 4
-# Rows of a group that are kept apart by less than this share of the deviation are one.
+# Clearing radius of niches, as a share of the sampling deviation.
 CLEARING = 0.5
-# Of the rows of a group, the share that is kept at most.
+# Maximum share of a group's samples that are selected.
 KEPT_SHARE = 0.5
-# Rows of a group that are kept, however much they cost.
+# Samples selected of each group whatever their cost.
 FEWEST_KEPT = 4
 
 
 class NicheSampling:
-    """Rows of groups of variables (g, n, d), from the whole box to the niches of the best.
+    """Samples of groups of variables (g, n, d), from the whole box to the niches of the best.
 
     lower, upper: (g, d) boxes.
-    allowed: rows (n, d) of group numbers (n,) -> flags (n,).
+    allowed: samples (n, d) of groups (n,) -> feasibility (n,).
     rng: of all draws.
 
     >>> lower, upper = np.full((3, 2), -2.0), np.full((3, 2), 6.0)
@@ -57,10 +56,10 @@ class NicheSampling:
         self._rng = rng
 
     def first(self, count: int, beyond: Floats | float = 0.0) -> Floats:
-        """Rows (g, count, d), uniform in the boxes.
+        """Samples (g, count, d), uniform in the boxes.
 
-        beyond: (d,) share of the box by which draws go on above it, to be clipped to its upper side: where the best
-        rows lie on that side, uniform draws hardly ever would.
+        beyond: (d,) share of the box by which draws extend above it before they are clipped, for variables whose best
+        values are at the upper bound, which uniform draws would hardly ever reach.
         """
         size = (len(self._lower), count, self._lower.shape[1])
         top = self._upper + beyond * (self._upper - self._lower)
@@ -73,10 +72,10 @@ class NicheSampling:
         return self._drawn(size, draw, FIRST_REDRAWS)
 
     def next(self, rows: Floats, costs: Floats, count: int, deviation: Floats, most: float, elite: Floats) -> Floats:
-        """Rows (g, count, d): the elite, the best that lie apart, and new ones around all of these.
+        """Samples (g, count, d): the elite, the best of each niche, and new samples around these.
 
-        rows: (g, n, d) with their costs (g, n).  deviation: (d,) of the new rows.  most: what a row that is kept may
-        cost.  elite: (g, d), kept in any case.
+        rows: (g, n, d) with costs (g, n). deviation: (d,) of new samples. most: maximum cost of a selected sample.
+        elite: (g, d), always selected.
         """
         kept, numbers = _keep(rows, costs, elite, CLEARING * deviation, most, max(1, int(KEPT_SHARE * count)))
         groups, parents = len(rows), kept.shape[1]
@@ -92,7 +91,7 @@ class NicheSampling:
         return out
 
     def _drawn(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], redraws: int) -> Floats:
-        """Rows of this size by a draw for each group number; those that are not allowed are drawn again."""
+        """Samples of this shape, from a function that draws one for each group number; infeasible ones are redrawn."""
         groups = np.repeat(np.arange(size[0]), size[1])
         out = draw(groups)
         bad = np.flatnonzero(~self._allowed(out, groups))
@@ -109,7 +108,7 @@ class NicheSampling:
 def _keep(
     rows: Floats, costs: Floats, elite: Floats, apart: Floats, most: float, number: int
 ) -> tuple[Floats, Ints]:  # pragma: no cover - compiled
-    """Rows (g, number, d) that are kept of each group, the elite first, and how many, (g,)."""
+    """Selected samples (g, number, d) of each group, the elite first, and their numbers (g,)."""
     groups, _, size = rows.shape
     kept, numbers = np.zeros((groups, number, size)), np.ones(groups, dtype=np.int64)
     for g in range(groups):
@@ -126,7 +125,7 @@ def _keep(
 
 @compiled
 def _lies_apart(row: Floats, others: Floats, apart: Floats) -> bool:  # pragma: no cover - compiled
-    """Whether a row (d,) differs from each other one in some variable by at least so much."""
+    """Whether a sample (d,) differs from each of the others by at least `apart` in some variable."""
     for n in range(others.shape[0]):
         near = True
         for d in range(row.size):

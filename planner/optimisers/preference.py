@@ -1,11 +1,11 @@
-"""Preference between scored candidates: goals, priorities and Pareto dominance (Fonseca and Fleming 1998).
+"""Preference between scored candidates: goals, priorities and Pareto dominance.
 
 Fonseca and Fleming, "Multiobjective optimization and multiple constraint handling with evolutionary algorithms", IEEE
-Transactions on Systems, Man, and Cybernetics A 28, 1998.  Levels come in order of priority.  With U the components of a
-level in which u violates its goal, u is preferred to v if u dominates v on U; or if they are equal on U and either v
-violates a goal outside U, or u is preferred to v at the next level (at the lowest: u dominates v on the components it
-satisfies).  A component without a goal counts as violated (goal -inf), so a level without goals has U = all its
-components.
+Transactions on Systems, Man, and Cybernetics A 28, 1998. Levels are in order of priority. Let U be the components of a
+level in which u violates its goal. Then u is preferred to v if u dominates v on U; or if they are equal on U and either
+v violates a goal outside U, or u is preferred to v at the next level (at the lowest: u dominates v on the components
+that satisfy their goals). A component without a goal counts as violated (goal -inf), so for a level without goals U is
+all its components.
 """
 
 from collections.abc import Sequence
@@ -21,29 +21,29 @@ Ints = NDArray[np.int64]
 
 NO_GOAL = -np.inf
 
-# Rows sorted by insertion at a time; and rows of two columns from which on a tree counts faster than a scan.
+# Run length of insertion sort; and number of rows of two columns above which a tree counts faster than a scan.
 INSERTED, MANY = 8, 4000
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One priority: columns of the scores, all minimised, and a goal for each (`NO_GOAL` for none)."""
+    """One priority level: columns of the scores, all minimised, and a goal for each (`NO_GOAL` for none)."""
 
     columns: tuple[int, ...]
     goals: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Refuse a level whose goals do not match its columns."""
+        """Raise ValueError if the goals do not match the columns."""
         if len(self.columns) != len(self.goals) or not self.columns:
             raise ValueError(f"{len(self.columns)} columns and {len(self.goals)} goals: give one goal a column")
 
 
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """How many rows of scores (n, c) are preferred to each, (n,), counted level by level.
+    """Number of rows of scores (n, c) that are preferred to each, (n,), counted level by level.
 
     With every component raised to its goal, "u dominates v on U, or is equal there and v violates a goal outside U" is
-    Pareto dominance on the level, and only rows equal on it go on to the next: a component outside U is at its
-    goal, which no other row is below.  So each level is one dominance count inside groups of ties.
+    Pareto dominance on the level, and only rows equal on it proceed to the next: a component outside U is at its goal,
+    and no row is below it. Each level is therefore one dominance count within groups of ties.
 
     >>> levels = Level((0,), (0.0,)), Level((1,), (NO_GOAL,))
     >>> ranks(np.array([[0.0, 9.0], [1.0, 2.0], [0.0, 3.0]]), levels).tolist()  # those that meet the goal come first
@@ -52,7 +52,7 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
     columns = [column for level in levels for column in level.columns]
     goals = [goal for level in levels for goal in level.goals]
     lowest = list(levels[-1].columns)
-    # The lowest level comes once more as it is, for rows that are equal on all.
+    # The lowest level is appended without goals, for rows that are equal on all levels.
     table = np.concatenate([np.maximum(scores[:, columns], goals), scores[:, lowest]], axis=1)
     widths = np.array([*(len(level.columns) for level in levels), len(lowest)])
     return np.asarray(_rank_rows(np.ascontiguousarray(table.T), widths))
@@ -66,7 +66,7 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
     order, scratch = np.arange(count), np.empty(count, dtype=np.int64)
     sorted_ = np.empty((table.shape[0], count))
     below = np.empty(count, dtype=np.int64)
-    # Ties: groups of rows that are equal so far, as positions in the order where each begins, closed by the count.
+    # Groups of tied rows: the position in the order at which each begins, followed by the count.
     begins, after = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
     begins[0], begins[1], groups = 0, count, 1
     column = 0
@@ -97,7 +97,7 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
         begins, after = after, begins
         column += width
         if groups == count:
-            # No two rows are equal: lower levels have nothing to decide.
+            # No ties left for lower levels to decide.
             break
     return total
 
@@ -106,9 +106,9 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
 def _sort(
     table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int
 ) -> None:  # pragma: no cover - compiled
-    """Sort order[begin:end] by the rows' numbers in some columns, the first column first: a stable merge sort."""
+    """Sort order[begin:end] lexicographically by `width` columns of the table: a stable merge sort."""
     for k in range(begin + 1, end):
-        # A few rows at a time by insertion.
+        # Insertion sort of short runs.
         low = begin + (k - begin) // INSERTED * INSERTED
         row, at = order[k], k
         while at > low and _before(table, column, width, row, order[at - 1]):
@@ -136,7 +136,7 @@ def _sort(
 
 @compiled
 def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # pragma: no cover - compiled
-    """Whether row a comes before row b, column by column."""
+    """Whether row a precedes row b, column by column."""
     for c in range(column, column + width):
         if table[c, a] != table[c, b]:
             return bool(table[c, a] < table[c, b])
@@ -147,7 +147,10 @@ def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # 
 def _count_any(
     rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints
 ) -> None:  # pragma: no cover - compiled
-    """Add to total the dominators of each row of a group; rows: (c, n), sorted: only an earlier row can dominate."""
+    """Add the number of dominators of each row of a group to total.
+
+    rows: (c, n), sorted, so that only earlier rows can dominate.
+    """
     dominators = 0
     for k in range(begin + 1, end):
         equal = True
@@ -155,7 +158,7 @@ def _count_any(
             equal = equal and rows[c, k] == rows[c, k - 1]
         if not equal:
             dominators = k - begin
-            # In the first column no earlier row is larger.
+            # No earlier row is larger in the first column.
             if width == 2:
                 dominators = _at_most(rows[1, begin:k], rows[1, k])
             elif width > 2:
@@ -169,7 +172,7 @@ def _count_any(
 
 @compiled
 def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compiled
-    """How many values are not above the limit.  A loop without branches, which becomes vector instructions."""
+    """Number of values not above the limit. Without branches, so that the loop is vectorised."""
     count = 0
     for k in range(values.size):
         count += 1 if values[k] <= limit else 0
@@ -178,14 +181,14 @@ def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compile
 
 @compiled
 def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:  # pragma: no cover - compiled
-    """Take the mark from the places of values above the limit."""
+    """Clear the marks of values above the limit."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
 
 
 @compiled
 def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -> None:  # pragma: no cover - compiled
-    """Add to total the dominators of each row of a group, by a Fenwick tree over the second of two columns.
+    """Add the number of dominators of each row of a group to total, with a Fenwick tree over the second of two columns.
 
     O(n log n), for many rows.
     """

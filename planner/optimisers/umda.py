@@ -1,8 +1,7 @@
-"""UMDAc: the univariate marginal distribution algorithm for continuous variables, as ask and tell.
+"""UMDAc: univariate marginal distribution algorithm for continuous variables, with an ask-and-tell interface.
 
-Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002; section IV of Yang, Tang and Lozano,
-CEC 2014.  It knows a box, samples and a ranking, and nothing of what
-they stand for.
+Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002; section IV of Yang, Tang and Lozano, CEC
+2014.
 """
 
 from collections.abc import Callable
@@ -12,12 +11,12 @@ import numpy as np
 from planner.optimisers.box_search import BoxSearch, Floats, Ints
 from planner.optimisers.linear_algebra import times_sparse
 
-# Draws of a sample that falls outside the box before it is clipped to it.
+# Redraws of a sample outside the box before it is clipped.
 REDRAWS = 10
 
 
 class Umda(BoxSearch):
-    """Keeps the better half of a population, and samples the other half from its marginals, in ask and tell.
+    """Keeps the better half of a population and replaces the other half by samples of its marginal distributions.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -30,11 +29,11 @@ class Umda(BoxSearch):
 
     The other arguments are those of `BoxSearch`.
 
-    basis: (d, d) orthogonal matrix whose columns are the directions in which the marginals are independent; None for
-    the variables themselves.
-    floor: (d,) smallest standard deviation along each direction, or None.
+    basis: (d, d) orthogonal matrix whose columns are the directions along which marginals are independent; None for the
+    variables themselves.
+    floor: (d,) minimum standard deviation along each direction, or None.
 
-    samples and scores are the kept half, (n, d) and (n, c), best first; without rows before the first `tell`.
+    samples and scores are the selected half, (n, d) and (n, c), best first; empty before the first `tell`.
     """
 
     def __init__(
@@ -54,16 +53,16 @@ class Umda(BoxSearch):
         self._floor = floor
 
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of what was asked; keep the better half and sample the next rows."""
+        """Take the scores (n, c) of the samples last asked for, select the better half and sample the next ones."""
         samples = np.concatenate([self.samples, self._asked])
         known = np.concatenate([self.scores, scores]) if len(self.scores) else scores
-        # Equal ranks are ordered by a seeded draw, not by age.
+        # Ties are broken by a seeded draw, not by age.
         order = np.lexsort((self._rng.random(len(known)), self._rank(known)))[: self._half]
         self.samples, self.scores = samples[order], known[order]
         self._asked = self._sample(len(samples) - self._half)
 
     def _sample(self, count: int) -> Floats:
-        """Rows from independent Gaussians (maximum likelihood, 1/N), redrawn and then clipped to the box."""
+        """Samples of independent Gaussians (maximum likelihood, 1/N), redrawn and finally clipped to the box."""
         kept = self.samples if self._basis is None else _project(self.samples, self._basis)
         mean, deviation = kept.mean(axis=0), kept.std(axis=0)
         if self._floor is not None:
@@ -76,7 +75,7 @@ class Umda(BoxSearch):
         )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
-        """Rows of `draw`; those outside the box are drawn again, and then clipped."""
+        """Samples of `draw`; those outside the box are redrawn and finally clipped."""
         out = draw(count)
         rows = np.flatnonzero(((out < self.lower) | (out > self.upper)).any(axis=1))
         for _ in range(REDRAWS):
@@ -88,7 +87,7 @@ class Umda(BoxSearch):
         return np.clip(out, self.lower, self.upper)
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
-        """Numbers drawn from independent Gaussians; those outside the box are drawn again, and then clipped."""
+        """Values drawn from independent Gaussians; those outside the box are redrawn and finally clipped."""
         rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
         for _ in range(REDRAWS):
             if rows.size == 0:

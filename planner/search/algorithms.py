@@ -1,4 +1,8 @@
-"""The algorithms that a scenario or a command may name."""
+"""The planning algorithms by name, and the limits within which each plans.
+
+An `Algorithm` combines an encoding, a kind of scores, seeding and an optimiser; `ALGORITHMS` lists all that a scenario
+or a command may name.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -12,15 +16,15 @@ Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 
 @dataclass(frozen=True, slots=True)
 class Algorithm:
-    """One way to search: its encoding and what it adds to the planner of Yang, Tang and Lozano (CEC 2014).
+    """One search method: its encoding and its extensions of the planner of Yang, Tang and Lozano (CEC 2014).
 
-    name, summary: as commands and their help show them.
+    name, summary: as shown by commands and their help.
     encoding: a name of `planner.evaluation.encoding.ENCODINGS`.
-    graded: constraints by how far they are violated, along the whole path, and kill exposure ahead of length.
-    smooth: first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
+    graded: scores violations by amount along the whole path, and ranks kill exposure before length.
+    smooth: draws first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
     seeded: starts from grid routes, improved by a pattern search.
-    tightened: ends with moves of all waypoints of its best path at once.
-    optimiser: which of `planner.optimisers` it uses; "waypoints" is `planner.search.generations`.
+    tightened: finally moves all waypoints of the best path at once.
+    optimiser: from `planner.optimisers`; "waypoints" is `planner.search.generations.waypoint_generations`.
     """
 
     name: str
@@ -140,9 +144,9 @@ def algorithm_lines() -> str:
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:
-    """The algorithm of this name, the default for None.  Raises ScenarioError for a name that is none.
+    """The algorithm with this name; the default for None. Raises ScenarioError for an unknown name.
 
-    source: what asked for it, as the error's first words.
+    source: origin of the name, with which the error message begins.
 
     >>> find_algorithm(None, "example.toml").name, find_algorithm("umda-polar", "example.toml").encoding
     ('fda-seeded', 'polar')
@@ -154,10 +158,6 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     return found
 
 
-# ----------------------------------------------------------------------
-# The limits that an algorithm plans within.
-
-
 def limits_for(algorithm: Algorithm, limits: Limits) -> Limits:
-    """Limits that an algorithm plans within: those that count violations are the paper's, and know no autopilot."""
+    """Limits for an algorithm: those with the paper's violation counts ignore the autopilot's tracking error."""
     return limits if algorithm.graded else replace(limits, tracking=None)

@@ -1,4 +1,9 @@
-"""Why no path was found: what stands across the whole way, and what the search could not have tried."""
+"""Explanations of a search without a feasible path: obstacles that block all routes, and limits of the method.
+
+`what_blocks` collects lines for the user. It looks for lines across the map where ground and clearance reach the
+ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on a coarse
+grid (connected components); and for bands of heights that the required margins close.
+"""
 
 import itertools
 import math
@@ -21,20 +26,19 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-# ----------------------------------------------------------------------
-# Which zones close the way from start to destination: cells of a coarse grid that hang together, and their bounds.
+# --- Zones that separate start and destination ---
 
 
-# Cells along the map's longer side, and heights from the lowest to the highest that a path may be at.
+# Cells along the map's longer side, and heights from the lowest to the highest allowed.
 CELLS, HEIGHTS = 150, 5
-# What a cell is closed by, if not by the zone of a number.
+# State of a cell, unless it is the index of the zone that closes it.
 _OPEN, _GROUND = -1, -2
 
 
 class Closed(NamedTuple):
-    """What closes the way.
+    """Zones that separate start and destination.
 
-    zones: names of the zones that bound both what can be reached from the start and from the destination.
+    zones: names of the zones adjacent to both regions, that reachable from the start and that from the destination.
     pitch: of the cells, m.
     """
 
@@ -43,9 +47,9 @@ class Closed(NamedTuple):
 
 
 def closing_zones(scenario: Scenario) -> Closed | None:
-    """What of a scenario's zones closes the way; None where none does, or the ground does it without them.
+    """Zones that separate start and destination; None if there are none, or if the ground alone separates them.
 
-    A gap narrower than a cell counts as closed.  Missiles and what an aircraft can climb are not looked at.
+    A gap narrower than a cell counts as closed. Missiles and the aircraft's climb are ignored.
 
     >>> from world.scenario import load_scenario
     >>> closing_zones(load_scenario("tight")) is None
@@ -90,7 +94,7 @@ def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Fl
 
 
 def _reached(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
-    """Whether open cells lead from the one end to the other."""
+    """Whether open cells connect the two ends."""
     from scipy import ndimage
 
     regions, _ = ndimage.label(cells == _OPEN)
@@ -101,7 +105,7 @@ def _reached(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
 def _close(
     records: ZoneRecords, east: Floats, north: Floats, ground: Floats, low: Floats, top: Floats, cells: Ints
 ) -> None:  # pragma: no cover - compiled
-    """Note in open cells (heights, rows, columns) the first zone that closes them."""
+    """Store in open cells (heights, rows, columns) the first zone that closes them."""
     for z in range(records.zones.shape[0]):
         zone = records.zones[z]
         for i in range(north.size):
@@ -117,12 +121,11 @@ def _close(
                         cells[k, i, j] = z
 
 
-# ----------------------------------------------------------------------
-# Bands of heights that leave a path no room: between what is kept from their lower and from their upper edge.
+# --- Bands of heights closed by the required margins ---
 
 
 def narrow_bands(problem: Problem) -> list[str]:
-    """Lines that name each band, of the limits or of an inclusion, in which a plan's reserves leave no height at all.
+    """Lines that name each band of heights, of the limits or of an inclusion, that the required margins close.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -157,7 +160,7 @@ def narrow_bands(problem: Problem) -> list[str]:
 
 
 def highest_allowed(problem: Problem) -> tuple[float, str]:
-    """The highest that a plan may be anywhere, m AMSL, and what says so: the ceiling, or an inclusion's.
+    """Greatest height of a plan anywhere, m AMSL, and the limit that sets it: the ceiling, or that of an inclusion.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -175,16 +178,18 @@ def highest_allowed(problem: Problem) -> tuple[float, str]:
     return min(tops)
 
 
-# Places looked at along and across the way.
+# --- Lines for the user ---
+
+# Points along and across the direct line.
 ALONG, ACROSS = 200, 400
-# Names of zones that are said, at most; and between places of a path that is looked at for them, m.
+# Maximum number of zones named; and spacing of points on a path that is tested against them, m.
 MAX_NAMES, ZONE_PITCH = 4, 20.0
 
 
 def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
-    """Lines that say what is in the way of a plan that is not feasible, and what a search in its encoding cannot do.
+    """Lines that state what blocks an infeasible plan, and what a search in its encoding cannot find.
 
-    limits: of the path; where they are given, what a plan keeps in reserve is looked at, too.
+    limits: of the path; if given, the margins that a plan requires are examined too.
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
@@ -225,7 +230,7 @@ def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
 
 
 def _walls(scenario: Scenario) -> list[str]:
-    """Where, across the whole map, the ground leaves no height below the ceiling, or missiles cover every height."""
+    """Lines across the whole map where the ground reaches the ceiling, or missiles cover every height above it."""
     terrain = scenario.terrain
     if terrain is None:
         return []
@@ -247,7 +252,7 @@ def _walls(scenario: Scenario) -> list[str]:
 
 
 def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Lines across the map between the ends: how far from the start, m, and places (n, 2) on it."""
+    """Lines across the map between the ends: distance from the start, m, and points (n, 2) on each."""
     frame = rotated_frame(scenario.start, scenario.destination)
     widest = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-widest, widest, ACROSS)
@@ -259,14 +264,14 @@ def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
 
 
 def _reserve_walls(problem: Problem) -> list[str]:
-    """Where, across the whole map, ground, clearance and what a plan keeps in reserve leave no height."""
+    """Lines across the whole map where ground, clearance and required margins leave no height."""
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
         return []
     (top, name), reserve = highest_allowed(problem), float(data.buffer)
     length = math.dist(scenario.start[:2], scenario.destination[:2])
     for along, places in _lines_across(scenario):
-        # Near the ends a plan keeps as much as they leave.
+        # Near the ends the margins are reduced.
         if min(along, length - along) < reserve / BUFFER_GROWTH:
             continue
         lowest = float(np.nanmin(scenario.terrain.height(places[:, 0], places[:, 1]))) + data.clearance
@@ -280,7 +285,7 @@ def _reserve_walls(problem: Problem) -> list[str]:
 
 
 def _unguarded(scenario: Scenario, places: np.ndarray, lowest: np.ndarray) -> bool:
-    """Whether some height at some of the places (n, 2) is outside every kill sphere."""
+    """Whether any height above any of the points (n, 2) is outside every kill sphere."""
     threats = scenario.threats
     armed = threats.kill_radius > 0.0
     position, radius = threats.position[armed], threats.kill_radius[armed]
@@ -296,7 +301,7 @@ def _unguarded(scenario: Scenario, places: np.ndarray, lowest: np.ndarray) -> bo
 
 
 def zones_entered(scenario: Scenario, path: np.ndarray) -> list[str]:
-    """Names of the exclusions that places of a path (w, 3) are inside, and of the inclusions that they are outside.
+    """Names of the zones that a path (w, 3) violates: exclusions that it enters, inclusions that it leaves.
 
     >>> from world.scenario import load_scenario
     >>> zones_entered(load_scenario("tight"), np.zeros((2, 3)))

@@ -1,4 +1,16 @@
-"""Generations of an optimiser: of whole paths, and of waypoints that are worth the best path through each."""
+"""Generations of the two kinds of evolutionary search: of whole paths, and of single waypoints.
+
+`path_generations` runs an optimiser on vectors of whole paths, ranked by the preference between their scores.
+
+`waypoint_generations` is a factorised distribution algorithm (Mühlenbein and Mahnig, "FDA - a scalable evolutionary
+algorithm for the optimization of additively decomposed functions", Evolutionary Computation 7, 1999) over the paper's
+subspaces: "to find one optimal waypoint in each subspace, so that the line segments from itself to its two adjacent
+waypoints satisfy all the constraints and objectives" (Yang, Tang and Lozano, CEC 2014, section I).
+UMDA ranks whole paths, so that a good waypoint is lost with a bad path. Here every interval has a population of
+candidates; all combinations are evaluated at once by dynamic programming (`planner.seeding.waypoint_chains`), and each
+candidate is ranked by the best path through it. The best candidates of each niche form the interval's next density
+(`planner.optimisers.niche_sampling`), so that routes on several sides of the obstacles coexist until one is shorter.
+"""
 
 import math
 from collections.abc import Callable
@@ -21,22 +33,20 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-# ----------------------------------------------------------------------
-# Generations of whole paths: an optimiser of vectors, its samples ranked by the preference between scores.
+# --- Whole paths ---
 
 
-# A seeded search ends when this many generations have shortened its best path by less than this share of the straight
-# line: the pattern search at the end is faster at the rest.
+# A seeded search ends when the best path has gained less than this share of the straight line in this many generations:
+# the final pattern search is more efficient from there.
 STALLED_GENERATIONS, MIN_GAIN = 10, 2e-4
-# Of the evaluations that the paper's planner makes, the share that a seeded search's generations spend: while it has no
-# safe path, and once it has.
+# Share of the paper's number of evaluations that a seeded search may spend: without a safe path, and with one.
 SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
 
 
 def path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
-    """Search with this many paths and generations; the best vector (d,) of the last.
+    """Run an optimiser on whole paths; returns the best vector (d,) of the last generation.
 
-    starts: vectors (s, d) that the first population is drawn around.
+    starts: vectors (s, d) around which the first population is sampled.
     """
     encoding, algorithm = search.encoding, search.algorithm
     levels, before = _levels(search), search.evaluations
@@ -63,7 +73,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
 
 
 def _levels(search: Search) -> tuple[Level, ...]:
-    """Preference that ranks a population; goals are the scenario's, none by default."""
+    """Preference levels for ranking; goals are those of the scenario, by default none."""
     goals = search.problem.scenario.planner.goals
     length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
     kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
@@ -80,7 +90,7 @@ def _best_row(scores: Floats) -> Floats:
 def _make_optimiser(
     search: Search, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
 ) -> Umda | DifferentialEvolution:
-    """The optimiser that the algorithm names."""
+    """The optimiser named by the algorithm."""
     lower, upper = search.encoding.lower, search.encoding.upper
     if search.algorithm.optimiser == "differential":
         return DifferentialEvolution(lower, upper, rank, population, search.rng, initial=initial)
@@ -93,7 +103,7 @@ def _make_optimiser(
 
 
 def _stagnant(bests: list[Floats]) -> bool:
-    """Whether the last generations have gained next to nothing."""
+    """Whether the last generations gained almost nothing."""
     if len(bests) <= STALLED_GENERATIONS:
         return False
     before, after = bests[-1 - STALLED_GENERATIONS], bests[-1]
@@ -101,46 +111,36 @@ def _stagnant(bests: list[Floats]) -> bool:
     return bool(same and before[LENGTH] - after[LENGTH] < MIN_GAIN)
 
 
-# ----------------------------------------------------------------------
-# An estimation of distribution algorithm whose samples are waypoints: what a waypoint is worth is the best path of
-# it.
-#
-# A factorised distribution algorithm (Mühlenbein and Mahnig, "FDA - a scalable evolutionary algorithm for the
-# optimization of additively decomposed functions", Evolutionary Computation 7, 1999) of the paper's subspaces: "to
-# find one optimal waypoint in each subspace, so that the line segments from itself to its two adjacent waypoints
-# satisfy all the constraints and objectives" (Yang, Tang and Lozano, CEC 2014, section I).  UMDA ranks whole paths,
-# and a good waypoint of a bad path is lost with it.  Here the populations of all intervals are joined in every way at
-# once (`planner.seeding.waypoint_chains`), each waypoint is ranked by the best path through it, and the better ones
-# that lie apart make the interval's next density (`planner.optimisers.niche_sampling`): several sides of the
-# obstacles live beside each other until one is shorter.
+# --- Single waypoints ---
 
-# Generations at most: the last moves waypoints by decimetres.  Beside seeds, whose best path is tightened in any case,
-# fewer of fewer waypoints do: this share of the population at first.
+# Maximum number of generations; the last move waypoints by decimetres. With seeds, whose best path is tightened anyway,
+# fewer generations of a smaller population suffice.
 MAX_GENERATIONS, SEEDED_GENERATIONS, SEEDED_SHARE = 10, 6, 0.4
-# Of the first generation's waypoints an interval, the share that later ones have, and the fewest.
+# Population of later generations, as a share of the first, and its minimum.
 LATER_SHARE, FEWEST = 0.2, 24
-# Legs that one generation may be able to join, so many that they fit the memory of a small machine.
+# Maximum number of legs between the candidates of one generation: limits memory.
 MAX_LEGS = 6_000_000
-# First deviations about a kept waypoint, as shares of the interval, along and across, and up, m; what is left of them
-# after each generation.
+# Initial sampling deviations around a selected waypoint: along and across as shares of the interval, up in m; and their
+# reduction per generation.
 FIRST_ALONG, FIRST_ACROSS, FIRST_UP, SHRINK = 0.4, 0.5, 60.0, 0.5
-# Of the heights, how far draws go on above the ceiling, where spheres are smallest, to be clipped to it.
+# Share of the height range by which draws extend above the ceiling before they are clipped: spheres are smallest there.
 ABOVE_CEILING = 0.3
-# How much longer than the best path one through a kept waypoint may be, as a share: in the first generation, the last.
-# Beside seeds the first is less: their best path is nearer to the shortest than the first that samples make.
+# Maximum excess of a path through a selected waypoint over the best path, as a share: in the first and the last
+# generation; and the smaller first value with seeds, whose best path is closer to the optimum.
 FIRST_SLACK, LAST_SLACK, SEEDED_SLACK = 0.1, 0.003, 0.05
-# Bounds on the first path's cost, over the straight line, tried one after the other: the lower, the faster.
+# Bounds on the first path's cost over the straight line, tried in this order: lower bounds are faster.
 FIRST_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
-# Paths that are evaluated whole: through so many of the best waypoints of every so many intervals.
+# Paths evaluated as a whole: through this many of the best candidates of every n-th interval.
 BEST_EACH, EVERY = 3, 3
-# Evaluations that mend a generation's best path by a pattern search while none is feasible, at most.
+# Maximum evaluations of a pattern search on a generation's best path while no path is feasible.
 MENDING = 100
 
 
 def waypoint_generations(search: Search, population: int, generations: int) -> None:
-    """Search with this many waypoints an interval at first; the archive takes the paths that are found.
+    """Run the factorised distribution algorithm; the archive takes the paths found.
 
-    generations: at most `MAX_GENERATIONS` are made, or `SEEDED_GENERATIONS`.
+    population: candidates per interval in the first generation. generations: limited to `MAX_GENERATIONS`, or
+    `SEEDED_GENERATIONS` with seeds.
     """
     encoding, space = search.encoding, search.problem.space
     inner = encoding.waypoints - 2
@@ -155,7 +155,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
     rows = sampling.first(first, np.array([0.0, 0.0, ABOVE_CEILING]))
     if not len(search.archive.vectors):
-        # Something to show, whenever the search is asked to end.
+        # The archive must hold a path whenever the search is stopped.
         search.evaluate(_as_vectors(rows[:, :1]))
     steps = min(generations, SEEDED_GENERATIONS if seeded else MAX_GENERATIONS)
     slack_at_first = SEEDED_SLACK if seeded else FIRST_SLACK
@@ -178,12 +178,12 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
 
 
 def _as_vectors(rows: Floats) -> Floats:
-    """Waypoints (i, k, 3) of intervals as vectors (k, 3 i): the k-th of each."""
+    """Candidates (i, k, 3) of intervals as vectors (k, 3 i): the k-th of each."""
     return rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
 
 
 def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Best paths through the waypoints of paths (k, w, 3), within a share of the best path's length if there is one."""
+    """Best paths through the candidates of paths (k, w, 3), bounded relative to the best path if there is one."""
     data, space = search.problem.search, search.problem.space
     straight = math.dist(space.start, space.destination)
     candidates = np.ascontiguousarray(paths.transpose(1, 0, 2))
@@ -200,7 +200,7 @@ def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
 
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
-    """Evaluate the best paths through some of the best waypoints, whole; mend one while none is feasible."""
+    """Evaluate the best paths through some of the best candidates as a whole; repair one while none is feasible."""
     chosen = set()
     for i in range(1, len(chains.cost) - 1, EVERY):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_EACH]:

@@ -1,4 +1,4 @@
-"""Small work that calls the kernels of a part of planning, with the types that a search calls them with."""
+"""Small calls of the planner's kernels with the argument types of a search, to compile them ahead of use."""
 
 from typing import NamedTuple
 
@@ -24,12 +24,12 @@ Floats = NDArray[np.float64]
 PARTS = ("scores", "certificates", "shortening", "routes", "paper")
 WAYPOINTS = 8
 STAGES, MAX_ROUTES, FEW = 12, 2, 4
-# How far the path passes aside of the middle, and above it, m.
+# Offset of the path's middle to the side and upwards, m.
 ASIDE, ABOVE = 300.0, 20.0
 
 
 class _Task(NamedTuple):
-    """A small problem, and a path (w, 3) about its middle."""
+    """A small problem, and a path (w, 3) near its direct line."""
 
     problem: Problem
     encoding: Encoding
@@ -37,7 +37,7 @@ class _Task(NamedTuple):
 
 
 def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
-    """Call the kernels of a part of planning, one of `PARTS`, in a scenario that should be small.
+    """Call the kernels of one part of planning, one of `PARTS`, on a scenario that should be small.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario

@@ -1,4 +1,10 @@
-"""An algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
+"""Planning a path: run an algorithm on a scenario and return the plan with its certificate.
+
+A seeded search tries the straight line first, then fits waypoints to grid routes, shortens the best, tries other sides
+of the obstacles, and runs generations of samples if no path is safe. If the certificate fails, up to two more attempts
+use finer grids, larger populations and a larger clearance buffer. If no safe path exists in the straight frame, or only
+a long one, a lattice search looks for routes that turn back.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,19 +32,19 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Of each attempt: stages of its grids with the routes from each, and the population's growth.
+# Per attempt: (stages, number of routes) of its grids, and the factor on the population.
 ATTEMPTS = (
     (((36, 2), (66, 1), (130, 1)), 1),
     (((24, 3), (52, 3), (80, 3), (110, 2)), 2),
     (((44, 3), (96, 3), (160, 2)), 3),
 )
-# Evaluations that the best path at the end is improved with by a pattern search, at most.
+# Maximum evaluations of the final pattern search.
 LAST_SEARCH = 200
-# Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
+# Scales of the moves that finally tighten the best path, relative to those that fit a seed; and rounds of each.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
-# Of the airspeed: in more wind no path is searched for.
+# Maximum wind as a share of the airspeed.
 MAX_WIND = 0.8
-# Numbers a population may hold.
+# Maximum number of values in a population.
 MAX_NUMBERS = 30_000_000
 
 
@@ -54,7 +60,7 @@ def plan_path(
     first_safe: bool = False,
     previous: Floats | None = None,
 ) -> Plan:
-    """Plan a path.  The same scenario, limits, algorithm and seed give the same plan.
+    """Plan a path. The same scenario, limits, algorithm and seed give the same plan.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -63,21 +69,21 @@ def plan_path(
     >>> plan.safe, plan.waypoints.shape
     (True, (10, 3))
 
-    algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
-    progress: called with generations done, generations in all, and a short text.
-    stop: asked every few hundredths of a second; a text ("interrupted") ends the search with the best path yet, and
-        stands in it.
+    algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None for the scenario's, or the default.
+    progress: called with generations done, generations in total, and a short text.
+    stop: called every few hundredths of a second; a returned text ("interrupted") ends the search with the best path so
+    far and is recorded in the plan.
     improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
     first_safe: end with the first safe path.
-    previous: (w, 3) an older path of the same ends and number of waypoints to start from.
+    previous: (w, 3) an older path with the same ends and number of waypoints to start from.
 
-    No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
+    If no feasible path is found, the plan says so. Raises ScenarioError for options that cannot work.
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits_for(chosen, limits))
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
-    # No path is further from a missile's sphere than its own ends are.
+    # No path is further from missile spheres than its own ends.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
     wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
     search = Search(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
@@ -98,7 +104,7 @@ def plan_path(
 
 
 def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:
-    """Search, and search again with finer grids and more samples while the certificate says no."""
+    """Search, and search again with finer grids and more samples while the certificate fails."""
     attempts = ATTEMPTS if search.algorithm.seeded else ATTEMPTS[:1]
     best: tuple[Floats, Certificate] | None = None
     for number in range(len(attempts)):
@@ -109,7 +115,7 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
         except SearchEnded:
             search.note()
         found = search.best_path()
-        # An earlier attempt's is kept where a later one has nothing better.
+        # A later attempt replaces an earlier result only if it is better.
         if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):
             best = found
         if number == 0 and may_turn_back(search, best[1]):
@@ -161,7 +167,7 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
 
 
 def _retry(search: Search, number: int) -> None:
-    """Take a larger clearance buffer, and evaluate again what the archive holds."""
+    """Increase the clearance buffer and re-evaluate the archive."""
     search.problem = make_problem(search.problem.scenario, search.problem.limits, number)
     vectors = search.archive.vectors
     search.archive = Archive(vectors[:0], no_scores())
@@ -169,7 +175,7 @@ def _retry(search: Search, number: int) -> None:
 
 
 def _attempt(search: Search, number: int, previous: Floats | None) -> None:
-    """One search from its first population to its last generation."""
+    """One search from the first population to the last generation."""
     table = search.problem.scenario.planner
     grids, growth = ATTEMPTS[number]
     population, algorithm = table.population * growth, search.algorithm
@@ -185,7 +191,7 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
         search_other_sides(search)
     last = None
     if algorithm.optimiser == "waypoints":
-        # Where other sides have been looked at and a path is safe, generations shorten it by ten-thousandths.
+        # With a safe path and other sides tried, generations would shorten it by only 1e-4.
         if not (algorithm.seeded and search.has_safe()):
             waypoint_generations(search, population, table.generations)
     else:
@@ -195,13 +201,13 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
 
 
 def _finish(search: Search, last: Floats | None) -> None:
-    """Shorten or tighten the best path, and the vector (d,) that generations came to, if there were any."""
+    """Shorten or tighten the best path, and the result (d,) of the generations, if any."""
     if search.shortens:
         if last is not None:
             search.shorten(search.encoding.decode(last[None])[0])
         shorten_best(search)
     if search.shortest is None:
-        # What the generations came to, tightened, may be another way than the improved seed's.
+        # The result of the generations may take another route than the improved seed.
         if last is not None:
             search.tighten(last, LAST_ROUNDS, 0.5, LAST_SEARCH)
         for scale in LAST_MOVES:

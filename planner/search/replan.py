@@ -1,4 +1,4 @@
-"""Planning again in flight: what is flown stays, what lies ahead is planned anew past threats that have popped up."""
+"""Replanning in flight: flown legs stay, and the rest is planned again around newly known threats."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Waypoints that the way ahead has, at least: with fewer there is no way round anything.
+# Minimum number of waypoints of the path ahead: with fewer it cannot avoid anything.
 FEWEST = 8
 
 
@@ -35,11 +35,11 @@ def replan(
     progress: SearchProgress | None = None,
     stop: StopCondition | None = None,
 ) -> Plan:
-    """Plan anew from the waypoint at which leg `leg` of an old plan begins; legs before it are flown and stay.
+    """Plan again from the waypoint at which leg `leg` of an old plan begins; the legs before it are flown and stay.
 
-    scenario: with the threats known now (`world.scenario.with_threats`).  The turn at that waypoint counts
-    from the course of the leg flown last.  The search starts around the rest of the old plan, beside its grid routes.
-    The certificate is of the way ahead; violations and objectives are of the whole path in this scenario.
+    scenario: with the threats known now (`world.scenario.with_threats`). The turn at that waypoint is measured from the
+    course of the last flown leg. The search starts from the rest of the old plan, in addition to its grid routes. The
+    certificate is of the path ahead; violations and objectives are of the whole path in this scenario.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -53,8 +53,8 @@ def replan(
     >>> new.safe, new.flown_legs, np.array_equal(new.waypoints[:4], old.waypoints[:4])
     (True, 3, True)
 
-    Raises MissionError for a leg that the old plan has not or that begins in a missile's kill sphere or against a zone,
-    and for a plan of another mission; ScenarioError as `plan_path`.
+    Raises MissionError for a leg that the old plan does not have or that begins in a missile's kill sphere or violates
+    a zone, and for a plan of another mission; ScenarioError as `plan_path`.
     """
     count = len(old.waypoints)
     if not 0 <= leg < count - 1:
@@ -75,7 +75,7 @@ def replan(
 
 
 def same_mission(scenario: Scenario, old: Plan) -> None:
-    """Raise MissionError if a plan has not the scenario's ends.
+    """Raise MissionError if the ends of a plan are not the scenario's.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -100,7 +100,7 @@ def same_mission(scenario: Scenario, old: Plan) -> None:
 
 
 def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
-    """Raise MissionError if a missile reaches the place that the new plan is to begin at, or a zone forbids it."""
+    """Raise MissionError if the new plan would begin within a missile's kill radius or violate a zone there."""
     threats = scenario.threats
     inside = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
     unit = int(np.argmax(np.where(threats.kill_radius > 0.0, inside, -math.inf))) if len(inside) else -1
@@ -120,7 +120,7 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:
-    """A path (w, 3) whose longest legs are split until it has `count` waypoints."""
+    """A path (w, 3) whose longest legs are halved until it has `count` waypoints."""
     points = [np.asarray(point, dtype=np.float64) for point in path]
     while len(points) < count:
         longest = int(np.argmax(leg_runs(np.array(points))))

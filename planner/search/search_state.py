@@ -1,4 +1,8 @@
-"""A search under way: what it has evaluated, the best of it, and when it is to end."""
+"""State of a search: scores, the archive of the best paths, the evaluation budget, and stopping.
+
+`Search` is the interface that seeding and generations share. It scores paths, keeps the best in an `Archive`, counts
+evaluations against the budget, applies local searches, and decides when the search is finished.
+"""
 
 import math
 from collections.abc import Callable
@@ -28,14 +32,13 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 
-# ----------------------------------------------------------------------
-# The table of scores that a search ranks: a row a path, its violations and then its objectives, and their order.
+# --- Scores: one row per path, violations followed by objectives ---
 
 
 SCORE_COLUMNS = len(Violation) + len(Objective)
 LENGTH, KILL, DETECTION, HEIGHT = (len(Violation) + item for item in Objective)
 CONSTRAINTS = Level(tuple(Violation), (0.0,) * len(Violation))
-# The order of an archive: what meets the constraints, then least kill exposure, then the shortest.
+# Order of the archive: feasible paths first, then the lowest kill exposure, then the shortest.
 ARCHIVE_LEVELS = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
 
 
@@ -45,7 +48,7 @@ def score_table(violations: NDArray[np.generic], objectives: Floats) -> Floats:
 
 
 def no_scores() -> Floats:
-    """A table without rows."""
+    """An empty table of scores (0, 8)."""
     return np.empty((0, SCORE_COLUMNS))
 
 
@@ -55,12 +58,12 @@ def violated(scores: Floats) -> Flags:
 
 
 def safe(scores: Floats) -> Flags:
-    """Whether paths with these scores (..., 8) violate nothing and are exposed to no missile, (...,)."""
+    """Whether paths with these scores (..., 8) violate no constraint and are exposed to no missile, (...,)."""
     return np.asarray(~violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
 def best_first(scores: Floats) -> Ints:
-    """Rows of scores (n, 8) in the archive's order; equal ranks keep their order."""
+    """Rows of scores (n, 8) in the archive's order; the sort is stable."""
     return np.argsort(ranks(scores, ARCHIVE_LEVELS), kind="stable")
 
 
@@ -68,37 +71,37 @@ SearchProgress = Callable[[int, int, str], None]
 StopCondition = Callable[[], str]
 Improved = Callable[[Floats], None]
 
-# Paths that are kept.
+# Maximum number of paths in an archive.
 ARCHIVE_SIZE = 24
-# Room beside spheres and above ground that a path is shortened with until it is certified, m.
+# Additional margins to spheres and ground, m, with which a path is shortened until it is certified.
 SPARES = (0.1, 2.0)
-# Evaluations that moving all waypoints may take: with less left of a budget they are not moved.
+# Evaluations that `tighten` may take: with less budget left it is skipped.
 MAX_TIGHTENING = 600
-# Waypoints of paths that are evaluated before the search may end: some 10 ms.
+# Waypoints evaluated between two checks of the stop condition: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
-# Certificates that are made of the archive before the search may end: some 10 ms where none is to be had.
+# Certificates made before the stop condition is checked: some 10 ms if none passes.
 CERTIFICATES_AT_ONCE = 4
 
 
 class SearchEnded(Exception):
-    """Raised in the midst of a search that is asked to end; its archive holds what it has found."""
+    """Raised within a search that is asked to stop; its archive holds the results so far."""
 
 
 @dataclass(slots=True)
 class Archive:
-    """The best paths of all that were evaluated, best first: vectors (k, d) and scores (k, 8)."""
+    """The best of all evaluated paths, best first: vectors (k, d) and scores (k, 8)."""
 
     vectors: Floats
     scores: Floats
 
     def feasible(self) -> bool:
-        """Whether the best path meets the constraints; not where there is none."""
+        """Whether the best path meets the constraints; False if the archive is empty."""
         return len(self.scores) > 0 and not violated(self.scores[0])
 
     def take(self, vectors: Floats, scores: Floats) -> None:
-        """Let new rows in; equal ranks keep their order, older first.
+        """Insert new rows; of equal ranks the older stay first.
 
-        Once a row meets the constraints, those that do not are let go: there can be thousands of them to rank.
+        Once any row is feasible, infeasible ones are dropped: there can be thousands of them to rank.
         """
         fit = ~violated(scores)
         if self.feasible():
@@ -118,23 +121,24 @@ class Archive:
 
 @dataclass(slots=True)
 class Search:
-    """What attempts share: how much was evaluated, and what was found after each generation.
+    """State shared by all attempts of a search.
 
-    problem: with the margins of the present attempt.
-    algorithm, encoding, rng: how it searches.
-    progress: called with generations done, generations in all, and a short text.
-    stop: asked after each generation and each start; a text ends the search and says why.
-    first_safe: whether it ends with the first safe path.
-    wanted: distance (m) from missiles that the certificate of a finished path has.
-    improved: called with each path (w, 3) that is the best yet of those that meet the constraints.
-    archive: the best paths of all.
-    evaluations: paths evaluated, or as much work.
+    problem: with the margins of the current attempt.
+    algorithm, encoding, rng: of the search.
+    progress: called with generations done, generations in total, and a short text.
+    stop: called after each generation and each start; a returned text ends the search and gives the reason.
+    first_safe: whether to end with the first safe path.
+    wanted: distance (m) from missiles that the certificate of a finished path requires.
+    improved: called with each path (w, 3) that is the best so far of those that meet the constraints.
+    archive: the best paths.
+    evaluations: paths evaluated, or equivalent work.
     done: generations done.
     ended: why the search ended.
-    history: after each generation length ratio, kill exposure and violations of the best path yet.
+    history: per generation, length ratio, kill exposure and violations of the best path so far.
     certificates: by the path's vector.
-    shortest: the shortest finished path (w, 3) that shortening came to, and its certificate; no interval holds it.
-    spent: whether the budget leaves too little for another shortening.
+    shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
+    intervals.
+    spent: whether the budget is too small for another shortening.
     """
 
     problem: Problem
@@ -156,11 +160,11 @@ class Search:
     spent: bool = False
 
     def __post_init__(self) -> None:
-        """Begin with nothing."""
+        """Create an empty archive."""
         self.archive = Archive(np.empty((0, self.encoding.lower.size)), no_scores())
 
     def score(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d), of which neither archive nor budget takes note."""
+        """Scores (n, 8) of vectors (n, d), without effect on the archive or the budget."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
         data = self.problem.search
         if self.algorithm.graded:
@@ -171,7 +175,7 @@ class Search:
         return score_table(counts, objectives)
 
     def evaluate(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d); the archive takes them.  Raises SearchEnded when asked to end."""
+        """Scores (n, 8) of vectors (n, d); the archive takes them. Raises SearchEnded if asked to stop."""
         at_once, scores = max(1, WAYPOINTS_AT_ONCE // self.encoding.waypoints), no_scores()
         for first in range(0, len(vectors), at_once):
             scores = np.concatenate([scores, self.score(vectors[first : first + at_once])])
@@ -183,7 +187,7 @@ class Search:
         return scores
 
     def pause(self) -> None:
-        """Raise SearchEnded if the search is asked to end and has anything to show."""
+        """Raise SearchEnded if the search is asked to stop and has a result."""
         if len(self.archive.scores) and self._asked_to_end():
             raise SearchEnded
 
@@ -193,7 +197,7 @@ class Search:
         return bool(reason)
 
     def _take(self, vectors: Floats, scores: Floats) -> None:
-        """Count what was evaluated, and let it into the archive."""
+        """Count evaluated vectors and insert them into the archive."""
         self.evaluations += len(vectors)
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
@@ -205,18 +209,18 @@ class Search:
             self.improved(self.encoding.decode(best)[0])
 
     def improve(self, vector: Floats, most: int) -> Floats:
-        """Tighten a vector (d,) by a pattern search; the archive takes what it finds.  Gives the best scores (8,)."""
+        """Improve a vector (d,) by a pattern search; the archive takes the result. Returns the best scores (8,)."""
         left = min(most, self._budget() - self.evaluations)
         if left < 2:
             return np.asarray(self.evaluate(vector[None])[0])
         found, made = search_patterns(self.problem.search, self.encoding, vector, int(left))
         scores = self.evaluate(found)
-        # What is found was counted when it was found.
+        # The pattern search has counted these vectors already.
         self.evaluations += made - len(found)
         return np.asarray(scores[0])
 
     def tighten(self, vector: Floats, rounds: int, scale: float, most: int) -> Floats:
-        """Move all waypoints of a vector (d,) at once, then `improve` it.  Gives the best scores (8,)."""
+        """Move all waypoints of a vector (d,) at once, then `improve` it. Returns the best scores (8,)."""
         if self._budget() - self.evaluations < MAX_TIGHTENING:
             return self.improve(vector, most)
         moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
@@ -225,11 +229,11 @@ class Search:
 
     @property
     def shortens(self) -> bool:
-        """Whether paths are shortened free of their intervals: not among zones, which shortening does not see."""
+        """Whether paths are shortened free of their intervals: not among zones, which shortening ignores."""
         return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:
-        """Shorten a path (w, 3) and keep what comes of it if it is the shortest finished one; whether it is."""
+        """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""
         for spare in SPARES:
             if self._budget() - self.evaluations < MOST_MODELS:
                 self.spent = True
@@ -247,7 +251,7 @@ class Search:
         return False
 
     def over(self) -> bool:
-        """Whether the search is to end now."""
+        """Whether the search must end now: stopped, or out of budget."""
         if self.spent or self.evaluations >= self._budget():
             self.ended = "budget"
         elif self.stop is not None:
@@ -255,11 +259,11 @@ class Search:
         return self.ended != "completed"
 
     def best_is_safe(self) -> bool:
-        """Whether the best path yet violates nothing and is exposed to no missile."""
+        """Whether the archive's best path violates nothing and is exposed to no missile."""
         return bool(safe(self.archive.scores[0]))
 
     def safe_already(self) -> bool:
-        """Whether the first safe path was asked for, and is there."""
+        """Whether the search was to end with the first safe path, and one is finished."""
         if not self.first_safe or (self.shortest is None and not self.archive.feasible()):
             return False
         return self.shortest is not None or self.finished(self.best_certified()[1])
@@ -272,7 +276,7 @@ class Search:
         return math.dist(self.problem.space.start, self.problem.space.destination)
 
     def length_ratio(self) -> float:
-        """Length ratio of the best path yet."""
+        """Length ratio of the best path so far."""
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
             return ratio
@@ -280,7 +284,7 @@ class Search:
         return min(ratio, shortest) if self.best_is_safe() else shortest
 
     def finished(self, certificate: Certificate) -> bool:
-        """Whether a path of this certificate is what the search is for."""
+        """Whether this certificate meets the goal of the search."""
         return certificate.ok and certificate.kill_distance >= self.wanted
 
     def _budget(self) -> float:
@@ -288,7 +292,7 @@ class Search:
         return math.inf if most is None else most
 
     def note(self) -> None:
-        """Add the archive's best to the history."""
+        """Append the best path so far to the history."""
         best = self.archive.scores[0]
         violations = best[: len(Violation)]
         count = np.count_nonzero(violations) if self.algorithm.graded else violations.sum()
@@ -297,7 +301,7 @@ class Search:
         self.history.append(row)
 
     def report(self, left: int) -> None:
-        """Tell how far the search has come; left: generations that may follow."""
+        """Report progress; left: number of generations that may follow."""
         if self.progress is not None:
             best = self.archive.scores[0]
             remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best[KILL]:.3g}"
@@ -307,9 +311,10 @@ class Search:
             self.progress(self.done, self.done + left, "no feasible path yet" if none_yet else remark)
 
     def best_certified(self) -> tuple[Floats, Certificate]:
-        """First of the archive that is certified and out of range; or certified and farthest; or the first.
+        """First path of the archive that is certified with the full kill margin.
 
-        Of a search that is asked to end, the first few of the archive alone are looked at.
+        Otherwise the certified path furthest from missiles, or the first path if none is certified. A search that is
+        asked to end examines only the first few.
         """
         first: tuple[Floats, Certificate] | None = None
         exposed: tuple[Floats, Certificate] | None = None
@@ -334,7 +339,7 @@ class Search:
         return result
 
     def best_path(self) -> tuple[Floats, Certificate]:
-        """The shortest of the certified path of the archive and of the shortened one."""
+        """The shorter of the archive's certified path and the shortened path."""
         found = self.best_certified()
         if self.shortest is None or (
             self.finished(found[1]) and path_length(found[0]) <= path_length(self.shortest[0])
@@ -343,7 +348,7 @@ class Search:
         return self.shortest
 
     def _certificate(self, vector: Floats, path: Floats) -> Certificate:
-        """Certificate of a vector's path: the same in all attempts, so it is made once."""
+        """Certificate of a vector's path, cached: it is the same in all attempts."""
         key = vector.tobytes()
         known = self.certificates.get(key)
         if known is None:

@@ -1,4 +1,11 @@
-"""What a seeded search starts from: the straight line where it is safe, or routes over grids, fitted and improved."""
+"""Starting points of a seeded search: the straight line, routes over grids, other sides, and routes that turn back.
+
+Grid routes are fitted with waypoints and improved one after another; the best becomes the seed of the population. A
+grid estimates the shorter side of an obstacle only as well as it resolves gaps. Grids with reduced obstacles therefore
+propose one route for each choice of sides, and shortening decides which are safe and short.
+A path in the straight frame cannot turn back. If it contains no safe path, or only a long one, a lattice search finds a
+route that may turn back or circle to climb; paths in a frame along this route are fitted and improved in the same way.
+"""
 
 import math
 from contextlib import suppress
@@ -21,16 +28,16 @@ from world.geometry import path_length
 Floats = NDArray[np.float64]
 
 
-# Evaluations that a quick path and each seed are improved with by a pattern search, at most.
+# Maximum evaluations of the pattern search on a quickly fitted path, and on a seed.
 QUICK_SEARCH, SEED_SEARCH = 50, 300
-# Times as many for seeds where a path has to stay in a band of heights above ground: hardly a move keeps to it.
+# Factor on these for seeds below a maximum height above ground, where few moves stay within the band.
 BAND_EFFORT = 3
-# Routes that are followed once a path is safe: other sides are looked for next (`planner.search.seeds`).
+# Number of routes followed once a path is safe; after them other sides are tried.
 FOLLOWED = 2
 
 
 def straight_line(search: Search) -> bool:
-    """Whether the straight line is a safe path: no path is shorter, and there is nothing to search for."""
+    """Whether the straight line is a safe path: no path is shorter, and the search is finished."""
     encoding, space = search.encoding, search.problem.space
     if encoding.name != "rotated":
         return False
@@ -46,10 +53,10 @@ def straight_line(search: Search) -> bool:
 
 
 def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
-    """Vectors (n, d) that a search starts from: the seed that comes out best when improved, and the older path.
+    """Start vectors (n, d) of a search: the seed that is best after improvement, and the previous path.
 
-    Marginals over several routes at once fit none of them: one leads.  It leads as it was: improved it stands so close
-    to every limit that hardly a sample near it keeps them.
+    The marginals of several routes at once describe none of them, so one seed leads. It is used before its improvement:
+    afterwards it is so close to every limit that hardly any sample around it is feasible.
     """
     encoding, space, waypoints = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
@@ -60,7 +67,7 @@ def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previou
     improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
     airspace = search.problem.search.airspace
     effort = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
-    # Among zones no other sides are looked for: all the routes are followed.
+    # Among zones `search_other_sides` does not apply: follow all routes.
     followed = math.inf if is_limited(airspace) else FOLLOWED
     if search.shortens and search.algorithm.optimiser == "waypoints":
         followed = 0
@@ -77,9 +84,9 @@ def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previou
 
 
 def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRoute]:
-    """The grids' routes; the archive takes a path that is quickly fitted to each as soon as it is found.
+    """The grids' routes, those with the best quickly fitted paths first.
 
-    Those with the best such paths come first.
+    The archive takes each fitted path as soon as it is found.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     if search.progress is not None:
@@ -108,26 +115,22 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
     return [found[k] for k in best_first(np.array(scores))]
 
 
-# ----------------------------------------------------------------------
-# Other sides of the obstacles: routes that the cheapest grid routes do not take, each shortened.
-#
-# A grid says which side is shorter only as well as it sees gaps.  So grids that see obstacles smaller than they are
-# propose a route for each choice of sides, and each is shortened: what comes of it is safe and short, or it is not,
-# and only then is it known what the side is worth.
+# --- Other sides of the obstacles ---
 
-# Stages of the grids; shares of a step by which they look at the ground, have places across, and see spheres smaller.
+# Stages of the grids; shares of a step for the area of highest ground, the spacing across, and the reduction of
+# spheres.
 STAGES, SPREAD, RATIO, SHRINKS = 50, 0.2, 1.0 / 3.0, (0.2, 0.5)
-# Routes of one grid, and what they may cost: over the best path, or where none is safe over the straight line.  Grids
-# know few courses, and their routes are longer by some percent.
+# Maximum number of routes per grid; and maximum cost relative to the best path, or, if none is safe, to the straight
+# line. With few courses, grid routes are some percent too long.
 MAX_ROUTES, SLACK, MAX_DETOUR = 8, 1.08, 1.8
-# A best path that is longer than the straight line by less than this share has no other side worth looking for.
+# No other side is tried for a path that exceeds the straight line by less than this share.
 MIN_DETOUR = 0.004
-# Of a path shortened again, from waypoints at equal distances: times, and the least gain for another, as a share.
+# Maximum repetitions of shortening from equidistant waypoints, and the minimum gain for another, as a share.
 AGAIN, MIN_GAIN = 3, 2e-5
 
 
 def search_other_sides(search: Search) -> None:
-    """Shorten the best path, and routes on other sides than its own."""
+    """Shorten the best path, and routes on other sides of the obstacles."""
     if search.shortens and search.has_safe():
         shorten_best(search)
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
@@ -147,7 +150,7 @@ def search_other_sides(search: Search) -> None:
 
 
 def shorten_best(search: Search) -> None:
-    """Shorten the archive's best path, and the shortest again from waypoints at equal distances while that helps."""
+    """Shorten the archive's best path, then repeatedly the shortest from equidistant waypoints while it gains."""
     search.shorten(search.encoding.decode(search.archive.vectors[:1])[0])
     for _ in range(AGAIN):
         if search.shortest is None or search.over():
@@ -159,28 +162,22 @@ def shorten_best(search: Search) -> None:
             return
 
 
-# ----------------------------------------------------------------------
-# Paths that turn back, or go round to climb: searched for in a frame that follows a route, where a straight one
-# fails.
-#
-# The straight frame holds no path that gets further from the destination along the line to it.  A lattice search
-# finds a route that may; a frame along that route then holds paths about it, and they are fitted and tightened as
-# elsewhere.
+# --- Routes that turn back ---
 
-# A safe path this many times as long as the straight line may be longer than one that turns back.
+# If a safe path is longer than this many times the straight line, a path that turns back may be shorter.
 LONG_WAY = 1.25
-# Routes are over lattices of these steps, as shares of the step that turns need, until one is safe.
+# Lattice steps, as shares of the step that turns require, tried until a path is safe.
 STEPS = (1.0, 0.6)
-# A route is followed if it is shorter than this share of the best safe path.
+# A route is followed if shorter than this share of the best safe path.
 WORTH = 0.99
-# Searches at first, and evaluations of each and after each move of all waypoints, that a path along a route is improved
-# with before it is shortened; and these moves, each of so many rounds, as shares of the first that fit it.
+# Before shortening, a path along a route is improved by this many pattern searches, with evaluations of each, and
+# evaluations after each move of all waypoints; scales of these moves relative to those of fitting, and rounds.
 FIRST_SEARCHES, FIRST_SEARCH, LATER_SEARCH = 4, 500, 600
 MOVES, ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 
 
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
-    """Whether a path that turns back is to be looked for: the straight frame held no safe one, or a long one."""
+    """Whether to search for a path that turns back: the straight frame has no safe path, or only a long one."""
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.over():
         return False
     if not search.finished(certificate):
@@ -189,7 +186,7 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 
 
 def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """The path (w, 3) along a route that may turn back and its certificate, if that is better; else what was found."""
+    """The path (w, 3) along a route that may turn back and its certificate, if better than `found`; else `found`."""
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     for share in STEPS:
@@ -213,7 +210,7 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
 
 
 def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
-    """The best path that was found in a frame along a route (k, 3), and its certificate."""
+    """The best path found in a frame along a route (k, 3), and its certificate."""
     waypoints = search.encoding.waypoints
     pieces, _ = spread_over(route, waypoints - 1)
     encoding = along_route(search.problem.space, pieces[:, :2])
@@ -230,7 +227,7 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
 
 
 def _improve_along(inner: Search, vector: Floats, ways: tuple[Floats, ...]) -> None:
-    """Work on the path of a vector (d,), then shorten it and ways (k, 3): a bound climb either may end short of."""
+    """Improve the path of a vector (d,), then shorten it and the given routes (k, 3), which may end better."""
     inner.evaluate(vector[None])
     for _ in range(FIRST_SEARCHES):
         if inner.over() or inner.safe_already():
@@ -247,7 +244,7 @@ def _improve_along(inner: Search, vector: Floats, ways: tuple[Floats, ...]) -> N
 
 
 def _places(route: Floats, encoding: Encoding) -> Floats:
-    """Places (w - 2, places, 3) on a route (k, 3), those of each waypoint in its frame: within its piece of the way."""
+    """Candidate points (w - 2, places, 3) on a route (k, 3) for each waypoint in its frame, within its piece."""
     count = encoding.waypoints - 2
     dense, _ = spread_over(route, count * (CLOSE.places + 1) + 1)
     rows = np.arange(count)[:, None] * (CLOSE.places + 1) + 1 + np.arange(CLOSE.places)
