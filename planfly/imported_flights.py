@@ -1,4 +1,4 @@
-"""Flights of the field as setups and tracks of planfly's: in a scenario, along a mission, in the wind of their log."""
+"""Imported flights as setups and tracks of planfly's: in a scenario, along a mission, in the wind of their log."""
 
 import hashlib
 import math
@@ -16,11 +16,11 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import lay_route
 from flight.mission_files.formats import mission_text, read_mission
-from flight.simulation.setup import FieldSource, FlightSetup, VerticalDatum, make_limits
+from flight.simulation.setup import FlightSetup, ImportedLog, VerticalDatum, make_limits
 from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
 from logs.importers.clean_places import LONGEST_STEP
-from logs.importers.imported_flight import FieldFlight, make_flight, mean_wind, rows_of_flight, with_flown_heights
+from logs.importers.imported_flight import LoggedFlight, make_flight, mean_wind, track_of_flight, with_flown_heights
 from logs.importers.logged_missions import logged_parameters
 from logs.importers.open_log import open_log
 from logs.recording.reader import LogEvent
@@ -42,7 +42,7 @@ _BLOCK = 2**20
 
 
 @dataclass(frozen=True, slots=True)
-class FieldOptions:
+class ImportOptions:
     """What a person says of a flight beside its log; None where nothing is.
 
     plan: a mission file or plan.json that was to be flown.
@@ -66,7 +66,7 @@ class FieldOptions:
 
 @dataclass(frozen=True, slots=True)
 class ImportedFlight:
-    """A flight of the field, judged.
+    """An imported flight, judged.
 
     setup: with its source.  track: its rows.  events: what the vehicle said.
     ended: how the log shows that it ended.
@@ -84,7 +84,7 @@ class ImportedFlight:
         return self.setup.source is not None and self.setup.source.damage.lossy
 
 
-def import_flight(path: Path, options: FieldOptions, change: ScenarioChange) -> ImportedFlight:
+def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) -> ImportedFlight:
     """Read a log, set it into its world and judge it.
 
     change: makes another scenario of the one that the flight is judged in.  Raises LogError for a file that is no log
@@ -111,7 +111,7 @@ def import_flight(path: Path, options: FieldOptions, change: ScenarioChange) -> 
         *mission.warnings,
         *_differing(flight, mission, options),
     )
-    source = FieldSource(
+    source = ImportedLog(
         file=path.name,
         sha256=_sha256(path),
         format=flight.raw.format,
@@ -130,7 +130,7 @@ def import_flight(path: Path, options: FieldOptions, change: ScenarioChange) -> 
         notes=notes,
     )
     setup = replace(setup, source=source)
-    track = rows_of_flight(flight, scenario.origin)
+    track = track_of_flight(flight, scenario.origin)
     if options.plan is not None:
         mismatch = plan_mismatch(setup, track)
         if mismatch is not None:
@@ -140,7 +140,7 @@ def import_flight(path: Path, options: FieldOptions, change: ScenarioChange) -> 
     return ImportedFlight(setup, track, _events(flight), verdict, ended)
 
 
-def _mission(path: Path, flight: FieldFlight, options: FieldOptions) -> tuple[Mission, str, Scenario | None]:
+def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[Mission, str, Scenario | None]:
     """The mission that was to be flown, whose it is, and the scenario that its plan was made in."""
     if options.plan is not None:
         if options.plan.suffix.lower() == ".json":
@@ -158,7 +158,7 @@ def _mission(path: Path, flight: FieldFlight, options: FieldOptions) -> tuple[Mi
     return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
 
 
-def _world(mission: Mission, options: FieldOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
+def _world(mission: Mission, options: ImportOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
     """The scenario that a flight is judged in, and its mission's places there."""
     scenario = planned_in
     if options.scenario is not None:
@@ -171,7 +171,7 @@ def _world(mission: Mission, options: FieldOptions, planned_in: Scenario | None)
     return scenario, place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
 
 
-def _in_its_wind(scenario: Scenario, flight: FieldFlight, options: FieldOptions) -> tuple[Scenario, str]:
+def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: ImportOptions) -> tuple[Scenario, str]:
     """The scenario in the mean wind of the stretches, and where that is from."""
     if options.wind_given:
         return scenario, "as given"
@@ -188,7 +188,7 @@ def _setup(
     placed: PlacedMission,
     mission: Mission,
     parameters: ArduPilotParameters | None,
-    flight: FieldFlight,
+    flight: LoggedFlight,
 ) -> FlightSetup:
     aircraft, battery = find_airframe(scenario)
     limits = _limits(scenario, parameters, flight, aircraft.airspeed)
@@ -208,7 +208,7 @@ def _setup(
     )
 
 
-def _limits(scenario: Scenario, parameters: ArduPilotParameters | None, flight: FieldFlight, usual: float) -> Limits:
+def _limits(scenario: Scenario, parameters: ArduPilotParameters | None, flight: LoggedFlight, usual: float) -> Limits:
     """Limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
@@ -231,7 +231,7 @@ def _sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _edges(flight: FieldFlight) -> tuple[str, ...]:
+def _edges(flight: LoggedFlight) -> tuple[str, ...]:
     """What the log does not hold of the flight by its nature, in words: before it, after it, between its rows."""
     notes = []
     if flight.begins:
@@ -244,7 +244,7 @@ def _edges(flight: FieldFlight) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _other_flights(flight: FieldFlight) -> tuple[str, ...]:
+def _other_flights(flight: LoggedFlight) -> tuple[str, ...]:
     """That a log holds other flights, in words."""
     if flight.count == 1:
         return ()
@@ -252,7 +252,7 @@ def _other_flights(flight: FieldFlight) -> tuple[str, ...]:
     return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
 
 
-def _differing(flight: FieldFlight, mission: Mission, options: FieldOptions) -> tuple[str, ...]:
+def _differing(flight: LoggedFlight, mission: Mission, options: ImportOptions) -> tuple[str, ...]:
     """That the plan is not what the log's own mission is, in words."""
     if options.plan is None or flight.mission is None:
         return ()
@@ -266,7 +266,7 @@ def _differing(flight: FieldFlight, mission: Mission, options: FieldOptions) -> 
     return (f"{len(changed)} items of the log's own mission lie elsewhere than the plan's, item {changed[0]} first",)
 
 
-def _events(flight: FieldFlight) -> tuple[LogEvent, ...]:
+def _events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
     """What the vehicle said during the flight, and the modes it was in."""
     if not len(flight.time):
         return ()
@@ -288,7 +288,7 @@ def _end_of(verdict: Verdict) -> str:
 
 
 # ----------------------------------------------------------------------
-# The mission of a flight of the field, flown again by the model of its aircraft.
+# The mission of an imported flight, flown again by the model of its aircraft.
 
 
 def fly_again(

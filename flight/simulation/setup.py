@@ -40,7 +40,7 @@ class AutopilotProgram:
 
 
 # ----------------------------------------------------------------------
-# Where a flight is from that was not flown by planfly: a log of the field, and what that log can carry.
+# Where a flight is from that was not flown by planfly: an imported log, and what that log can carry.
 
 # "amsl": above mean sea level as the vehicle has it.  "ellipsoid": above WGS 84's.  "pressure": above the level of
 # 1013.25 hPa.  "unstated": the log does not say.
@@ -134,8 +134,8 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True)
-class FieldSource:
-    """A log of the field as the source of a flight.
+class ImportedLog:
+    """An imported log as the source of a flight.
 
     file: its name.  sha256: of its bytes.
     format: for people.  program: what flew, "" where the log does not say.
@@ -151,7 +151,7 @@ class FieldSource:
     faults: of its rows.  damage: of the file.
     notes: what else a person should know, in sentences.
 
-    >>> FieldSource("a.BIN", "", "ArduPilot dataflash log", "ArduPlane V4.6.0", holds=("attitude",)).holds
+    >>> ImportedLog("a.BIN", "", "ArduPilot dataflash log", "ArduPlane V4.6.0", holds=("attitude",)).holds
     ('attitude',)
     """
 
@@ -196,7 +196,7 @@ class FlightSetup:
     fdm_hz: steps of JSBSim a second.
     parameters: of the ArduPlane that flies; None where planfly's guidance does.
     program: the real autopilot that flies; None where planfly's guidance or its law of ArduPlane does.
-    source: the log of the field that the flight is from; None for a flight of planfly's own.
+    source: the imported log that the flight is from; None for a flight of planfly's own.
     path: that is to be followed, of route and limits.
     """
 
@@ -215,7 +215,7 @@ class FlightSetup:
     fdm_hz: Literal[60, 120] = FDM_HZ
     parameters: ArduPilotParameters | None = None
     program: AutopilotProgram | None = None
-    source: FieldSource | None = None
+    source: ImportedLog | None = None
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -154,7 +154,7 @@ _MAX_ROWS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class FieldFlight:
+class LoggedFlight:
     """One flight of a log.
 
     raw: the log.
@@ -163,7 +163,7 @@ class FieldFlight:
     holds: which of them it holds.
     stretches: flown along the mission.
     mission: that it was flown with; None where the log holds none.
-    heights, gaps, faults: see `flight.simulation.setup.FieldSource`.
+    heights, gaps, faults: see `flight.simulation.setup.ImportedLog`.
     number, count: which of the log's flights, from 1, and how many there are.
     others: of the others, when they began and for how long they followed a mission, s.
     begins, ends: whether the log's first row, and its last, is in the air: what came before and after it does not hold.
@@ -189,7 +189,7 @@ class FieldFlight:
     clock: Places | None = field(default=None, repr=False)
 
 
-def make_flight(raw: RawLog, number: int | None = None) -> FieldFlight:
+def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     """The flight of a log that was flown along its mission for the longest, or the one of a number, from 1.
 
     Raises LogError for a vehicle that is no aeroplane, a log without a flight, and a number that it does not have.
@@ -231,7 +231,7 @@ def _why_none(places: Places) -> str:
 
 def _cut(
     raw: RawLog, places: Places, part: FlightPart, number: int, count: int, others: tuple[tuple[float, float], ...]
-) -> FieldFlight:
+) -> LoggedFlight:
     keep = (places.time >= part.start - BESIDE) & (places.time <= part.end + BESIDE)
     time = places.time[keep]
     columns = {name: _at(raw.series.get(name), name, time, places) for name in COLUMNS if name != "height"}
@@ -240,7 +240,7 @@ def _cut(
     if np.isfinite(up).all():
         holds.append("heights")
     start = part.stretches[0].start if part.stretches else part.start
-    return FieldFlight(
+    return LoggedFlight(
         raw=raw,
         time=time,
         lat=places.lat[keep],
@@ -347,7 +347,7 @@ class MeanWind:
     source: str
 
 
-def mean_wind(flight: FieldFlight) -> MeanWind | None:
+def mean_wind(flight: LoggedFlight) -> MeanWind | None:
     """The mean over the stretches that followed the mission, or over the flight; None where the log holds none.
 
     The estimate's first part is left out: it begins at nothing, and finds the wind in the first turns.
@@ -370,10 +370,10 @@ def mean_wind(flight: FieldFlight) -> MeanWind | None:
 
 
 # ----------------------------------------------------------------------
-# The rows of a flight of the field as a track; what the log does not hold is NaN there.
+# The rows of an imported flight as a track; what the log does not hold is NaN there.
 
 
-def rows_of_flight(flight: FieldFlight, origin: GeoOrigin) -> Track:
+def track_of_flight(flight: LoggedFlight, origin: GeoOrigin) -> Track:
     """A track on the map about ``origin``.
 
     Velocities that the log does not hold are the differences of its places.  A log without heights has 0 there, which
@@ -381,7 +381,7 @@ def rows_of_flight(flight: FieldFlight, origin: GeoOrigin) -> Track:
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight
-    >>> track = rows_of_flight(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
+    >>> track = track_of_flight(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
     >>> track.position[-1].round(1).tolist(), float(track.airspeed[0]), float(track.current[0])
     ([1045.0, 1000.0, 500.0], 25.0, nan)
     """

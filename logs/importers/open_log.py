@@ -17,10 +17,10 @@ _HEAD = 512
 _PX4_MAGIC, _ZIP_MAGIC = b"ULog\x01\x12\x35", b"PK\x03\x04"
 
 
-def is_field_log(path: Path) -> bool:
+def is_imported_log(path: Path) -> bool:
     """Whether a file is a log that others write, by its suffix.
 
-    >>> is_field_log(Path("00000042.BIN")), is_field_log(Path("flight.mcap"))
+    >>> is_imported_log(Path("00000042.BIN")), is_imported_log(Path("flight.mcap"))
     (True, False)
     """
     return path.suffix.lower() in (*SUFFIXES, *_NAMED)

@@ -1,4 +1,4 @@
-"""What a log of the field holds, in SI units, whatever program wrote it."""
+"""What an imported log holds, in SI units, whatever program wrote it."""
 
 import math
 from collections.abc import Mapping

@@ -19,7 +19,7 @@ import zstandard
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from flight.simulation.setup import FieldSource, FlightSetup, make_limits
+from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
 from logs.recording.setup_schema import (
     EnvelopeTable,
     Finite,
@@ -231,7 +231,7 @@ class _Setup(SetupModel):
     fdm_hz: Literal[60, 120] = 120  # a log of before it could be chosen
     parameters: ParametersTable | None = None  # a log of before there were any was flown by planfly's guidance
     program: ProgramTable | None = None
-    source: FieldSource | None = None
+    source: ImportedLog | None = None
     mission: MissionTable
     route: RouteTable
     envelope: EnvelopeTable

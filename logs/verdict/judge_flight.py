@@ -40,7 +40,7 @@ def judge_flight(
     """Judge a flown track: level "flown".
 
     Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
-    flight that never began: its route is judged, level "geometric".  One of the field is judged as far as its log goes.
+    flight that never began: its route is judged, level "geometric".  An imported one is judged as far as its log goes.
 
     ended: how the flight ended, "completed" or what stopped it.  whole: the record has its end.
     envelope: whether the aircraft's envelope counts beside what the flight showed, and not that alone.

@@ -168,7 +168,7 @@ CAPTURE_RADIUS = 500.0
 CHORD_TIME = 0.25
 # m.  A waypoint that the track ends at is passed within this of its apex, beside the fly-by's own distance.
 ARRIVED = 10.0
-# s.  A flight of the field that goes on for as long after its last waypoint has flown a part of the next leg.
+# s.  An imported flight that goes on for as long after its last waypoint has flown a part of the next leg.
 PARTLY_FLOWN = 2.0
 # m.  A flight that comes no nearer than this to any waypoint of a plan was flown somewhere else.
 ANOTHER_PLACE = 1000.0

@@ -117,7 +117,7 @@ def _above(flight: NamedFlight) -> Floats:
 
 
 # ----------------------------------------------------------------------
-# A flight of the field and the model's of the same mission: a picture for each quantity, over the way.
+# An imported flight and the model's of the same mission: a picture for each quantity, over the way.
 
 _SIMULATED = "#D55E00"
 # File name, field of a profile, axis label, factor, least span.

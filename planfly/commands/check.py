@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from logs.importers.open_log import is_field_log
+from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.findings import verdict_json
 from logs.verdict.judge_flight import judge_geometry
@@ -20,9 +20,9 @@ from world.scenario import over_terrain
 def check(args: argparse.Namespace) -> int:
     """Judge without flying; the exit code is the verdict's, or 3 for a log that is cut short."""
     source = Path(args.file)
-    if is_field_log(source):
-        return _check_field_log(source, args)
-    _refuse_field_options(source, args)
+    if is_imported_log(source):
+        return _check_imported_log(source, args)
+    _refuse_import_options(source, args)
     fences = read_named_fences(args.fence)
     if is_log(source):
         log = _open_log(source, args, fences)
@@ -40,12 +40,12 @@ def check(args: argparse.Namespace) -> int:
     return FLYABLE if verdict.flyable else NOT_FLYABLE
 
 
-def _check_field_log(source: Path, args: argparse.Namespace) -> int:
-    # Imported here: no other check needs the libraries that read logs of the field.
-    from planfly.commands.imported_logs import field_options
+def _check_imported_log(source: Path, args: argparse.Namespace) -> int:
+    # Imported here: no other check needs the libraries that read imported logs.
+    from planfly.commands.imported_logs import import_options
     from planfly.imported_flights import import_flight
 
-    flight = import_flight(source, field_options(args), scenario_change(args))
+    flight = import_flight(source, import_options(args), scenario_change(args))
     give_answer(args, lambda: verdict_json(flight.verdict))
     print_verdict(flight.verdict, flight.setup.route.notes)
     if flight.lossy:
@@ -53,11 +53,11 @@ def _check_field_log(source: Path, args: argparse.Namespace) -> int:
     return FLYABLE if flight.verdict.flyable else NOT_FLYABLE
 
 
-def _refuse_field_options(source: Path, args: argparse.Namespace) -> None:
-    """Refuse what only a log of the field can take.  Raises ScenarioError."""
+def _refuse_import_options(source: Path, args: argparse.Namespace) -> None:
+    """Refuse what only an imported log can take.  Raises ScenarioError."""
     for name in ("plan", "flight", "datum"):
         if (value := getattr(args, name, None)) is not None:
-            allowed = "goes with a log of the field, not with this file"
+            allowed = "goes with an imported log, not with this file"
             raise ScenarioError.at(source, f"--{name}", value, allowed, shown="")
 
 

@@ -10,7 +10,7 @@ from logs.recording.recorder import Recorder
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from logs.views.report.text import left_lines, refly_lines
-from planfly.imported_flights import FieldOptions, ImportedFlight, fly_again, import_flight
+from planfly.imported_flights import ImportedFlight, ImportOptions, fly_again, import_flight
 from planfly.open_mission import read_named_fences
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
@@ -29,10 +29,10 @@ from world.errors import LogError, ScenarioError
 from world.files import write_whole
 
 # ----------------------------------------------------------------------
-# What options say of a log of the field.
+# What options say of an imported log.
 
 
-def field_options(args: argparse.Namespace) -> FieldOptions:
+def import_options(args: argparse.Namespace) -> ImportOptions:
     """Plan, world and aircraft of the options.
 
     Raises ScenarioError for one that a flown log cannot take, and as `read_named_fences` does.
@@ -40,9 +40,9 @@ def field_options(args: argparse.Namespace) -> FieldOptions:
     source = args.log if hasattr(args, "target") else args.file
     for name in ("params", "guidance", "airspeed"):
         if (value := getattr(args, name, None)) is not None:
-            allowed = "a flight of the field is judged by the autopilot and the speeds of its log"
+            allowed = "an imported flight is judged by the autopilot and the speeds of its log"
             raise ScenarioError.at(source, f"--{name}", value, allowed, shown="")
-    return FieldOptions(
+    return ImportOptions(
         plan=Path(args.plan) if args.plan else None,
         scenario=args.scenario,
         terrain=args.terrain,
@@ -55,7 +55,7 @@ def field_options(args: argparse.Namespace) -> FieldOptions:
 
 
 # ----------------------------------------------------------------------
-# ``planfly import``: a log of the field as a flight log of planfly's own, with its verdict.
+# ``planfly import``: an imported log as a flight log of planfly's own, with its verdict.
 
 # Rows that are recorded at once.
 _PIECE = 4096
@@ -65,7 +65,7 @@ def import_log(args: argparse.Namespace) -> int:
     """Import a log; the exit code is the verdict's, or 3 for a log of which some could not be read."""
     source, target = Path(args.log), Path(args.target)
     refuse_existing(target, args.overwrite, source)
-    flight = import_flight(source, field_options(args), scenario_change(args))
+    flight = import_flight(source, import_options(args), scenario_change(args))
     _write(target, flight)
     print_verdict(flight.verdict, flight.setup.route.notes)
     print(f"log       {target} ({len(flight.track)} rows)")
@@ -97,7 +97,7 @@ def _write(target: Path, flight: ImportedFlight) -> None:
 
 
 # ----------------------------------------------------------------------
-# ``planfly refly``: the mission of a flight of the field, flown again in JSBSim: where model and flight differ.
+# ``planfly refly``: the mission of an imported flight, flown again in JSBSim: where model and flight differ.
 
 
 def refly(args: argparse.Namespace) -> int:

@@ -154,7 +154,7 @@ SHELLS = ("bash", "zsh", "fish")
 # Beside which file the embedded ones stand: their modules would load numbers first.
 _ROOT = Path(__file__).parents[2]
 MISSIONS = ("json", "waypoints", "plan", "txt")
-FIELD_LOGS = ("BIN", "bin", "log", "tlog", "ulg", "gpx", "igc", "kml")
+IMPORTED_LOGS = ("BIN", "bin", "log", "tlog", "ulg", "gpx", "igc", "kml")
 
 
 def completed(action: argparse.Action, completer: Completer) -> argparse.Action:

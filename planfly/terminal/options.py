@@ -201,9 +201,9 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
     )
 
 
-def field_log_options(parser: CommandParser) -> None:
-    """What a person says of a log of the field."""
-    group = parser.group("a log of the field")
+def imported_log_options(parser: CommandParser) -> None:
+    """What a person says of an imported log."""
+    group = parser.group("an imported log")
     found = group.add_argument(
         "--plan", metavar="MISSION", help="what was to be flown, in place of the log's own mission"
     )

@@ -2,7 +2,7 @@
 
 from planfly import __version__
 from planfly.terminal.arguments import (
-    FIELD_LOGS,
+    IMPORTED_LOGS,
     MISSIONS,
     SHELLS,
     aircraft_words,
@@ -26,9 +26,9 @@ from planfly.terminal.command_parser import CommandParser, LineParser, OptionTak
 from planfly.terminal.options import (
     add_campaigns,
     fence_option,
-    field_log_options,
     flight_options,
     flown_by_options,
+    imported_log_options,
     json_option,
     own_link_options,
     pilot_options,
@@ -40,7 +40,7 @@ from planfly.terminal.options import (
 )
 
 # ----------------------------------------------------------------------
-# The parsers of the commands that take logs of the field.
+# The parsers of the commands that take imported logs.
 
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
@@ -49,15 +49,15 @@ def add_field_commands(line: LineParser) -> None:
     """``import`` and ``refly``."""
     importing = line.command(
         "import",
-        "make a flight log of planfly's own of a log from the field, and judge the flight against its plan",
+        "turn another program's flight log into one of planfly's, and judge the flight against its plan",
         "planfly import 00000042.BIN flight.mcap --terrain dem.tif --aircraft aerosonde",
     )
     completed(
         importing.add_argument("log", metavar=LOGS, help="a log of ArduPilot, of a ground station, of PX4, or a track"),
-        files(*FIELD_LOGS),
+        files(*IMPORTED_LOGS),
     )
     importing.add_argument("target", metavar="FLIGHT.mcap", help="the flight log to write")
-    field_log_options(importing)
+    imported_log_options(importing)
     world_options(importing)
     flown_by_options(importing)
     result_options(importing)
@@ -85,7 +85,7 @@ def add_log_commands(line: LineParser) -> None:
     """``check``, ``replay``, ``recover``, ``report`` and ``compare``."""
     check = line.command(
         "check",
-        "judge a flight from its log (planfly's, or one of the field), or a mission file by its geometry alone",
+        "judge a flight from its log (planfly's, or another program's), or a mission file by its geometry alone",
         "planfly check flight.mcap --json verdict.json",
         "planfly check mission.waypoints --terrain jacksboro --json -",
     )
@@ -93,9 +93,9 @@ def add_log_commands(line: LineParser) -> None:
         check.add_argument(
             "file", metavar="LOG|MISSION", help=f"a flight log (.mcap, or {LOGS}), or plan.json, .waypoints, .plan"
         ),
-        files("mcap", *MISSIONS, *FIELD_LOGS),
+        files("mcap", *MISSIONS, *IMPORTED_LOGS),
     )
-    field_log_options(check)
+    imported_log_options(check)
     world_options(check)
     flown_by_options(check)
     pilot_options(check)

@@ -1,4 +1,4 @@
-"""Which legs of a route each stretch of a flight was flown on: a log of the field may hold a part of them, or none."""
+"""Which legs of a route each stretch of a flight was flown on: an imported log may hold a part of them, or none."""
 
 import math
 from dataclasses import dataclass, replace
@@ -175,10 +175,10 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     """Whether the stretches of a flight that followed a mission followed another one than the setup's; None if not.
 
     >>> from dataclasses import replace
-    >>> from flight.simulation.setup import FieldSource, MissionStretch
+    >>> from flight.simulation.setup import ImportedLog, MissionStretch
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
-    >>> source = FieldSource("a.BIN", "", "", stretches=(MissionStretch(0.0, 36.5, "AUTO", "log"),))
+    >>> source = ImportedLog("a.BIN", "", "", stretches=(MissionStretch(0.0, 36.5, "AUTO", "log"),))
     >>> setup = replace(log.setup, source=source)
     >>> far = replace(log.track, position=log.track.position + np.array([0.0, 9000.0, 0.0]))
     >>> plan_mismatch(setup, log.track) is None, plan_mismatch(setup, far).text

@@ -1,4 +1,4 @@
-"""Judging a flight of the field: the stretches that followed the mission, by the same rules, as far as its log goes.
+"""Judging an imported flight: the stretches that followed the mission, by the same rules, as far as its log goes.
 
 A log may lack what a rule needs, have pauses, and end before the flight does.  What cannot be known from it is not
 judged and says why; what it shows to be wrong is wrong all the same.
@@ -14,9 +14,9 @@ import numpy as np
 from flight.mission.items import Command
 from flight.simulation.setup import (
     Damage,
-    FieldSource,
     FlightSetup,
     Gap,
+    ImportedLog,
     MissionStretch,
     Quantity,
     RowFaults,
@@ -30,7 +30,7 @@ from logs.verdict.places import FLIGHT, LevelAnswer, Place
 from logs.verdict.summary import headline
 
 # ----------------------------------------------------------------------
-# The lines of a verdict on a flight of the field: the answer, what was judged and what not, and what the log is.
+# The lines of a verdict on an imported flight: the answer, what was judged and what not, and what the log is.
 
 _DATUM_TEXTS: dict[VerticalDatum, str] = {
     "amsl": "above mean sea level, as the log has it",
@@ -66,7 +66,7 @@ def field_lines(
     return tuple(lines)
 
 
-def _judged_lines(source: FieldSource, flown: Sequence[FlownLegs]) -> list[str]:
+def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs]) -> list[str]:
     """What is judged: each stretch, with its time and its legs."""
     if not source.stretches:
         return ["Judged: nothing, for no stretch followed the mission"]
@@ -98,11 +98,11 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
     return lines
 
 
-def heights_text(source: FieldSource) -> str:
+def heights_text(source: ImportedLog) -> str:
     """Which height was taken, its datum, and how far off the others were at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
-    >>> heights_text(FieldSource("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
+    >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
     'POS, above mean sea level, as the log has it; at the start GPS.Alt -0.1 m of it'
     """
     offsets = ", ".join(f"{one.name} {one.offset:+.1f} m" for one in source.heights.offsets)
@@ -150,7 +150,7 @@ def damage_text(damage: Damage) -> str:
     return "; ".join(words) or "nothing"
 
 
-def _when(source: FieldSource) -> str:
+def _when(source: ImportedLog) -> str:
     if not isfinite(source.utc_start) or not 0.0 <= source.utc_start < 4.1e9:
         return ""
     return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
@@ -201,7 +201,7 @@ def judge_field_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verd
     """
     source = setup.source
     if source is None:
-        raise ValueError("a flight without a source is not of the field")
+        raise ValueError("a flight without a source was not imported")
     flown = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     findings = _merged([_of_stretch(setup, legs) for legs in flown])
     findings = (*findings, _completion(setup, flown, whole=whole))

@@ -1,4 +1,4 @@
-"""A flight of the field and the model's flight of the same mission, side by side: leg by leg, turn by turn."""
+"""An imported flight and the model's flight of the same mission, side by side: leg by leg, turn by turn."""
 
 import math
 from collections.abc import Sequence
@@ -80,7 +80,7 @@ class Spread:
 class Reflight:
     """Both flights.
 
-    stretch: of the flight of the field that is compared.
+    stretch: of the imported flight that is compared.
     setup: of the simulated one.  simulated: its rows.  ended: how it ended.
     distance: (n,) m along the route's legs at which they are compared.
     ends: (legs,) m along the route at which each leg ends.
@@ -107,7 +107,7 @@ class Reflight:
 def compare_with_model(
     setup: FlightSetup, flown: FlownLegs, simulated: Track, ended: str, *, stands_in: bool = False
 ) -> Reflight:
-    """Hold a model's flight of a route against the flight of the field on it.
+    """Hold a model's flight of a route against the imported flight on it.
 
     setup: of the model's flight.  Raises LogError where the model's flight has too few rows.
 

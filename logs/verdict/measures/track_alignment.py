@@ -143,7 +143,7 @@ def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
 def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
     """Rows with finite, plausible numbers, later than every usable row before them.
 
-    own: the flight is planfly's, which has all numbers in every row; of a log of the field places and velocities count,
+    own: the flight is planfly's, which has all numbers in every row; of an imported log places and velocities count,
     and each rule looks to what it needs beside them.
     """
     good = np.isfinite(track.time)

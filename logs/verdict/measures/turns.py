@@ -16,10 +16,10 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# How a flight of the field took each corner: its nearest pass, and how far past the new leg it went.
+# How an imported flight took each corner: its nearest pass, and how far past the new leg it went.
 #
-# An autopilot of the field knows nothing of planfly's arcs: it turns where it holds the waypoint to be reached.  So its
-# corners are measured against what is known of them, the waypoint and the next leg.
+# The autopilot of an imported flight knows nothing of planfly's arcs: it turns where it holds the waypoint to be
+# reached.  So its corners are measured against what is known of them, the waypoint and the next leg.
 
 # Share of the next leg over which a corner is looked at: by its end the next corner has begun.
 OF_NEXT_LEG = 0.7
@@ -121,7 +121,7 @@ class TurnMeasure:
     passed: m, least distance from the waypoint.
     full_circles: whole turns flown beyond the corner's own.
     over: the flight got past the turn.
-    corner: of a flight of the field, how its waypoint was passed; ``overshoot`` and ``passed`` are then its.
+    corner: of an imported flight, how its waypoint was passed; ``overshoot`` and ``passed`` are then its.
     """
 
     angle: float | None = None

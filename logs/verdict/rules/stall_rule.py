@@ -105,7 +105,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Findi
     envelope = requirements.setup.envelope
     level = np.interp(up, envelope.amsl, envelope.level_speed_min)
     # What the wing carried, or what it had to carry for the height to be held in a turn within the bank limit.
-    # A log of the field may hold no load factor.
+    # An imported log may hold no load factor.
     carried = np.fmax(load, 1.0 / np.cos(np.minimum(bank, requirements.limits.max_bank)))
     stall = level * np.sqrt(np.maximum(carried, 0.0))
     margin = speed - stall

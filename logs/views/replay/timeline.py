@@ -136,7 +136,7 @@ def _start(log: FlightLog) -> TimelineEntry:
         text = f"{setup.aircraft}, {scenario}, seed {setup.seed}; {place}. {setup.route.started}"
     else:
         # A real flight was drawn from no seed, and nobody trimmed it.
-        text = f"{setup.aircraft}, {scenario}; log of the field {setup.source.file}, {place}"
+        text = f"{setup.aircraft}, {scenario}; imported log {setup.source.file}, {place}"
     return TimelineEntry(float(track.time[0]), "start", text.strip())
 
 
@@ -247,7 +247,7 @@ def _end(log: FlightLog) -> list[TimelineEntry]:
     flown = float(np.nansum(np.sqrt((steps**2).sum(axis=1))))
     how = log.ended if log.ended is not None else "not recorded"
     used = float(track.energy[-1])
-    # A log of the field may hold no battery.
+    # An imported log may hold no battery.
     drawn = f", {used:.1f} Wh from the battery" if math.isfinite(used) else ""
     text = f"{how}; {log.end_time:.1f} s, {flown / 1000.0:.2f} km{drawn}"
     entries = [TimelineEntry(log.end_time, "end", text)]

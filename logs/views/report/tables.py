@@ -113,7 +113,7 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     low = NOTHING if above is None else number(_least(above), digits=0)
     height = f", never less than {low} m above ground" if low != NOTHING else ""
     energy = float(track.energy[-1])
-    # A log of the field may hold no battery.
+    # An imported log may hold no battery.
     used = f", {number(energy, digits=0)} of {number(setup.battery, digits=0)} Wh" if math.isfinite(energy) else ""
     return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height}{used}."
 

@@ -323,7 +323,7 @@ def _rule_row(rule: str, group: list[Finding]) -> RuleRow:
 
 
 # ----------------------------------------------------------------------
-# A flight of the field against the model's, in words: legs, turns, and how far the model can be trusted.
+# An imported flight against the model's, in words: legs, turns, and how far the model can be trusted.
 
 _CALLED = {"cross_track": "cross-track", "height_error": "height", "ground_speed": "ground speed", "bank": "bank"}
 _HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)", "energy (Wh)")
@@ -378,7 +378,7 @@ def trust_line(again: Reflight) -> str:
 def left_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], flown_again: int) -> list[str]:
     """Which stretches were not flown again, and why.
 
-    stretches: of the flight of the field.  flown_again: the most that are.
+    stretches: of the imported flight.  flown_again: the most that are.
 
     >>> left_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
     ['Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order']

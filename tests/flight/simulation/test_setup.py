@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from aircraft.path_limits import Limits
-from flight.simulation.setup import AutopilotProgram, Damage, FieldSource, make_limits
+from flight.simulation.setup import AutopilotProgram, Damage, ImportedLog, make_limits
 from tests.setups import falling_envelope, route_along, setup_along, small_scenario
 from world.wind import Wind
 
@@ -29,7 +29,7 @@ def test_a_cut_end_is_no_loss() -> None:
 
 
 def test_a_source_holds_nothing_that_is_not_stated() -> None:
-    source = FieldSource("a.BIN", "", "")
+    source = ImportedLog("a.BIN", "", "")
     assert (source.holds, source.stretches, source.heights.datum, source.aircraft_known) == ((), (), "unstated", False)
 
 

@@ -14,7 +14,7 @@ from logs.importers.imported_flight import (
     flown_spans,
     make_flight,
     mean_wind,
-    rows_of_flight,
+    track_of_flight,
     with_flown_heights,
 )
 from logs.importers.raw_log import BEFORE, LEG, SPEED, LoggedMission, LogSeries, ModeChange, RawLog, example_raw_log
@@ -79,7 +79,7 @@ def test_a_flight_without_auto_is_shown_and_not_judged() -> None:
 
 
 # ----------------------------------------------------------------------
-# Field flight.
+# One flight of a log.
 
 
 def with_series(raw: RawLog, **series: LogSeries | None) -> RawLog:
@@ -206,14 +206,14 @@ PLACES = {
 def test_the_flight_is_where_its_formula_has_it(place: str) -> None:
     lat, lon, up = PLACES[place]
     flight = make_flight(example_raw_log(lat, lon, up))
-    track = rows_of_flight(flight, GeoOrigin(lat, lon))
+    track = track_of_flight(flight, GeoOrigin(lat, lon))
     run = SPEED * (track.time - 20.0 - BEFORE)
     wanted = np.column_stack([np.maximum(run - LEG, 0.0), np.minimum(run, LEG), np.full(run.size, up)])
     assert np.abs(track.position - wanted).max() < 1e-3
 
 
 def test_what_the_log_does_not_hold_is_no_number() -> None:
-    track = rows_of_flight(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
+    track = track_of_flight(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
     for name in ("rates", "commands", "load_factor", "current", "energy"):
         assert np.isnan(getattr(track, name)).all()
     assert (track.controls[:, 3] == np.float32(0.6)).all()
@@ -223,5 +223,5 @@ def test_velocities_that_are_missing_are_those_of_the_places() -> None:
     raw = example_raw_log()
     series = {name: found for name, found in raw.series.items() if name != "velocity"}
     flight = make_flight(type(raw)(**{**{f: getattr(raw, f) for f in raw.__slots__}, "series": series}))
-    track = rows_of_flight(flight, GeoOrigin(46.0, 8.0))
+    track = track_of_flight(flight, GeoOrigin(46.0, 8.0))
     assert np.abs(np.hypot(*track.velocity[:, :2].T)[10:200] - SPEED).max() < 0.01

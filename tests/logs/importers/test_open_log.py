@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from logs.importers.open_log import MAX_BYTES, is_field_log, open_log
+from logs.importers.open_log import MAX_BYTES, is_imported_log, open_log
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
 from world.errors import LogError
 
@@ -22,7 +22,7 @@ WRITERS: dict[str, tuple[str, Callable[[Path], Path]]] = {
 def test_each_format_is_told_from_the_others(tmp_path: Path, name: str) -> None:
     suffix, write = WRITERS[name]
     path = write(tmp_path / f"a{suffix}")
-    assert is_field_log(path)
+    assert is_imported_log(path)
     assert open_log(path).format == name
 
 
@@ -60,7 +60,7 @@ def test_a_zipped_track_is_read_as_the_track_in_it(tmp_path: Path) -> None:
         archive.write(track, "doc.kml")
     one, other = open_log(track), open_log(path)
     assert one.series["position"].values.tolist() == other.series["position"].values.tolist()
-    assert is_field_log(path)
+    assert is_imported_log(path)
 
 
 def test_a_log_as_text_is_refused_by_name(tmp_path: Path) -> None:
@@ -68,4 +68,4 @@ def test_a_log_as_text_is_refused_by_name(tmp_path: Path) -> None:
     path.write_text("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nPARM, 1, RLL_P, 0.3\n")
     with pytest.raises(LogError, match=r"a dataflash log as text: the \.BIN that it was made of is read"):
         open_log(path)
-    assert is_field_log(path)
+    assert is_imported_log(path)

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.simulation.setup import FieldSource
+from flight.simulation.setup import ImportedLog
 from logs.importers.raw_log import example_raw_log
 from logs.recording.reader import read_log
 from planfly.cli import main
 from tests.logs.importers.damaged_copies import damaged
 from tests.logs.importers.written_logs import BEGAN, dataflash, gpx, igc, kml, px4, telemetry
-from tests.planfly.commands.field_log_files import example_plan
+from tests.planfly.commands.imported_log_files import example_plan
 from tests.soak import note, scaled
 
 Output = pytest.CaptureFixture[str]
@@ -31,7 +31,7 @@ TRACKS = ("a.gpx", "a.igc", "a.kml")
 TIMES = example_raw_log().series["position"].time
 
 
-def untold(name: str, time: np.ndarray, source: FieldSource, out: str) -> str:
+def untold(name: str, time: np.ndarray, source: ImportedLog, out: str) -> str:
     """A stretch of over a second that is missing from the rows (n,) and that the result does not tell; "" for none."""
     known = {(round(gap.start, 6), round(gap.end, 6)) for gap in source.gaps}
     for start, end in zip(time[:-1].tolist(), time[1:].tolist(), strict=True):
@@ -80,4 +80,4 @@ def test_damaged_copies_are_refused_or_told(tmp_path: Path, capsys: Output, name
         assert untold(name, flown.track.time, source, out) == "", (seed, out)
     assert set(codes) & {0, 3, 4}, "none was read"
     refused = codes.count(2)
-    note(f"field logs: damaged {name}", copies=len(codes), refused=refused, judged=len(codes) - refused, silent=0)
+    note(f"imported logs: damaged {name}", copies=len(codes), refused=refused, judged=len(codes) - refused, silent=0)

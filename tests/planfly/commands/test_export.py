@@ -111,7 +111,7 @@ def test_a_log_in_other_programs_forms(log_file: Path, tmp_path: Path, capsys: p
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["flight"] * 4
     assert len(targets[0].read_text().splitlines()) == rows + 1
     assert pyarrow.parquet.read_metadata(targets[1]).num_rows == rows
-    # Both are logs of the field to `check`, and the same flight.
+    # Both are imported logs to `check`, and the same flight.
     for target in targets[2:]:
         assert main(["check", str(target)]) in (0, 4)
         assert "Judged: " in capsys.readouterr().out

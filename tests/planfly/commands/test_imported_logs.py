@@ -8,25 +8,25 @@ from logs.importers.raw_log import example_raw_log
 from logs.recording.example_log import write_example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.commands.imported_logs import field_options
+from planfly.commands.imported_logs import import_options
 from planfly.terminal.parser import build_parser
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
-from tests.planfly.commands.field_log_files import FLIGHTS, example_plan
+from tests.planfly.commands.imported_log_files import FLIGHTS, example_plan
 from tests.soak import SOAK
 from world.errors import ScenarioError
 
 
 def test_options_become_what_a_person_says() -> None:
     line = ["check", "a.BIN", "--plan", "p.plan", "--flight", "2", "--datum", "amsl", "--aircraft", "c172x"]
-    options = field_options(build_parser().parse_args([*line, "--wind", "5,270"]))
+    options = import_options(build_parser().parse_args([*line, "--wind", "5,270"]))
     assert (options.plan, options.number, options.datum) == (Path("p.plan"), 2, "amsl")
     assert (options.aircraft, options.wind_given, options.scenario) == ("c172x", True, None)
 
 
 @pytest.mark.parametrize("given", [["--params", "a.parm"], ["--guidance", "l1"], ["--airspeed", "20"]])
 def test_what_a_flown_log_cannot_take_is_refused(given: list[str]) -> None:
-    with pytest.raises(ScenarioError, match=f"a.BIN: {given[0]}: a flight of the field"):
-        field_options(build_parser().parse_args(["check", "a.BIN", *given]))
+    with pytest.raises(ScenarioError, match=f"a.BIN: {given[0]}: an imported flight"):
+        import_options(build_parser().parse_args(["check", "a.BIN", *given]))
 
 
 # ----------------------------------------------------------------------
@@ -177,9 +177,9 @@ def test_flights_anywhere_are_judged_alike(tmp_path: Path, capsys: Output, lat: 
 def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Output) -> None:
     log = dataflash(tmp_path / "a.BIN")
     assert main(["check", str(log), "--guidance", "l1"]) == 2
-    assert "--guidance: a flight of the field is judged by the autopilot" in capsys.readouterr().err
+    assert "--guidance: an imported flight is judged by the autopilot" in capsys.readouterr().err
     assert main(["check", str(example_plan(tmp_path)), "--flight", "1"]) == 2
-    assert "--flight: goes with a log of the field" in capsys.readouterr().err
+    assert "--flight: goes with an imported log" in capsys.readouterr().err
     assert main(["import", str(log), str(log)]) == 2
     assert "is the input itself" in capsys.readouterr().err
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.simulation.setup import FieldSource, FlightSetup, MissionStretch
+from flight.simulation.setup import FlightSetup, ImportedLog, MissionStretch
 from logs.recording.example_log import example_log
 from logs.verdict.imported.flown_legs import flown_legs, part_of_route, plan_mismatch
 from logs.verdict.tolerances import ANOTHER_PLACE, PARTLY_FLOWN
@@ -61,7 +61,7 @@ def test_a_flight_that_ends_in_its_first_lap_has_flown_none_of_the_second() -> N
 # ----------------------------------------------------------------------
 # Wrong plan.
 
-SETUP = replace(LOG.setup, source=FieldSource("a", "", "", stretches=(MissionStretch(0.0, 36.5, "AUTO", "log"),)))
+SETUP = replace(LOG.setup, source=ImportedLog("a", "", "", stretches=(MissionStretch(0.0, 36.5, "AUTO", "log"),)))
 
 
 def along(waypoints: list[list[float]]) -> FlightSetup:
@@ -111,6 +111,6 @@ def test_a_flight_that_went_home_half_way_is_not_another_plan() -> None:
 
 
 def test_without_stretches_nothing_is_said() -> None:
-    assert plan_mismatch(replace(SETUP, source=FieldSource("a", "", "")), LOG.track) is None
+    assert plan_mismatch(replace(SETUP, source=ImportedLog("a", "", "")), LOG.track) is None
     assert plan_mismatch(SETUP, LOG.track.rows(0, 0)) is None
     assert np.isfinite(LOG.track.position).all()

@@ -1,4 +1,4 @@
-"""Flights of the field: what is judged, what is not and why, and that what is wrong is wrong all the same."""
+"""Imported flights: what is judged, what is not and why, and that what is wrong is wrong all the same."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.simulation.setup import Damage, FieldSource, Heights, RowFaults
+from flight.simulation.setup import Damage, Heights, ImportedLog, RowFaults
 from logs.importers.raw_log import LogSeries, ModeChange, RawLog, example_raw_log
 from logs.verdict.imported.judge_imported_flight import damage_text, heights_text, rows_text
 from logs.verdict.judge_flight import judge_flight
-from planfly.imported_flights import FieldOptions
+from planfly.imported_flights import ImportOptions
 from tests.logs.importers.judged_flights import judged, outcome, reasons
 
-AEROSONDE = FieldOptions(aircraft="aerosonde")
+AEROSONDE = ImportOptions(aircraft="aerosonde")
 
 
 def without(*names: str) -> RawLog:
@@ -188,7 +188,7 @@ def test_each_fault_of_rows_is_counted_by_name() -> None:
 
 def test_each_datum_is_named() -> None:
     said = {
-        datum: heights_text(FieldSource("a", "", "", heights=Heights("POS", datum)))
+        datum: heights_text(ImportedLog("a", "", "", heights=Heights("POS", datum)))
         for datum in ("amsl", "ellipsoid", "pressure", "unstated")
     }
     assert len(set(said.values())) == 4

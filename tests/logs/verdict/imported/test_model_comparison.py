@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.simulation.setup import FieldSource, MissionStretch
+from flight.simulation.setup import ImportedLog, MissionStretch
 from flight.simulation.track import Track
 from logs.recording.example_log import example_log
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 
 LOG = example_log()
-SETUP = replace(LOG.setup, source=FieldSource("a.BIN", "", ""))
+SETUP = replace(LOG.setup, source=ImportedLog("a.BIN", "", ""))
 
 
 def flown(track: Track) -> FlownLegs:

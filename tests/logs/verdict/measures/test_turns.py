@@ -147,7 +147,7 @@ def test_a_turn_that_was_not_reached_has_no_numbers(setup: FlightSetup) -> None:
 
 
 # ----------------------------------------------------------------------
-# How corners of the field were passed, against sums on polylines made by hand.
+# How corners of imported flights were passed, against sums on polylines made by hand.
 
 Place = tuple[float, float]
 # Two kilometres north, then one to the east, then north again.

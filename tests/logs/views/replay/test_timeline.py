@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.simulation.setup import FieldSource
+from flight.simulation.setup import ImportedLog
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
@@ -45,10 +45,10 @@ def test_a_real_flight_begins_where_its_log_does_without_seed_or_trim(log: Fligh
     def start(given: FlightLog) -> str:
         return timeline(given)[0].text
 
-    real = dataclasses.replace(log, setup=dataclasses.replace(log.setup, source=FieldSource("a.BIN", "", "")))
+    real = dataclasses.replace(log, setup=dataclasses.replace(log.setup, source=ImportedLog("a.BIN", "", "")))
     assert "seed" in start(log)
     assert log.setup.route.started in start(log)
-    assert "; log of the field a.BIN, from " in start(real)
+    assert "; imported log a.BIN, from " in start(real)
     assert "seed" not in start(real)
     assert log.setup.route.started not in start(real)
 

@@ -11,7 +11,7 @@ from logs.recording.reader import read_log
 from planfly.cli import main
 from planfly.paper import SeededPlan
 from tests.logs.importers.written_logs import dataflash
-from tests.planfly.commands.field_log_files import example_plan
+from tests.planfly.commands.imported_log_files import example_plan
 from tests.planfly.conftest import FIELD
 from tests.planfly.made_plans import made_plan
 from tests.planfly.terminal.answers.checked_answers import answered
