@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from aircraft.jsbsim_model import OURS, Model, read_model
+from aircraft.jsbsim_model import DEFAULT_MODEL, Model, read_model
 from world.errors import FlightError
 from world.files import did_you_mean, read_at_most, read_toml, write_folder
 from world.scenario_tables import names_folder
@@ -85,7 +85,7 @@ class Aircraft:
     motor_lag: float
     battery_voltage: float
     battery_energy: float
-    model: Model = OURS
+    model: Model = DEFAULT_MODEL
 
     @property
     def model_file(self) -> Path:
@@ -172,7 +172,7 @@ def read_aircraft(folder: Path) -> Aircraft:
     if not isinstance(title, str):
         raise FlightError(f"{file}: title = {title!r} is not a text", file=file, field="title", value=title)
     try:
-        model = read_model(table.pop("model"), folder.name) if "model" in table else OURS
+        model = read_model(table.pop("model"), folder.name) if "model" in table else DEFAULT_MODEL
         values = _numbers(table)
     except FlightError as error:
         raise FlightError.from_error(error, file) from None

@@ -50,7 +50,7 @@ class Model:
     readings: tuple[Reading, ...]
 
 
-OURS = Model(
+DEFAULT_MODEL = Model(
     shipped="",
     settles=False,
     commands=(
@@ -77,14 +77,14 @@ def read_model(table: object, aircraft: str) -> Model:
     commands = _table(table.get("command", {}), "model.command", _COMMANDS)
     readings = _table(table.get("reading", {}), "model.reading", _READINGS)
     made = []
-    for name, ours in zip(_COMMANDS, OURS.commands, strict=True):
+    for name, ours in zip(_COMMANDS, DEFAULT_MODEL.commands, strict=True):
         if name not in commands:
             made.append(ours)
             continue
         prop, above, below = _entry(commands[name], f"model.command.{name}", 2)
         made.append(CommandProperty(prop, above, below))
     read = []
-    for name, mine in zip(_READINGS, OURS.readings, strict=True):
+    for name, mine in zip(_READINGS, DEFAULT_MODEL.readings, strict=True):
         if name not in readings:
             read.append(mine)
         elif readings[name] == []:
@@ -92,7 +92,7 @@ def read_model(table: object, aircraft: str) -> Model:
         else:
             prop, factor = _entry(readings[name], f"model.reading.{name}", 1)
             read.append(Reading(prop, factor))
-    return Model(_shipped(table, aircraft), _truth(table, "engine_settles"), tuple(made), tuple(read))
+    return Model(_shipped(table, aircraft), _flag(table, "engine_settles"), tuple(made), tuple(read))
 
 
 def _table(value: object, key: str, known: tuple[str, ...]) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def _shipped(table: dict[str, Any], aircraft: str) -> str:
     return value
 
 
-def _truth(table: dict[str, Any], name: str) -> bool:
+def _flag(table: dict[str, Any], name: str) -> bool:
     value = table.get(name, False)
     if not isinstance(value, bool):
         raise FlightError(f"model.{name} = {value!r} is not true or false", field=f"model.{name}", value=value)

@@ -104,8 +104,8 @@ class Limits:
             # sigma_w of MIL-F-8785C, which sigma_u meets at 300 m.
             gust_sigma=0.1 * W20[wind.turbulence],
             amsl=heights,
-            climb=_locked(angles[:, 0]),
-            descent=_locked(angles[:, 1]),
+            climb=_read_only(angles[:, 0]),
+            descent=_read_only(angles[:, 1]),
         )
 
 
@@ -118,7 +118,7 @@ def derated(table: PerformanceTable, share: float) -> PerformanceTable:
     [0.1, -0.1]
     """
     climb, descent = (
-        _locked(np.where(angles > 0.0, share * angles, angles)) for angles in (table.climb, table.descent)
+        _read_only(np.where(angles > 0.0, share * angles, angles)) for angles in (table.climb, table.descent)
     )
     return table._replace(climb=climb, descent=descent)
 
@@ -132,11 +132,11 @@ def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -
     ([0.201, 0.201], [0.3, 0.3])
     """
     most = [math.asin(min(1.0, rate / table.airspeed)) for rate in (climb_rate, sink_rate)]
-    climb, descent = _locked(np.minimum(table.climb, most[0])), _locked(np.minimum(table.descent, most[1]))
+    climb, descent = _read_only(np.minimum(table.climb, most[0])), _read_only(np.minimum(table.descent, most[1]))
     return table._replace(climb=climb, descent=descent)
 
 
-def _locked(values: Floats) -> Floats:
+def _read_only(values: Floats) -> Floats:
     # Contiguous and read-only like every table: another layout would compile the kernels again.
     out = np.array(values, dtype=np.float64)
     out.setflags(write=False)

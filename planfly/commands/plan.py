@@ -17,7 +17,7 @@ from planfly.terminal.options import scenario_change
 from planfly.terminal.output import progress
 from planfly.terminal.results import default_folder, named_or_default
 from planner.plan import Objective, Plan, plan_json, read_plan
-from planner.search.explain_failure import what_blocks
+from planner.search.explain_failure import explain_failure
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan, same_mission
 from planner.search.search_state import SearchProgress, StopCondition
@@ -149,5 +149,5 @@ def _print_plan(made: Plan, limits: Limits) -> None:
     for problem in made.certificate.problems:
         print(f"  failed  {problem}")
     if not made.feasible:
-        for line in what_blocks(made, limits):
+        for line in explain_failure(made, limits):
             print(f"  note    {line}")

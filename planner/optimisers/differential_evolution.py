@@ -35,20 +35,20 @@ class DifferentialEvolution(BoxSearch):
         if not len(self.scores):
             self.samples, self.scores = self._asked.copy(), np.array(scores)
         else:
-            rows = self._challenged()
+            rows = self._targets()
             order = self._rank(np.concatenate([self.scores, scores]))
             better = order[len(self.samples) :] <= order[rows]
             self.samples[rows[better]] = self._asked[better]
             self.scores[rows[better]] = scores[better]
             self._turn += 1
-        self._asked = self._mix(self._challenged())
+        self._asked = self._trial_vectors(self._targets())
 
-    def _challenged(self) -> Ints:
+    def _targets(self) -> Ints:
         """Target rows of this generation: the halves of the population alternate."""
         count = len(self.samples)
         return np.arange(self._half) if self._turn % 2 == 0 else np.arange(count - self._half, count)
 
-    def _mix(self, rows: Ints) -> Floats:
+    def _trial_vectors(self, rows: Ints) -> Floats:
         """Trial vectors of some targets: a + F (b - c) in most variables, the target's own value in the others."""
         count, size = self.samples.shape
         picked = self._rng.integers(0, count, (3, rows.size))

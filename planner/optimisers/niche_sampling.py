@@ -22,9 +22,9 @@ FIRST_REDRAWS, REDRAWS = 8, 4
 # Clearing radius of niches, as a share of the sampling deviation.
 CLEARING = 0.5
 # Maximum share of a group's samples that are selected.
-KEPT_SHARE = 0.5
+MAX_SELECTED_SHARE = 0.5
 # Samples selected of each group whatever their cost.
-FEWEST_KEPT = 4
+MIN_SELECTED = 4
 
 
 class NicheSampling:
@@ -69,28 +69,32 @@ class NicheSampling:
             spread = self._rng.random((groups.size, size[2]))
             return np.asarray(np.minimum(low[groups, 0] + spread * (high - low)[groups, 0], self._upper[groups]))
 
-        return self._drawn(size, draw, FIRST_REDRAWS)
+        return self._draw(size, draw, FIRST_REDRAWS)
 
-    def next(self, rows: Floats, costs: Floats, count: int, deviation: Floats, most: float, elite: Floats) -> Floats:
+    def next(
+        self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
+    ) -> Floats:
         """Samples (g, count, d): the elite, the best of each niche, and new samples around these.
 
-        rows: (g, n, d) with costs (g, n). deviation: (d,) of new samples. most: maximum cost of a selected sample.
+        rows: (g, n, d) with costs (g, n). deviation: (d,) of new samples. max_cost: maximum cost of a selected sample.
         elite: (g, d), always selected.
         """
-        kept, numbers = _keep(rows, costs, elite, CLEARING * deviation, most, max(1, int(KEPT_SHARE * count)))
-        groups, parents = len(rows), kept.shape[1]
+        selected, numbers = _select(
+            rows, costs, elite, CLEARING * deviation, max_cost, max(1, int(MAX_SELECTED_SHARE * count))
+        )
+        groups, parents = len(rows), selected.shape[1]
 
         def draw(of: Ints) -> Floats:
             parent = np.floor(self._rng.random(of.size) * numbers[of]).astype(np.int64)
-            drawn = kept[of, parent] + deviation * self._rng.standard_normal((of.size, rows.shape[2]))
+            drawn = selected[of, parent] + deviation * self._rng.standard_normal((of.size, rows.shape[2]))
             return np.clip(drawn, self._lower[of], self._upper[of])
 
-        out = self._drawn((groups, count, rows.shape[2]), draw, REDRAWS)
+        out = self._draw((groups, count, rows.shape[2]), draw, REDRAWS)
         old = np.arange(parents) < numbers[:, None]
-        out[:, :parents][old] = kept[old]
+        out[:, :parents][old] = selected[old]
         return out
 
-    def _drawn(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], redraws: int) -> Floats:
+    def _draw(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], redraws: int) -> Floats:
         """Samples of this shape, from a function that draws one for each group number; infeasible ones are redrawn."""
         groups = np.repeat(np.arange(size[0]), size[1])
         out = draw(groups)
@@ -105,31 +109,31 @@ class NicheSampling:
 
 
 @compiled
-def _keep(
-    rows: Floats, costs: Floats, elite: Floats, apart: Floats, most: float, number: int
+def _select(
+    rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, number: int
 ) -> tuple[Floats, Ints]:  # pragma: no cover - compiled
     """Selected samples (g, number, d) of each group, the elite first, and their numbers (g,)."""
     groups, _, size = rows.shape
-    kept, numbers = np.zeros((groups, number, size)), np.ones(groups, dtype=np.int64)
+    selected, numbers = np.zeros((groups, number, size)), np.ones(groups, dtype=np.int64)
     for g in range(groups):
-        kept[g, 0] = elite[g]
+        selected[g, 0] = elite[g]
         for k in np.argsort(costs[g], kind="mergesort"):
             many = numbers[g]
-            if many == number or costs[g, k] == np.inf or (costs[g, k] > most and many >= FEWEST_KEPT):
+            if many == number or costs[g, k] == np.inf or (costs[g, k] > max_cost and many >= MIN_SELECTED):
                 break
-            if _lies_apart(rows[g, k], kept[g, :many], apart):
-                kept[g, many] = rows[g, k]
+            if _is_distinct(rows[g, k], selected[g, :many], clearing_radius):
+                selected[g, many] = rows[g, k]
                 numbers[g] += 1
-    return kept, numbers
+    return selected, numbers
 
 
 @compiled
-def _lies_apart(row: Floats, others: Floats, apart: Floats) -> bool:  # pragma: no cover - compiled
-    """Whether a sample (d,) differs from each of the others by at least `apart` in some variable."""
+def _is_distinct(row: Floats, others: Floats, clearing_radius: Floats) -> bool:  # pragma: no cover - compiled
+    """Whether a sample (d,) differs from each of the others by at least `clearing_radius` in some variable."""
     for n in range(others.shape[0]):
         near = True
         for d in range(row.size):
-            near = near and abs(row[d] - others[n, d]) < apart[d]
+            near = near and abs(row[d] - others[n, d]) < clearing_radius[d]
         if near:
             return False
     return True

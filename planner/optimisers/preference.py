@@ -22,7 +22,7 @@ Ints = NDArray[np.int64]
 NO_GOAL = -np.inf
 
 # Run length of insertion sort; and number of rows of two columns above which a tree counts faster than a scan.
-INSERTED, MANY = 8, 4000
+INSERTION_RUN, TREE_THRESHOLD = 8, 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
             for c in range(width):
                 for k in range(begin, end):
                     sorted_[c, k] = table[column + c, order[k]]
-            if width == 2 and end - begin > MANY:
+            if width == 2 and end - begin > TREE_THRESHOLD:
                 _count_pairs(sorted_, begin, end, order, total)
             else:
                 _count_any(sorted_, width, begin, end, order, below, total)
@@ -109,13 +109,13 @@ def _sort(
     """Sort order[begin:end] lexicographically by `width` columns of the table: a stable merge sort."""
     for k in range(begin + 1, end):
         # Insertion sort of short runs.
-        low = begin + (k - begin) // INSERTED * INSERTED
+        low = begin + (k - begin) // INSERTION_RUN * INSERTION_RUN
         row, at = order[k], k
         while at > low and _before(table, column, width, row, order[at - 1]):
             order[at] = order[at - 1]
             at -= 1
         order[at] = row
-    size = INSERTED
+    size = INSERTION_RUN
     while size < end - begin:
         for low in range(begin, end - size, 2 * size):
             middle, high = low + size, min(low + 2 * size, end)

@@ -63,8 +63,8 @@ class Umda(BoxSearch):
 
     def _sample(self, count: int) -> Floats:
         """Samples of independent Gaussians (maximum likelihood, 1/N), redrawn and finally clipped to the box."""
-        kept = self.samples if self._basis is None else _project(self.samples, self._basis)
-        mean, deviation = kept.mean(axis=0), kept.std(axis=0)
+        selected = self.samples if self._basis is None else _project(self.samples, self._basis)
+        mean, deviation = selected.mean(axis=0), selected.std(axis=0)
         if self._floor is not None:
             deviation = np.maximum(deviation, self._floor)
         if self._basis is None:

@@ -1,6 +1,6 @@
 """Explanations of a search without a feasible path: obstacles that block all routes, and limits of the method.
 
-`what_blocks` collects lines for the user. It looks for lines across the map where ground and clearance reach the
+`explain_failure` collects lines for the user. It looks for lines across the map where ground and clearance reach the
 ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on a coarse
 grid (connected components); and for bands of heights that the required margins close.
 """
@@ -35,7 +35,7 @@ CELLS, HEIGHTS = 150, 5
 _OPEN, _GROUND = -1, -2
 
 
-class Closed(NamedTuple):
+class SeparatingZones(NamedTuple):
     """Zones that separate start and destination.
 
     zones: names of the zones adjacent to both regions, that reachable from the start and that from the destination.
@@ -46,13 +46,13 @@ class Closed(NamedTuple):
     pitch: float
 
 
-def closing_zones(scenario: Scenario) -> Closed | None:
+def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     """Zones that separate start and destination; None if there are none, or if the ground alone separates them.
 
     A gap narrower than a cell counts as closed. Missiles and the aircraft's climb are ignored.
 
     >>> from world.scenario import load_scenario
-    >>> closing_zones(load_scenario("tight")) is None
+    >>> separating_zones(load_scenario("tight")) is None
     True
     """
     terrain = scenario.terrain
@@ -68,12 +68,12 @@ def closing_zones(scenario: Scenario) -> Closed | None:
     cells = np.full((HEIGHTS, *ground.shape), _OPEN, dtype=np.int64)
     cells[:, ~(low <= top)] = _GROUND
     ends = [_cell_of(scenario, end, pitch, low, top) for end in (scenario.start, scenario.destination)]
-    if not _reached(cells, ends):
+    if not _connected(cells, ends):
         return None
-    _close(zone_records(scenario.zones), east, north, ground, low, top, cells)
+    _close_cells(zone_records(scenario.zones), east, north, ground, low, top, cells)
     for end in ends:
         cells[end] = _OPEN
-    if _reached(cells, ends):
+    if _connected(cells, ends):
         return None
     # Imported here, as below: only the explanation of a failure needs it.
     from scipy import ndimage
@@ -82,18 +82,18 @@ def closing_zones(scenario: Scenario) -> Closed | None:
     beside = [ndimage.binary_dilation(regions == regions[end]) for end in ends]
     both = [set(cells[edge].tolist()) for edge in beside]
     found = (both[0] & both[1]) or (both[0] | both[1])
-    return Closed(tuple(scenario.zones[z].name for z in sorted(found) if z >= 0), pitch)
+    return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(found) if z >= 0), pitch)
 
 
 def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Floats) -> tuple[int, int, int]:
     """Height, row and column of the cell of a fixed end."""
-    place = ((end[:2] - scenario.bounds[:, 0]) / pitch).astype(np.int64)
-    column, row = (int(np.clip(at, 0, size - 1)) for at, size in zip(place, (low.shape[1], low.shape[0]), strict=True))
+    cell = ((end[:2] - scenario.bounds[:, 0]) / pitch).astype(np.int64)
+    column, row = (int(np.clip(at, 0, size - 1)) for at, size in zip(cell, (low.shape[1], low.shape[0]), strict=True))
     share = (end[2] - low[row, column]) / max(float(top[row, column] - low[row, column]), 1e-6)
     return int(np.clip(round(share * (HEIGHTS - 1)), 0, HEIGHTS - 1)), row, column
 
 
-def _reached(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
+def _connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
     """Whether open cells connect the two ends."""
     from scipy import ndimage
 
@@ -102,7 +102,7 @@ def _reached(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
 
 
 @compiled
-def _close(
+def _close_cells(
     records: ZoneRecords, east: Floats, north: Floats, ground: Floats, low: Floats, top: Floats, cells: Ints
 ) -> None:  # pragma: no cover - compiled
     """Store in open cells (heights, rows, columns) the first zone that closes them."""
@@ -124,14 +124,14 @@ def _close(
 # --- Bands of heights closed by the required margins ---
 
 
-def narrow_bands(problem: Problem) -> list[str]:
+def closed_bands(problem: Problem) -> list[str]:
     """Lines that name each band of heights, of the limits or of an inclusion, that the required margins close.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> narrow_bands(make_problem(scenario, load_airframe(scenario).limits))
+    >>> closed_bands(make_problem(scenario, load_airframe(scenario).limits))
     []
     """
     data, lines = problem.certified, []
@@ -159,14 +159,14 @@ def narrow_bands(problem: Problem) -> list[str]:
     return lines
 
 
-def highest_allowed(problem: Problem) -> tuple[float, str]:
+def max_altitude(problem: Problem) -> tuple[float, str]:
     """Greatest height of a plan anywhere, m AMSL, and the limit that sets it: the ceiling, or that of an inclusion.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
-    >>> highest_allowed(make_problem(scenario, load_airframe(scenario).limits))[1]
+    >>> max_altitude(make_problem(scenario, load_airframe(scenario).limits))[1]
     'the ceiling'
     """
     scenario: Scenario = problem.scenario
@@ -186,7 +186,7 @@ ALONG, ACROSS = 200, 400
 MAX_NAMES, ZONE_PITCH = 4, 20.0
 
 
-def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
+def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     """Lines that state what blocks an infeasible plan, and what a search in its encoding cannot find.
 
     limits: of the path; if given, the margins that a plan requires are examined too.
@@ -199,7 +199,7 @@ def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
     >>> certificate = Certificate(0.1, np.inf, 0.1, 9.0, -50.0, -50.0, ())
     >>> found = np.array([0, 0, 1, 1]), np.zeros(4)
     >>> plan = Plan(guarded, path, *found, certificate, 1, "umda", 60, np.zeros((0, 3)))
-    >>> print(what_blocks(plan)[0])
+    >>> print(explain_failure(plan)[0])
     terrain and missiles together close the way 65 m from the start, at every height
     """
     scenario = plan.scenario
@@ -207,14 +207,14 @@ def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
     lines = _walls(scenario)
     if limits is not None:
         problem = make_problem(scenario, limits if chosen is None else limits_for(chosen, limits))
-        lines += narrow_bands(problem) or ([] if lines else _reserve_walls(problem))
-    closed = closing_zones(scenario)
+        lines += closed_bands(problem) or ([] if lines else _margin_walls(problem))
+    closed = separating_zones(scenario)
     if closed is not None:
         names = ", ".join(closed.zones[:MAX_NAMES]) + (" and more" if len(closed.zones) > MAX_NAMES else "")
         lines.append(f"zones close the whole way (gaps narrower than {closed.pitch:.0f} m count as closed): {names}")
-    violated_zones = zones_entered(scenario, plan.waypoints)
-    if violated_zones:
-        lines.append(f"the best path does not keep to: {', '.join(violated_zones[:MAX_NAMES])}")
+    entered = violated_zones(scenario, plan.waypoints)
+    if entered:
+        lines.append(f"the best path does not keep to: {', '.join(entered[:MAX_NAMES])}")
     elif not lines:
         violated = [item.name.lower() for item in Violation if plan.violations[item]]
         if violated:
@@ -235,8 +235,8 @@ def _walls(scenario: Scenario) -> list[str]:
     if terrain is None:
         return []
     lines: list[str] = []
-    for along, places in _lines_across(scenario):
-        lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m
+    for along, points in _lines_across(scenario):
+        lowest = terrain.height(points[:, 0], points[:, 1]) + scenario.limits.min_clearance_m
         lowest = np.maximum(lowest, scenario.floor)
         gaps = scenario.ceiling - lowest
         if not (gaps > 0.0).any():
@@ -245,7 +245,7 @@ def _walls(scenario: Scenario) -> list[str]:
                 f"clearance take {np.nanmin(lowest):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
             )
             break
-        if not _unguarded(scenario, places[gaps > 0.0], lowest[gaps > 0.0]):
+        if not _outside_missiles(scenario, points[gaps > 0.0], lowest[gaps > 0.0]):
             lines.append(f"terrain and missiles together close the way {along:.0f} m from the start, at every height")
             break
     return lines
@@ -257,24 +257,24 @@ def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
     widest = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-widest, widest, ACROSS)
     for along in np.linspace(0.0, frame.length, ALONG)[1:-1]:
-        places = frame.restore(np.column_stack([np.full(ACROSS, along), across, np.zeros(ACROSS)]))[:, :2]
-        inside = ((places >= scenario.bounds[:, 0]) & (places <= scenario.bounds[:, 1])).all(axis=1)
+        points = frame.restore(np.column_stack([np.full(ACROSS, along), across, np.zeros(ACROSS)]))[:, :2]
+        inside = ((points >= scenario.bounds[:, 0]) & (points <= scenario.bounds[:, 1])).all(axis=1)
         if inside.any():
-            yield float(along), places[inside]
+            yield float(along), points[inside]
 
 
-def _reserve_walls(problem: Problem) -> list[str]:
+def _margin_walls(problem: Problem) -> list[str]:
     """Lines across the whole map where ground, clearance and required margins leave no height."""
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
         return []
-    (top, name), reserve = highest_allowed(problem), float(data.buffer)
+    (top, name), reserve = max_altitude(problem), float(data.buffer)
     length = math.dist(scenario.start[:2], scenario.destination[:2])
-    for along, places in _lines_across(scenario):
+    for along, points in _lines_across(scenario):
         # Near the ends the margins are reduced.
         if min(along, length - along) < reserve / BUFFER_GROWTH:
             continue
-        lowest = float(np.nanmin(scenario.terrain.height(places[:, 0], places[:, 1]))) + data.clearance
+        lowest = float(np.nanmin(scenario.terrain.height(points[:, 0], points[:, 1]))) + data.clearance
         if lowest + reserve > top:
             return [
                 f"the heights left are too narrow {along:.0f} m from the start, across the whole map: its lowest place,"
@@ -284,27 +284,27 @@ def _reserve_walls(problem: Problem) -> list[str]:
     return []
 
 
-def _unguarded(scenario: Scenario, places: np.ndarray, lowest: np.ndarray) -> bool:
+def _outside_missiles(scenario: Scenario, points: np.ndarray, lowest: np.ndarray) -> bool:
     """Whether any height above any of the points (n, 2) is outside every kill sphere."""
     threats = scenario.threats
     armed = threats.kill_radius > 0.0
     position, radius = threats.position[armed], threats.kill_radius[armed]
     for share in np.linspace(0.0, 1.0, 9):
         up = lowest + share * (scenario.ceiling - lowest)
-        free = np.ones(len(places), dtype=np.bool_)
+        free = np.ones(len(points), dtype=np.bool_)
         for centre, kill_radius in zip(position, radius, strict=True):
-            away = (places[:, 0] - centre[0]) ** 2 + (places[:, 1] - centre[1]) ** 2 + (up - centre[2]) ** 2
+            away = (points[:, 0] - centre[0]) ** 2 + (points[:, 1] - centre[1]) ** 2 + (up - centre[2]) ** 2
             free &= away > kill_radius * kill_radius
         if free.any():
             return True
     return math.isinf(scenario.ceiling)
 
 
-def zones_entered(scenario: Scenario, path: np.ndarray) -> list[str]:
+def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     """Names of the zones that a path (w, 3) violates: exclusions that it enters, inclusions that it leaves.
 
     >>> from world.scenario import load_scenario
-    >>> zones_entered(load_scenario("tight"), np.zeros((2, 3)))
+    >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))
     []
     """
     if not scenario.zones:
@@ -312,15 +312,15 @@ def zones_entered(scenario: Scenario, path: np.ndarray) -> list[str]:
     records = zone_records(scenario.zones)
     counts = [max(2, math.ceil(math.dist(a, b) / ZONE_PITCH)) for a, b in itertools.pairwise(path)]
     legs = zip(path[:-1], path[1:], counts, strict=True)
-    places = np.concatenate([np.linspace(a, b, count) for a, b, count in legs])
-    ground = np.full(len(places), math.nan)
+    points = np.concatenate([np.linspace(a, b, count) for a, b, count in legs])
+    ground = np.full(len(points), math.nan)
     if scenario.terrain is not None:
-        ground = scenario.terrain.height(places[:, 0], places[:, 1])
+        ground = scenario.terrain.height(points[:, 0], points[:, 1])
     found = []
     for z, zone in enumerate(scenario.zones):
         inside = (
             edge_distance(records, z, east, north) <= 0.0 and not outside_band(records.zones[z], up, under) > 0.0
-            for (east, north, up), under in zip(places, ground, strict=True)
+            for (east, north, up), under in zip(points, ground, strict=True)
         )
         if any(inside) if zone.kind == "exclusion" else not all(inside):
             found.append(zone.name)

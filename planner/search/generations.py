@@ -55,17 +55,17 @@ def path_generations(search: Search, population: int, generations: int, starts: 
     )
     optimiser = _make_optimiser(search, lambda scores: ranks(scores, levels), population, initial)
     optimiser.tell(search.evaluate(optimiser.ask()))
-    search.note()
+    search.record()
     bests = [_best_row(optimiser.scores)]
     whole = population + generations * (population // 2)
     for generation in range(generations):
-        if search.over() or search.safe_already():
+        if search.must_end() or search.first_safe_found():
             break
         share = SAFE_SHARE if search.best_is_safe() else SEARCH_SHARE
         if algorithm.seeded and (_stagnant(bests) or search.evaluations >= before + share * whole):
             break
         optimiser.tell(search.evaluate(optimiser.ask()))
-        search.note()
+        search.record()
         bests.append(_best_row(optimiser.scores))
         search.done += 1
         search.report(generations - generation - 1)
@@ -131,9 +131,9 @@ FIRST_SLACK, LAST_SLACK, SEEDED_SLACK = 0.1, 0.003, 0.05
 # Bounds on the first path's cost over the straight line, tried in this order: lower bounds are faster.
 FIRST_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
 # Paths evaluated as a whole: through this many of the best candidates of every n-th interval.
-BEST_EACH, EVERY = 3, 3
+BEST_PER_INTERVAL, EVERY = 3, 3
 # Maximum evaluations of a pattern search on a generation's best path while no path is feasible.
-MENDING = 100
+REPAIR_EVALUATIONS = 100
 
 
 def waypoint_generations(search: Search, population: int, generations: int) -> None:
@@ -165,10 +165,10 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
         chains = _join(search, encoding.decode(_as_vectors(rows)), slack)
         search.evaluations += math.ceil(chains.legs / (inner + 1))
         _evaluate_best(search, rows, chains)
-        search.note()
+        search.record()
         search.done += 1
         search.report(steps - step - 1)
-        if search.over() or search.safe_already():
+        if search.must_end() or search.first_safe_found():
             break
         if step < steps - 1:
             cost = chains.cost[1:-1]
@@ -203,7 +203,7 @@ def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None
     """Evaluate the best paths through some of the best candidates as a whole; repair one while none is feasible."""
     chosen = set()
     for i in range(1, len(chains.cost) - 1, EVERY):
-        for k in np.argsort(chains.cost[i], kind="stable")[:BEST_EACH]:
+        for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:
             if chains.cost[i, k] < math.inf:
                 chosen.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))
     if not chosen:
@@ -213,4 +213,4 @@ def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None
     vectors = np.array([rows[intervals, list(numbers)].ravel() for numbers in sorted(chosen)])
     search.evaluate(vectors)
     if not search.archive.feasible():
-        search.improve(search.archive.vectors[0], MENDING)
+        search.improve(search.archive.vectors[0], REPAIR_EVALUATIONS)

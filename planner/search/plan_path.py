@@ -113,14 +113,14 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
         try:
             _attempt(search, number, previous)
         except SearchEnded:
-            search.note()
+            search.record()
         found = search.best_path()
         # A later attempt replaces an earlier result only if it is better.
         if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):
             best = found
         if number == 0 and may_turn_back(search, best[1]):
             best = search_turning_back(search, best)
-        if search.finished(best[1]) or search.over():
+        if search.finished(best[1]) or search.must_end():
             break
     if best is None:  # pragma: no cover - the loop always runs
         raise ScenarioError(
@@ -180,12 +180,12 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
     grids, growth = ATTEMPTS[number]
     population, algorithm = table.population * growth, search.algorithm
     if algorithm.seeded and number == 0 and straight_line(search):
-        search.note()
+        search.record()
         search.report(0)
         return
     starts = starting_vectors(search, grids, previous)
-    if len(search.archive.scores) and (search.safe_already() or search.over()):
-        search.note()
+    if len(search.archive.scores) and (search.first_safe_found() or search.must_end()):
+        search.record()
         return
     if algorithm.seeded:
         search_other_sides(search)
@@ -211,8 +211,8 @@ def _finish(search: Search, last: Floats | None) -> None:
         if last is not None:
             search.tighten(last, LAST_ROUNDS, 0.5, LAST_SEARCH)
         for scale in LAST_MOVES:
-            if search.over():
+            if search.must_end():
                 break
             search.tighten(search.archive.vectors[0], LAST_ROUNDS, scale, LAST_SEARCH)
-    search.note()
+    search.record()
     search.report(0)

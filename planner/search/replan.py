@@ -11,7 +11,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
 from planner.search.algorithms import find_algorithm, limits_for
-from planner.search.explain_failure import zones_entered
+from planner.search.explain_failure import violated_zones
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
 from world.errors import MissionError
@@ -112,7 +112,7 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
             field="leg",
             value=leg,
         )
-    forbidden = zones_entered(scenario, old.waypoints[[leg, leg]])
+    forbidden = violated_zones(scenario, old.waypoints[[leg, leg]])
     if forbidden:
         begins = f"waypoint {leg}, where it begins, does not keep to {forbidden[0]}"
         message = f"{scenario.name}: leg {leg}: {begins}: no path from there does"

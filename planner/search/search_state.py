@@ -74,9 +74,9 @@ Improved = Callable[[Floats], None]
 # Maximum number of paths in an archive.
 ARCHIVE_SIZE = 24
 # Additional margins to spheres and ground, m, with which a path is shortened until it is certified.
-SPARES = (0.1, 2.0)
+EXTRA_MARGINS = (0.1, 2.0)
 # Evaluations that `tighten` may take: with less budget left it is skipped.
-MAX_TIGHTENING = 600
+TIGHTENING_EVALUATIONS = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
 # Certificates made before the stop condition is checked: some 10 ms if none passes.
@@ -128,7 +128,7 @@ class Search:
     progress: called with generations done, generations in total, and a short text.
     stop: called after each generation and each start; a returned text ends the search and gives the reason.
     first_safe: whether to end with the first safe path.
-    wanted: distance (m) from missiles that the certificate of a finished path requires.
+    required_distance: distance (m) from missiles that the certificate of a finished path requires.
     improved: called with each path (w, 3) that is the best so far of those that meet the constraints.
     archive: the best paths.
     evaluations: paths evaluated, or equivalent work.
@@ -138,7 +138,7 @@ class Search:
     certificates: by the path's vector.
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
     intervals.
-    spent: whether the budget is too small for another shortening.
+    budget_exhausted: whether the budget is too small for another shortening.
     """
 
     problem: Problem
@@ -148,7 +148,7 @@ class Search:
     progress: SearchProgress | None
     stop: StopCondition | None
     first_safe: bool
-    wanted: float
+    required_distance: float
     improved: Improved | None = None
     archive: Archive = field(init=False)
     evaluations: int = 0
@@ -157,7 +157,7 @@ class Search:
     history: list[tuple[float, float, float]] = field(default_factory=list)
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
-    spent: bool = False
+    budget_exhausted: bool = False
 
     def __post_init__(self) -> None:
         """Create an empty archive."""
@@ -221,7 +221,7 @@ class Search:
 
     def tighten(self, vector: Floats, rounds: int, scale: float, most: int) -> Floats:
         """Move all waypoints of a vector (d,) at once, then `improve` it. Returns the best scores (8,)."""
-        if self._budget() - self.evaluations < MAX_TIGHTENING:
+        if self._budget() - self.evaluations < TIGHTENING_EVALUATIONS:
             return self.improve(vector, most)
         moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += made
@@ -234,9 +234,9 @@ class Search:
 
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""
-        for spare in SPARES:
+        for spare in EXTRA_MARGINS:
             if self._budget() - self.evaluations < MOST_MODELS:
-                self.spent = True
+                self.budget_exhausted = True
                 return False
             path, made = shorten_path(self.problem.search, path, spare=spare, pause=self.pause)
             self.evaluations += made
@@ -250,9 +250,9 @@ class Search:
                 return True
         return False
 
-    def over(self) -> bool:
+    def must_end(self) -> bool:
         """Whether the search must end now: stopped, or out of budget."""
-        if self.spent or self.evaluations >= self._budget():
+        if self.budget_exhausted or self.evaluations >= self._budget():
             self.ended = "budget"
         elif self.stop is not None:
             self.ended = self.stop() or "completed"
@@ -262,7 +262,7 @@ class Search:
         """Whether the archive's best path violates nothing and is exposed to no missile."""
         return bool(safe(self.archive.scores[0]))
 
-    def safe_already(self) -> bool:
+    def first_safe_found(self) -> bool:
         """Whether the search was to end with the first safe path, and one is finished."""
         if not self.first_safe or (self.shortest is None and not self.archive.feasible()):
             return False
@@ -285,13 +285,13 @@ class Search:
 
     def finished(self, certificate: Certificate) -> bool:
         """Whether this certificate meets the goal of the search."""
-        return certificate.ok and certificate.kill_distance >= self.wanted
+        return certificate.ok and certificate.kill_distance >= self.required_distance
 
     def _budget(self) -> float:
         most = self.problem.scenario.planner.budget
         return math.inf if most is None else most
 
-    def note(self) -> None:
+    def record(self) -> None:
         """Append the best path so far to the history."""
         best = self.archive.scores[0]
         violations = best[: len(Violation)]

@@ -33,7 +33,7 @@ QUICK_SEARCH, SEED_SEARCH = 50, 300
 # Factor on these for seeds below a maximum height above ground, where few moves stay within the band.
 BAND_EFFORT = 3
 # Number of routes followed once a path is safe; after them other sides are tried.
-FOLLOWED = 2
+MAX_FOLLOWED = 2
 
 
 def straight_line(search: Search) -> bool:
@@ -68,11 +68,11 @@ def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previou
     airspace = search.problem.search.airspace
     effort = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
     # Among zones `search_other_sides` does not apply: follow all routes.
-    followed = math.inf if is_limited(airspace) else FOLLOWED
+    followed = math.inf if is_limited(airspace) else MAX_FOLLOWED
     if search.shortens and search.algorithm.optimiser == "waypoints":
         followed = 0
     for number, route in enumerate(_routes(search, grids) if search.algorithm.seeded else ()):
-        if search.over() or search.safe_already() or (number >= followed and search.best_is_safe()):
+        if search.must_end() or search.first_safe_found() or (number >= followed and search.best_is_safe()):
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
@@ -99,16 +99,16 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
     for route in routes(data, frame, span, grids):
         if followed_free and search.has_safe():
             search.shorten(evenly(frame.restore(route.points), encoding.waypoints))
-            if search.over():
+            if search.must_end():
                 break
             continue
         found.append(route)
         path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK)
         vectors = rotated_vectors(space, encoding, path[None])
         scores.append(search.evaluate(vectors)[0])
-        if not search.safe_already():
+        if not search.first_safe_found():
             scores[-1] = search.improve(vectors[0], QUICK_SEARCH)
-        if search.over() or search.safe_already():
+        if search.must_end() or search.first_safe_found():
             break
     if not found:
         return []
@@ -126,7 +126,7 @@ MAX_ROUTES, SLACK, MAX_DETOUR = 8, 1.08, 1.8
 # No other side is tried for a path that exceeds the straight line by less than this share.
 MIN_DETOUR = 0.004
 # Maximum repetitions of shortening from equidistant waypoints, and the minimum gain for another, as a share.
-AGAIN, MIN_GAIN = 3, 2e-5
+MAX_REPEATS, MIN_GAIN = 3, 2e-5
 
 
 def search_other_sides(search: Search) -> None:
@@ -144,7 +144,7 @@ def search_other_sides(search: Search) -> None:
         grid = optimistic_grid(data, frame, span, STAGES, shrink=shrink, spread=SPREAD, ratio=RATIO)
         bound = straight * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
         for route in side_routes(data, frame, grid, bound, MAX_ROUTES):
-            if search.over():
+            if search.must_end():
                 return
             search.shorten(evenly(frame.restore(route.points), encoding.waypoints))
 
@@ -152,8 +152,8 @@ def search_other_sides(search: Search) -> None:
 def shorten_best(search: Search) -> None:
     """Shorten the archive's best path, then repeatedly the shortest from equidistant waypoints while it gains."""
     search.shorten(search.encoding.decode(search.archive.vectors[:1])[0])
-    for _ in range(AGAIN):
-        if search.shortest is None or search.over():
+    for _ in range(MAX_REPEATS):
+        if search.shortest is None or search.must_end():
             return
         before = path_length(search.shortest[0])
         search.shorten(evenly(search.shortest[0], search.encoding.waypoints))
@@ -165,11 +165,11 @@ def shorten_best(search: Search) -> None:
 # --- Routes that turn back ---
 
 # If a safe path is longer than this many times the straight line, a path that turns back may be shorter.
-LONG_WAY = 1.25
+LONG_DETOUR = 1.25
 # Lattice steps, as shares of the step that turns require, tried until a path is safe.
 STEPS = (1.0, 0.6)
 # A route is followed if shorter than this share of the best safe path.
-WORTH = 0.99
+MAX_ROUTE_SHARE = 0.99
 # Before shortening, a path along a route is improved by this many pattern searches, with evaluations of each, and
 # evaluations after each move of all waypoints; scales of these moves relative to those of fitting, and rounds.
 FIRST_SEARCHES, FIRST_SEARCH, LATER_SEARCH = 4, 500, 600
@@ -178,11 +178,11 @@ MOVES, ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
     """Whether to search for a path that turns back: the straight frame has no safe path, or only a long one."""
-    if not search.algorithm.seeded or search.encoding.name != "rotated" or search.over():
+    if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
         return False
     if not search.finished(certificate):
         return True
-    return search.length_ratio() > LONG_WAY
+    return search.length_ratio() > LONG_DETOUR
 
 
 def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
@@ -190,7 +190,7 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     for share in STEPS:
-        if search.over():
+        if search.must_end():
             break
         try:
             route = lattice_route(data, frame, share * step, search.pause)
@@ -198,13 +198,13 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
             break
         if not len(route):
             continue
-        safe_already = search.finished(found[1])
-        if safe_already and path_length(route) > WORTH * path_length(found[0]):
+        already_safe = search.finished(found[1])
+        if already_safe and path_length(route) > MAX_ROUTE_SHARE * path_length(found[0]):
             break
         path, certificate = _search_along(search, route)
-        if search.finished(certificate) and (not safe_already or path_length(path) < path_length(found[0])):
+        if search.finished(certificate) and (not already_safe or path_length(path) < path_length(found[0])):
             return path, certificate
-        if not safe_already and (certificate.ok, certificate.kill_distance) > (found[1].ok, found[1].kill_distance):
+        if not already_safe and (certificate.ok, certificate.kill_distance) > (found[1].ok, found[1].kill_distance):
             found = path, certificate
     return found
 
@@ -215,10 +215,18 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
     pieces, _ = spread_over(route, waypoints - 1)
     encoding = along_route(search.problem.space, pieces[:, :2])
     inner = Search(
-        search.problem, search.algorithm, encoding, search.rng, search.progress, search.stop, search.first_safe,
-        search.wanted, search.improved, evaluations=search.evaluations,
-    )  # fmt: skip
-    path = fit_points(inner.problem.search, frames_of(encoding), _places(route, encoding), CLOSE)
+        search.problem,
+        search.algorithm,
+        encoding,
+        search.rng,
+        search.progress,
+        search.stop,
+        search.first_safe,
+        search.required_distance,
+        search.improved,
+        evaluations=search.evaluations,
+    )
+    path = fit_points(inner.problem.search, frames_of(encoding), _candidate_points(route, encoding), CLOSE)
     vector = np.clip(frames_of(encoding).rotate(path[1:-1]).ravel(), encoding.lower, encoding.upper)
     with suppress(SearchEnded):
         _improve_along(inner, vector, (path, route))
@@ -226,29 +234,29 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
     return inner.best_path()
 
 
-def _improve_along(inner: Search, vector: Floats, ways: tuple[Floats, ...]) -> None:
+def _improve_along(inner: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
     """Improve the path of a vector (d,), then shorten it and the given routes (k, 3), which may end better."""
     inner.evaluate(vector[None])
     for _ in range(FIRST_SEARCHES):
-        if inner.over() or inner.safe_already():
+        if inner.must_end() or inner.first_safe_found():
             return
         inner.improve(inner.archive.vectors[0], FIRST_SEARCH)
     for scale in MOVES:
-        if inner.over() or inner.safe_already():
+        if inner.must_end() or inner.first_safe_found():
             return
         inner.tighten(inner.archive.vectors[0], ROUNDS, scale, LATER_SEARCH)
     if inner.shortens:
-        for way in ways:
-            inner.shorten(evenly(way, inner.encoding.waypoints))
+        for route in routes:
+            inner.shorten(evenly(route, inner.encoding.waypoints))
         shorten_best(inner)
 
 
-def _places(route: Floats, encoding: Encoding) -> Floats:
+def _candidate_points(route: Floats, encoding: Encoding) -> Floats:
     """Candidate points (w - 2, places, 3) on a route (k, 3) for each waypoint in its frame, within its piece."""
     count = encoding.waypoints - 2
     dense, _ = spread_over(route, count * (CLOSE.places + 1) + 1)
     rows = np.arange(count)[:, None] * (CLOSE.places + 1) + 1 + np.arange(CLOSE.places)
     frames = frames_of(encoding)
-    places = frames.rotate(dense[rows].transpose(1, 0, 2)).transpose(1, 0, 2)
-    places[..., 0] = np.clip(places[..., 0], frames.edges[:-1, None], frames.edges[1:, None])
-    return places
+    points = frames.rotate(dense[rows].transpose(1, 0, 2)).transpose(1, 0, 2)
+    points[..., 0] = np.clip(points[..., 0], frames.edges[:-1, None], frames.edges[1:, None])
+    return points

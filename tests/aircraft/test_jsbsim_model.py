@@ -4,32 +4,34 @@ from typing import Any
 
 import pytest
 
-from aircraft.jsbsim_model import OURS, CommandProperty, Reading, read_model
+from aircraft.jsbsim_model import DEFAULT_MODEL, CommandProperty, Reading, read_model
 from world.errors import FlightError
 
 ORDER = ("elevator", "aileron", "rudder", "throttle")
 
 
 def test_an_empty_table_is_our_own_models() -> None:
-    assert read_model({}, "a") == OURS
-    assert [command.name.removesuffix("-rad") for command in OURS.commands[:3]] == [f"command/{c}" for c in ORDER[:3]]
-    assert OURS.commands[3].name == "command/throttle-norm"
-    assert len(OURS.readings) == 6
+    assert read_model({}, "a") == DEFAULT_MODEL
+    assert [command.name.removesuffix("-rad") for command in DEFAULT_MODEL.commands[:3]] == [
+        f"command/{c}" for c in ORDER[:3]
+    ]
+    assert DEFAULT_MODEL.commands[3].name == "command/throttle-norm"
+    assert len(DEFAULT_MODEL.readings) == 6
 
 
 @pytest.mark.parametrize("k", range(4))
 def test_a_command_replaces_its_own_and_no_other(k: int) -> None:
     model = read_model({"command": {ORDER[k]: ["fcs/stick", -2, 3.5]}}, "a")
     assert model.commands[k] == CommandProperty("fcs/stick", -2.0, 3.5)
-    assert [model.commands[i] for i in range(4) if i != k] == [OURS.commands[i] for i in range(4) if i != k]
-    assert model.readings == OURS.readings
+    assert [model.commands[i] for i in range(4) if i != k] == [DEFAULT_MODEL.commands[i] for i in range(4) if i != k]
+    assert model.readings == DEFAULT_MODEL.readings
 
 
 @pytest.mark.parametrize(("k", "name"), list(enumerate((*ORDER, "current", "power"))))
 def test_a_reading_replaces_its_own_and_an_empty_one_reads_as_zero(k: int, name: str) -> None:
     model = read_model({"reading": {name: ["fcs/pos", 0.5]}}, "a")
     assert model.readings[k] == Reading("fcs/pos", 0.5)
-    assert [model.readings[i] for i in range(6) if i != k] == [OURS.readings[i] for i in range(6) if i != k]
+    assert [model.readings[i] for i in range(6) if i != k] == [DEFAULT_MODEL.readings[i] for i in range(6) if i != k]
     assert read_model({"reading": {name: []}}, "a").readings[k] == Reading("", 0.0)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.optimisers.niche_sampling import CLEARING, FEWEST_KEPT, NicheSampling
+from planner.optimisers.niche_sampling import CLEARING, MIN_SELECTED, NicheSampling
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -76,7 +76,7 @@ def test_a_row_that_costs_too_much_is_kept_only_to_have_a_few() -> None:
     group = np.column_stack([np.linspace(0.5, 4.5, 10), np.linspace(-9.0, 8.0, 10)])
     rows, costs = np.stack([group, group + np.array([5.0, 0.0])]), np.tile(np.arange(10.0), (2, 1))
     elite = np.array([[2.5, 9.0], [7.5, 9.0]])
-    for most, kept in ((6.0, 8), (1.0, FEWEST_KEPT)):
+    for most, kept in ((6.0, 8), (1.0, MIN_SELECTED)):
         out = sampling().next(rows, costs, 30, np.array([0.1, 0.1]), most, elite)
         same = [sum((row == old).all() for old in group) for row in out[0]]
         assert sum(same) == kept - 1

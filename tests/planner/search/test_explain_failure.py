@@ -9,7 +9,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.evaluation.problem import CERTIFIED_BUFFER, make_problem
 from planner.plan import Certificate, Plan
-from planner.search.explain_failure import closing_zones, highest_allowed, narrow_bands, what_blocks, zones_entered
+from planner.search.explain_failure import closed_bands, explain_failure, max_altitude, separating_zones, violated_zones
 from planner.search.plan_path import plan_path
 from world.scenario import Scenario
 
@@ -26,7 +26,7 @@ def wall(low: float, high: float, name: str = "wall", **levels: float) -> dict[s
 
 
 def names(small: Callable[..., Scenario], *zones: dict[str, Any], **tables: Any) -> tuple[str, ...]:
-    closed = closing_zones(small(**({"terrain": FLAT, "threats": [], "zones": list(zones)} | tables)))
+    closed = separating_zones(small(**({"terrain": FLAT, "threats": [], "zones": list(zones)} | tables)))
     return () if closed is None else closed.zones
 
 
@@ -69,21 +69,21 @@ def failed_plan(scenario: Scenario) -> Plan:
 
 def test_what_blocks_names_the_zones(small: Callable[..., Scenario]) -> None:
     closed = small(terrain=FLAT, threats=[], zones=[wall(-3000, 3000)])
-    assert what_blocks(failed_plan(closed))[:2] == [
+    assert explain_failure(failed_plan(closed))[:2] == [
         "zones close the whole way (gaps narrower than 47 m count as closed): wall",
         "the best path does not keep to: wall",
     ]
     beside = small(terrain=FLAT, threats=[], zones=[wall(-3000, 2000), wall(2500, 2600, "other")])
-    assert what_blocks(failed_plan(beside))[0] == "the best path does not keep to: wall"
+    assert explain_failure(failed_plan(beside))[0] == "the best path does not keep to: wall"
 
 
 def test_zones_entered_by_their_heights(small: Callable[..., Scenario]) -> None:
     path = np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])
     fence = {"name": "fence", "kind": "inclusion", "polygon_m": [[-400, -90], [6400, -90], [6400, 90], [-400, 90]]}
     scenario = small(terrain=FLAT, threats=[], zones=[wall(-50, 50, floor_agl_m=151.0), fence])
-    assert zones_entered(scenario, path) == []
-    assert zones_entered(scenario, path + np.array([0.0, 0.0, 2.0])) == ["wall"]
-    assert zones_entered(scenario, path + np.array([0.0, 91.0, 0.0])) == ["fence"]
+    assert violated_zones(scenario, path) == []
+    assert violated_zones(scenario, path + np.array([0.0, 0.0, 2.0])) == ["wall"]
+    assert violated_zones(scenario, path + np.array([0.0, 91.0, 0.0])) == ["fence"]
 
 
 # ----------------------------------------------------------------------
@@ -98,7 +98,7 @@ Small = Callable[..., Scenario]
 def test_a_band_of_the_limits(more: float, said: list[str], small: Small, make_limits: MakeLimits) -> None:
     limits = {"min_clearance_m": 145.0, "max_height_m": 145.0 + 2.0 * CERTIFIED_BUFFER + more}
     scenario = small(**GROUND, limits=limits)
-    lines = narrow_bands(make_problem(scenario, make_limits(scenario)))
+    lines = closed_bands(make_problem(scenario, make_limits(scenario)))
     assert [line[-len(end) :] for line, end in zip(lines, said, strict=True)] == said
     assert all("min_clearance_m 145 m" in line and "max_height_m" in line for line in lines)
 
@@ -108,16 +108,16 @@ def test_an_inclusions_band_is_named_where_the_plan_cannot_keep_both_edges(
 ) -> None:
     zone = {"name": "corridor", "kind": "inclusion", "east_m": 3000, "north_m": 0, "radius_m": 8000}
     scenario = small(**GROUND, limits={"min_clearance_m": 148.0}, zones=[zone | {"ceiling_agl_m": 151.0}])
-    (line,) = narrow_bands(make_problem(scenario, make_limits(scenario)))
+    (line,) = closed_bands(make_problem(scenario, make_limits(scenario)))
     assert "corridor is too narrow a band: above the clearance of 148 m and below its ceiling at 151 m" in line
     wide = small(**GROUND, limits={"min_clearance_m": 100.0}, zones=[zone | {"ceiling_agl_m": 200.0}])
-    assert narrow_bands(make_problem(wide, make_limits(wide))) == []
+    assert closed_bands(make_problem(wide, make_limits(wide))) == []
 
 
 def test_the_lowest_ceiling_is_named(small: Small, make_limits: MakeLimits) -> None:
     zone = {"name": "shelf", "kind": "inclusion", "east_m": 3000, "north_m": 0, "radius_m": 8000}
     scenario = small(**GROUND, zones=[zone | {"ceiling_amsl_m": 300.0}])
-    assert highest_allowed(make_problem(scenario, make_limits(scenario))) == (
+    assert max_altitude(make_problem(scenario, make_limits(scenario))) == (
         300.0 - CERTIFIED_BUFFER,
         "the ceiling of shelf",
     )
@@ -143,7 +143,7 @@ def test_ground_clearance_and_reserve_against_the_ceiling(
     tables["area"] |= {"ceiling_amsl_m": top + 30.0 + 5.0 + more}
     scenario = small(**tables)
     limits = make_limits(scenario)
-    lines = what_blocks(plan_path(scenario, limits, seed=1, algorithm="umda"), limits)
+    lines = explain_failure(plan_path(scenario, limits, seed=1, algorithm="umda"), limits)
     assert any("the heights left are too narrow" in line and "reserve of 5.0 m" in line for line in lines) is said
     assert not any("terrain closes the way" in line for line in lines)
 
@@ -158,9 +158,9 @@ def test_what_blocks_a_way_is_named(small: Callable[..., Scenario], make_limits:
     walled = small(terrain={"kind": "peaks", "peak": hills}, planner=table)
     plan = plan_path(walled, make_limits(walled), seed=1)
     assert not plan.feasible
-    lines = what_blocks(plan)
+    lines = explain_failure(plan)
     assert "terrain closes the way" in lines[0]
     assert "ceiling is 450 m" in lines[0]
     assert "turn back, or go round to climb, were looked for" in lines[-1]
     alone = plan_path(walled, make_limits(walled), seed=1, algorithm="umda")
-    assert "a way that must turn back was not looked for" in what_blocks(alone)[-1]
+    assert "a way that must turn back was not looked for" in explain_failure(alone)[-1]
