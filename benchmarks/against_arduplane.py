@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.flight import fly_autopilot
 from flight.mission.from_plan import plan_mission
 from flight.simulation.setup import FlightSetup
@@ -118,9 +119,9 @@ def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
 
     There the throttle comes to its limit now and then, which is the hardest for its law.
     """
-    limits, parameters = airframe.limits, airframe.parameters
+    limits, parameters = airframe.limits, airframe.autopilot.parameters
     assert limits.tracking is not None
-    assert parameters is not None
+    assert isinstance(parameters, ArduPilotParameters)
     rate = PLANNED_CLIMB * TURBULENCE_SHARE[scenario.wind.turbulence] * parameters.tecs_climb_max
     return replace(airframe, limits=replace(limits, tracking=replace(limits.tracking, climb_rate=rate)))
 

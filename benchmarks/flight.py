@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
 from benchmarks.angles import angles
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.fdm import Fdm, Variation
 from flight.guidance.gains import Gains, load_gains
 from flight.simulation import simulate as simulation
@@ -175,7 +177,7 @@ def reference_laws(seeds: Sequence[int]) -> dict[str, list[float]]:
         setup = windy(seed)
         ours = straight_rms(setup, simulate(setup, aerosonde()))
         for name, (law, chosen) in laws.items():
-            other = replace(setup, guidance=cast("Any", law))
+            other = replace(setup, autopilot=PlanflyGuidance(cast("Any", law)))
             with flown_with(chosen):
                 found[name].append(straight_rms(other, simulate(other, aerosonde())) / ours)
     return found
@@ -207,9 +209,9 @@ def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240, *, ardupilo
     ardupilot: whether ArduPlane's law flies, in place of planfly's guidance.
     """
     ratios, closed, bares = [], [], []
-    parameters = load_parameters(aerosonde()) if ardupilot else None
+    autopilot = ArduPlane(load_parameters(aerosonde())) if ardupilot else PlanflyGuidance()
     for _ in range(rounds):
-        setup = replace(windy(1), guidance_hz=cast("Any", guidance_hz), parameters=parameters)
+        setup = replace(windy(1), guidance_hz=cast("Any", guidance_hz), autopilot=autopilot)
         flight = Flight(setup, aerosonde())
         flight.block(guidance_hz)
         bare = Fdm(aerosonde(), rate_hz=FDM_HZ)

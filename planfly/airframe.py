@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 from aircraft.catalog import Aircraft, find_aircraft, model_hash
 from aircraft.path_limits import Limits
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
-from flight.autopilots.arduplane.tracking_error import tracking_error
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.catalog import load_autopilot
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.setup import make_limits
 from world.errors import FlightError, ScenarioError
@@ -20,13 +20,13 @@ class Airframe:
     aircraft: its entry in the catalog.
     limits: of scenario and aircraft together; they hold the envelope.
     battery: energy carried, Wh.
-    parameters: of the ArduPlane that flies it; None where planfly's guidance does.
+    autopilot: that flies it, with its settings.
     """
 
     aircraft: Aircraft
     limits: Limits
     battery: float
-    parameters: ArduPilotParameters | None = None
+    autopilot: Autopilot
 
     @property
     def airspeed(self) -> float:
@@ -49,8 +49,8 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 def load_airframe(scenario: Scenario) -> Airframe:
     """The scenario's aircraft, its envelope, and the limits that both set.
 
-    Raises ScenarioError for an unknown aircraft, or a speed that it cannot fly, and ParameterError for a bad file of
-    ArduPilot's parameters.
+    Raises ScenarioError for an unknown aircraft or autopilot, or a speed that the aircraft cannot fly, and
+    ParameterError for a bad file of an autopilot's parameters.
 
     >>> from world.scenario import load_scenario
     >>> airframe = load_airframe(load_scenario("tight"))
@@ -59,16 +59,20 @@ def load_airframe(scenario: Scenario) -> Airframe:
     """
     table = scenario.flight
     aircraft, battery = find_airframe(scenario)
-    ardupilot = table.steering.autopilot == "ardupilot"
-    parameters = load_parameters(aircraft, table.params) if ardupilot else None
-    airspeed = _airspeed(scenario, aircraft, parameters)
+    autopilot = load_autopilot(scenario, aircraft)
+    airspeed = _airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     limits = make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg))
-    if parameters is not None:
-        nav, turbulence = table.steering.nav, scenario.wind.turbulence
-        tracking = tracking_error(parameters, airspeed, nav, fly_over=table.fly_over, turbulence=turbulence)
-        limits = replace(limits, tracking=tracking)
-    return Airframe(aircraft, limits, battery, parameters)
+    return Airframe(aircraft, with_tracking(limits, autopilot, scenario), battery, autopilot)
+
+
+def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
+    """Limits that leave free what an autopilot strays from its legs in a scenario."""
+    table = scenario.flight
+    tracking = autopilot.tracking_error(
+        limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
+    )
+    return replace(limits, tracking=tracking)
 
 
 def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
@@ -87,13 +91,13 @@ def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
     return aircraft, aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
 
 
-def _airspeed(scenario: Scenario, aircraft: Aircraft, parameters: ArduPilotParameters | None) -> float:
-    """Airspeed until a mission sets one, m/s: the scenario's, a parameter file's AIRSPEED_CRUISE, the aircraft's."""
-    stated = {} if parameters is None else parameters.by_origin("file")
+def _airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:
+    """Airspeed until a mission sets one, m/s: the scenario's, that of a file of parameters, the aircraft's."""
+    stated, parameters = autopilot.stated_airspeed, autopilot.parameters
     if (airspeed := scenario.flight.airspeed_mps) is not None:
         file, field = scenario.name, "flight.airspeed_mps"
-    elif parameters is not None and "AIRSPEED_CRUISE" in stated:
-        airspeed, file, field = stated["AIRSPEED_CRUISE"], parameters.source, "AIRSPEED_CRUISE"
+    elif stated is not None and parameters is not None:
+        (airspeed, field), file = stated, parameters.source
     else:
         airspeed, file, field = aircraft.airspeed, aircraft.name, "airspeed"
     if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:

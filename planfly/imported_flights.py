@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
-from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.catalog import autopilot_of_log
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
@@ -21,7 +23,6 @@ from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
 from logs.importers.clean_places import LONGEST_STEP
 from logs.importers.imported_flight import LoggedFlight, make_flight, mean_wind, track_of_flight, with_flown_heights
-from logs.importers.logged_missions import logged_parameters
 from logs.importers.open_log import open_log
 from logs.recording.reader import LogEvent
 from logs.verdict.findings import Verdict
@@ -97,10 +98,12 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
     if not plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
     scenario, placed = _world(mission, options, planned_in)
-    parameters, refused = logged_parameters(flight.raw)
     scenario, wind_source = _in_its_wind(options.fences.on_scenario(change(scenario)), flight, options)
     known = options.aircraft is not None or options.scenario is not None or planned_in is not None
-    setup = _setup(scenario, placed, mission, parameters, flight)
+    logged = autopilot_of_log(flight.raw.program, flight.raw.parameters, flight.raw.source)
+    # A flight by an autopilot that planfly does not know says what the aircraft can.
+    autopilot, refused = logged or (PlanflyGuidance(scenario.flight.steering.guidance), ())
+    setup = _setup(scenario, placed, mission, autopilot, flight)
     heights = flight.heights
     if options.datum is not None and heights.datum == "unstated":
         heights = replace(heights, datum=options.datum)
@@ -187,11 +190,11 @@ def _setup(
     scenario: Scenario,
     placed: PlacedMission,
     mission: Mission,
-    parameters: ArduPilotParameters | None,
+    autopilot: Autopilot,
     flight: LoggedFlight,
 ) -> FlightSetup:
     aircraft, battery = find_airframe(scenario)
-    limits = _limits(scenario, parameters, flight, aircraft.airspeed)
+    limits = _limits(scenario, autopilot, flight, aircraft.airspeed)
     return FlightSetup(
         scenario=scenario,
         mission=mission,
@@ -201,25 +204,23 @@ def _setup(
         aircraft=aircraft.name,
         battery=battery,
         seed=1,
-        guidance=scenario.flight.steering.guidance,
+        autopilot=autopilot,
         nav=scenario.flight.steering.nav,
         guidance_hz=scenario.flight.guidance_hz,
-        parameters=parameters,
     )
 
 
-def _limits(scenario: Scenario, parameters: ArduPilotParameters | None, flight: LoggedFlight, usual: float) -> Limits:
+def _limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, usual: float) -> Limits:
     """Limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
-    stated = {} if parameters is None else parameters.by_origin("file")
     airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
-    if "AIRSPEED_CRUISE" in stated:
-        airspeed = stated["AIRSPEED_CRUISE"]
+    if autopilot.stated_airspeed is not None:
+        airspeed, _ = autopilot.stated_airspeed
     elif scenario.flight.airspeed_mps is None and np.isfinite(flight.columns["airspeed"]).any():
         airspeed = float(np.nanmedian(flight.columns["airspeed"]))
-    if parameters is not None and "ROLL_LIMIT_DEG" in stated:
-        bank = parameters.roll_limit
+    if autopilot.stated_bank is not None:
+        bank = autopilot.stated_bank
     return make_limits(scenario, envelope, max(5.0, airspeed), bank)
 
 

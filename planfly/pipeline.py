@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from flight.autopilots.catalog import program_autopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
@@ -14,7 +15,7 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission
 from flight.mission.route import lay_route, make_route, with_end_courses
 from flight.mission_files.formats import mission_text
-from flight.simulation.airborne import Airborne
+from flight.simulation.airborne import Airborne, ProgramAutopilot
 from flight.simulation.setup import FDM_HZ, FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
@@ -166,11 +167,10 @@ def make_setup(
         battery=airframe.battery,
         seed=seed,
         plan=plan,
-        guidance=scenario.flight.steering.guidance,
+        autopilot=airframe.autopilot,
         nav=scenario.flight.steering.nav,
         guidance_hz=scenario.flight.guidance_hz,
         fdm_hz=fdm_hz,
-        parameters=airframe.parameters,
     )
 
 
@@ -205,11 +205,12 @@ def fly_and_judge(
     if stores > MAX_ENERGY_RATIO:
         return _unflown(setup, log, f"not started: it takes {stores:.0f} times the energy carried")
     try:
-        if autopilot is None:
-            how = off_nominal or OffNominal(Variation())
-            flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
-            return _record_and_judge(setup, airframe, flight, log, advance, every, most, reference=reference)
-        return _fly_program(setup, airframe, log, advance, every, autopilot, most)
+        if autopilot is not None:
+            program = program_autopilot(autopilot).flying(setup.autopilot, autopilot)
+            return _fly_program(setup, program, airframe, log, advance, every, most)
+        how = off_nominal or OffNominal(Variation())
+        flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
+        return _record_and_judge(setup, airframe, flight, log, advance, every, most, reference=reference)
     except StartError as error:
         return _unflown(setup, log, f"not started: {error.reason}")
 
@@ -223,17 +224,14 @@ def _stores_needed(setup: FlightSetup) -> float:
 
 def _fly_program(
     setup: FlightSetup,
+    program: ProgramAutopilot,
     airframe: Airframe,
     log: Path | None,
     advance: Advance | None,
     every: int,
-    autopilot: Path,
     most: FlightLimits,
 ) -> JudgedFlight:
-    # Imported here: nobody else needs MAVLink.
-    from flight.autopilots.arduplane_sitl.flight import AutopilotFlight
-
-    with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
+    with program.start(setup, airframe.aircraft) as flight:
         flight.prepare()
         try:
             judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every, most)

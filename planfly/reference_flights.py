@@ -3,10 +3,10 @@
 import contextlib
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Progress, simulate
 from flight.simulation.track import Track
@@ -18,71 +18,44 @@ from logs.verdict.summary import first_failed
 from world.errors import StartError
 
 # ----------------------------------------------------------------------
-# Which of ArduPlane's parameters decides a flight that fails: found by flying with one of them changed at a time.
+# Which of an autopilot's parameters decides a flight that fails: found by flying with one changed at a time.
 
 
-class Candidate(NamedTuple):
-    """A parameter that may decide.
-
-    name: ArduPlane's.
-    step: the increment that its parameter reference gives, or a few of them.
-    far: the farthest value that is tried, within the range that the reference gives.
-    unit: of both.
-    """
-
-    name: str
-    step: float
-    far: float
-    unit: str
-
-
-# Names, units, ranges and increments: ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.6).
-_HEIGHT = (
-    Candidate("TECS_HDEM_TCONST", 0.2, 1.0, "s"),
-    Candidate("TECS_CLMB_MAX", 0.5, 10.0, "m/s"),
-    Candidate("TECS_SINK_MAX", 0.5, 10.0, "m/s"),
-    Candidate("TECS_TIME_CONST", 0.2, 3.0, "s"),
-)
-_SIDE = (
-    Candidate("NAVL1_PERIOD", 1.0, 10.0, "s"),
-    Candidate("WP_RADIUS", 5.0, 30.0, "m"),
-    Candidate("WP_RADIUS", 5.0, 150.0, "m"),
-    Candidate("ROLL_LIMIT_DEG", 1.0, 60.0, "deg"),
-)
 # Rules that a height off the plan breaks before a track beside it does.
 _OF_HEIGHT = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
 
-Passes = Callable[[ArduPilotParameters], bool]
+Passes = Callable[[Autopilot], bool]
 
 
-def deciding_parameter(
-    parameters: ArduPilotParameters, findings: tuple[Finding, ...], passes: Passes
-) -> DecidingParameter | None:
+def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], passes: Passes) -> DecidingParameter | None:
     """The first candidate that passes with another value, and the nearest value that does; None where none does.
 
     findings: of the flight that failed.
-    passes: flies with other parameters and says whether that flight passes; called about ten times.
+    passes: flies the law with other parameters and says whether that flight passes; called about ten times.
 
     The candidates of what failed come first, heights or sides.  Of each the farthest value is flown, and where that
     passes the values between, by halves: the value that is named was flown and passed.
 
+    >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import default_parameters
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place
     >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
-    >>> found = deciding_parameter(default_parameters(), (low,), lambda new: new.tecs_height_demand_time < 1.3)
+    >>> quick = lambda law: law.parameters.tecs_height_demand_time < 1.3
+    >>> found = deciding_parameter(ArduPlane(default_parameters()), (low,), quick)
     >>> found.name, found.current, found.passing
     ('TECS_HDEM_TCONST', 3.0, 1.2)
     """
     failed = first_failed(findings)
-    if failed is None:
+    if failed is None or autopilot.parameters is None:
         return None
-    values = {parameter.name: parameter.value for parameter in parameters.values}
-    for name, step, far, unit in (*_HEIGHT, *_SIDE) if failed.rule in _OF_HEIGHT else (*_SIDE, *_HEIGHT):
+    values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
+    heights, sides = autopilot.height_candidates, autopilot.side_candidates
+    for name, step, far, unit in (*heights, *sides) if failed.rule in _OF_HEIGHT else (*sides, *heights):
         current = values[name]
 
         def with_value(value: float, name: str = name) -> bool:
-            return passes(parameters.changed(**{name: value}))
+            return passes(autopilot.with_parameters(**{name: value}))
 
         passing = _nearest(current, step, far, with_value)
         if passing is not None:
@@ -130,7 +103,7 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, progress: Progress |
     progress: as of `flight.simulation.simulate.simulate`.
     """
     same = true_route(setup)
-    ideal = replace(setup, parameters=None, program=None, guidance="path", nav="perfect", route=same)
+    ideal = replace(setup, autopilot=PlanflyGuidance(), nav="perfect", route=same)
     try:
         flown = simulate(ideal, aircraft, progress=progress)
     except StartError as error:
@@ -149,11 +122,11 @@ def find_deciding_parameter(
     ArduPlane's law: of a real autopilot's flight they say something where the law's own flight fails as well, and
     nothing where it passes.
     """
-    if setup.parameters is None or verdict.flyable:
+    if setup.autopilot.parameters is None or verdict.flyable:
         return None
     findings = verdict.findings
-    if setup.program is not None:
-        own = _flown_by_law(setup, aircraft, progress)
+    if setup.autopilot.program is not None:
+        own = _flown_by_law(setup, setup.autopilot.law, aircraft, progress)
         if own.flyable:
             return None
         findings = own.findings
@@ -163,10 +136,10 @@ def find_deciding_parameter(
     spec = scenario.spec.model_copy(update={"limits": limits})
     same = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
-    def passes(parameters: ArduPilotParameters) -> bool:
-        return _flown_by_law(replace(same, parameters=parameters), aircraft, progress).flyable
+    def passes(law: Autopilot) -> bool:
+        return _flown_by_law(same, law, aircraft, progress).flyable
 
-    return deciding_parameter(setup.parameters, findings, passes)
+    return deciding_parameter(setup.autopilot, findings, passes)
 
 
 def judge_with_reference_flights(
@@ -183,7 +156,7 @@ def judge_with_reference_flights(
         if hurry is not None and hurry():
             raise _GivenUp
 
-    if setup.parameters is None:
+    if setup.autopilot.level == "airframe":
         return judge_flight(setup, track, ended), None
     try:
         reference = ReferenceFlights(airframe_answer(setup, aircraft, watch))
@@ -197,8 +170,8 @@ def judge_with_reference_flights(
     return verdict, reference
 
 
-def _flown_by_law(setup: FlightSetup, aircraft: Aircraft, progress: Progress | None = None) -> Verdict:
-    """Fly a setup by ArduPlane's law, whoever flew it before, and judge that flight."""
-    by_law = replace(setup, program=None)
+def _flown_by_law(setup: FlightSetup, law: Autopilot, aircraft: Aircraft, progress: Progress | None = None) -> Verdict:
+    """Fly a setup by a law, whoever flew it before, and judge that flight."""
+    by_law = replace(setup, autopilot=law)
     flown = simulate(by_law, aircraft, progress=progress)
     return judge_flight(by_law, flown.track, flown.ended)

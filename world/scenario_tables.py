@@ -48,7 +48,6 @@ Course = Annotated[float, within(-360.0, 360.0)]
 Radius = Annotated[float, within(0.0, 200_000.0, above=True)]
 Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(no_line_break)]
 FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(no_line_break)]
-Autopilot = Literal["ardupilot", "ideal"]
 Guidance = Literal["path", "l1", "vector-field"]
 Navigation = Literal["perfect", "rtk", "gnss"]
 Seed = Annotated[int, within(0, 2**63 - 1)]
@@ -318,20 +317,21 @@ def names_folder(aircraft: str) -> bool:
 
 
 # Who flies where a scenario names neither an autopilot nor what belongs to one.
-DEFAULT_AUTOPILOT: Autopilot = "ardupilot"
-# How well an autopilot knows where it is, where a scenario does not say.
-_USUAL_NAVIGATION: dict[Autopilot, Navigation] = {"ardupilot": "gnss", "ideal": "perfect"}
+DEFAULT_AUTOPILOT = "ardupilot"
+# Planfly's own guidance, which alone has a choice of laws and takes no parameters.
+_OWN_GUIDANCE = "ideal"
 
 
 class Steering(NamedTuple):
     """Who flies.
 
-    autopilot: "ardupilot" for ArduPlane's laws, "ideal" for planfly's guidance.
+    autopilot: "ardupilot" for ArduPlane's laws, "ideal" for planfly's guidance; the others that there are stand in
+    `flight.autopilots.catalog`.
     guidance: the law of "ideal", which no other autopilot asks for.
     nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
     """
 
-    autopilot: Autopilot
+    autopilot: str
     guidance: Guidance
     nav: Navigation
 
@@ -348,7 +348,7 @@ class FlightTable(ScenarioTable):
     aircraft: FilePath = "aerosonde"  # an embedded name, or a folder where there is a slash
     airspeed_mps: Annotated[float, within(15.0, 60.0)] | None = None
     max_bank_deg: Annotated[float, within(5.0, 60.0)] = 30.0
-    autopilot: Autopilot | None = None
+    autopilot: Name | None = None
     params: FilePath | None = None
     guidance: Guidance | None = None
     guidance_hz: Literal[30, 60] = 60
@@ -360,27 +360,28 @@ class FlightTable(ScenarioTable):
     @model_validator(mode="after")
     def _one_autopilot(self) -> "FlightTable":
         autopilot = self.steering.autopilot
-        if self.guidance is not None and autopilot != "ideal":
-            raise ValueError('guidance: not a key of autopilot = "ardupilot"')
-        if self.params is not None and autopilot != "ardupilot":
+        if self.guidance is not None and autopilot != _OWN_GUIDANCE:
+            raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
+        if self.params is not None and autopilot == _OWN_GUIDANCE:
             raise ValueError('params: not a key of autopilot = "ideal", which guidance alone means')
         return self
 
     @property
     def steering(self) -> Steering:
-        """Who flies, and how well it knows where it is."""
-        implied: Autopilot = DEFAULT_AUTOPILOT
+        """Who flies, and how well it knows where it is: planfly's guidance exactly, others by GNSS."""
+        implied = DEFAULT_AUTOPILOT
         if self.guidance is not None:
-            implied = "ideal"
+            implied = _OWN_GUIDANCE
         elif self.params is not None:
             implied = "ardupilot"
         autopilot = self.autopilot or implied
-        return Steering(autopilot, self.guidance or "path", self.nav or _USUAL_NAVIGATION[autopilot])
+        usual: Navigation = "perfect" if autopilot == _OWN_GUIDANCE else "gnss"
+        return Steering(autopilot, self.guidance or "path", self.nav or usual)
 
     def stated(self) -> "FlightTable":
         """The same flight with nothing left to a default of who flies: as plans and logs hold it."""
         autopilot, guidance, nav = self.steering
-        who = {"autopilot": autopilot} if autopilot != "ideal" else {"guidance": guidance}
+        who = {"autopilot": autopilot} if autopilot != _OWN_GUIDANCE else {"guidance": guidance}
         return self.model_copy(update={**who, "nav": nav})
 
 

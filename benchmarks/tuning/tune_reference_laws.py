@@ -14,6 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from benchmarks.flight import aerosonde, errors_of, flown_with, straight_rms, windy
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.gains import load_gains
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
@@ -66,7 +67,7 @@ def measure(law: str, chosen: dict[str, float], setups: list[FlightSetup]) -> Se
     found = []
     with flown_with(replace(load_gains(aerosonde()), **cast("Any", chosen))):
         for setup in setups:
-            flown = simulate(replace(setup, guidance=cast("Any", law)), aerosonde())
+            flown = simulate(replace(setup, autopilot=PlanflyGuidance(cast("Any", law))), aerosonde())
             if not errors_of(flown).completed:
                 return Setting(chosen, ())
             found.append(straight_rms(setup, flown))

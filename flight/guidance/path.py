@@ -69,6 +69,27 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 
 @compiled
+def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  # pragma: no cover - compiled
+    """Note in the memory where on the path the aircraft is, and return the path's course there, rad.
+
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.  pieces: of `PIECE`.  memory: a record of
+    `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    """
+    k = memory.piece
+    along, cross, course = project(pieces[k], estimated.east, estimated.north)
+    while along > pieces[k].length and k + 1 < pieces.shape[0]:
+        k += 1
+        along, cross, course = project(pieces[k], estimated.east, estimated.north)
+    piece = pieces[k]
+    memory.piece = k
+    memory.distance = piece.start + along
+    memory.leg = piece.leg + (1 if memory.distance > piece.leg_change else 0)
+    memory.cross_track = cross
+    memory.done = k + 1 == pieces.shape[0] and along >= piece.length
+    return course
+
+
+@compiled
 def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
     """Mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
     total = 0.0

@@ -1,19 +1,21 @@
 """An aircraft in the air, whoever steers it: its start, its ground and wind, and how long it may fly.
 
-`flight.simulation.simulate.Flight` steers it by our guidance, `flight.autopilots.arduplane_sitl.flight.AutopilotFlight`
-by another program.
+`flight.simulation.simulate.Flight` steers it by an autopilot's law, a `ProgramFlight` by a program of its own.
 """
 
 import math
 from abc import ABC, abstractmethod
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
 from aircraft.path_limits import Limits, ground_speed_on
-from flight.autopilots.arduplane.parameters import speeds_flown
+from flight.autopilots.autopilot import Autopilot
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim
 from flight.guidance.gains import Gains
@@ -201,6 +203,7 @@ class Airborne(ABC):
     """One flight in progress, advanced by `block`.
 
     dt: of a tick, s.
+    setup: with the program that flies it, once that has said which it is.
     path: that it is to follow.
     map: from JSBSim's positions, around area and route.
     memory: guidance's, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
@@ -221,6 +224,7 @@ class Airborne(ABC):
 
         start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
         """
+        self.setup = setup
         self.path = setup.path
         self._start_offset = start_offset
         self._ground = Ground(setup.scenario.terrain)
@@ -228,11 +232,9 @@ class Airborne(ABC):
         self._steps = setup.fdm_hz // setup.guidance_hz
         self.dt = self._steps / setup.fdm_hz
         waypoints = waypoint_records(setup.route)
-        self._airspeeds = setup.route.airspeed
-        if setup.parameters is not None:
-            self._airspeeds = speeds_flown(setup.route.airspeed, setup.airspeed, setup.parameters)
+        self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
-        self._workspace = Workspace(gains, self.path, waypoints)
+        self._workspace = Workspace(gains, self.path, waypoints, setup.autopilot.own)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
@@ -336,6 +338,31 @@ class Airborne(ABC):
         if left <= count:
             return rows, f"time limit: not finished after {self.most_ticks * self.dt:.0f} s"
         return rows, ""
+
+
+class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
+    """A flight that a program steers, in lockstep with our physics; on leaving it the program has ended."""
+
+    @abstractmethod
+    def prepare(self) -> None:
+        """Have the program take the mission and fly to the first waypoint.  Raises FlightError."""
+
+    @abstractmethod
+    def keep_log(self, target: Path) -> bool:
+        """End the program in order, and move its own log to a file; whether there was one."""
+
+
+class ProgramAutopilot(Autopilot):
+    """An autopilot that is a program of its own; `law` is the autopilot that models it."""
+
+    @classmethod
+    @abstractmethod
+    def flying(cls, law: Any, binary: Path) -> Self:
+        """The program, with the settings of its law.  binary: its file."""
+
+    @abstractmethod
+    def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
+        """Start the program for a flight.  Raises FlightError."""
 
 
 def _slowest_leg(setup: FlightSetup, airspeeds: Floats) -> float:

@@ -2,42 +2,20 @@
 
 import copy
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from aircraft.tracking import corridor_half_width
-from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
-
-# ----------------------------------------------------------------------
-# The real autopilot that flew a flight, as a program of its own: what it is, and what it was set to.
-
-
-@dataclass(frozen=True, slots=True)
-class AutopilotProgram:
-    """Which program steered a flight.
-
-    version: what it calls itself.
-    sha256: of its file, hex.
-    parameters: by name, what it was given over its own defaults, as it had them.
-    changed: those of them that a person's file stated otherwise than the aircraft's.
-    unused: names in the person's file that it does not know, or that belong to other hardware.
-    """
-
-    version: str
-    sha256: str
-    parameters: Mapping[str, float]
-    changed: Mapping[str, float]
-    unused: tuple[str, ...] = ()
-
+from world.scenario_tables import Navigation
 
 # ----------------------------------------------------------------------
 # Where a flight is from that was not flown by planfly: an imported log, and what that log can carry.
@@ -190,12 +168,10 @@ class FlightSetup:
     battery: energy carried, Wh.
     seed: of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
     plan: None for a mission that a person brought.
-    guidance: the law that steers where ``parameters`` is None.
+    autopilot: what steers, with its settings.
     nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: how often it steers, and how many rows the track has a second.
     fdm_hz: steps of JSBSim a second.
-    parameters: of the ArduPlane that flies; None where planfly's guidance does.
-    program: the real autopilot that flies; None where planfly's guidance or its law of ArduPlane does.
     source: the imported log that the flight is from; None for a flight of planfly's own.
     path: that is to be followed, of route and limits.
     """
@@ -209,12 +185,10 @@ class FlightSetup:
     battery: float
     seed: int
     plan: Plan | None = None
-    guidance: Guidance = "path"
+    autopilot: Autopilot = field(default_factory=PlanflyGuidance)
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
     fdm_hz: Literal[60, 120] = FDM_HZ
-    parameters: ArduPilotParameters | None = None
-    program: AutopilotProgram | None = None
     source: ImportedLog | None = None
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
@@ -230,8 +204,7 @@ class FlightSetup:
     @property
     def corridor(self) -> float:
         """Half width of the corridor about the legs that the flight has to stay in, m."""
-        radius = None if self.parameters is None else self.parameters.wp_radius
-        return corridor_half_width(self.scenario.limits.corridor_m, radius)
+        return corridor_half_width(self.scenario.limits.corridor_m, self.autopilot.acceptance_radius)
 
     @property
     def airspeed(self) -> float:

@@ -7,16 +7,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.law import true_by_equivalent
+from flight.autopilots.autopilot import Tick
 from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.jsbsim_properties import Getter, Setter
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
-from flight.guidance.inner_loops import ARDUPILOT, CROSS_TRACK, L1, VECTOR_FIELD
 from flight.guidance.path import FlyByPath
 from flight.simulation.airborne import Airborne, LocalMap
 from flight.simulation.setup import FlightSetup
-from flight.simulation.tick import READ_FIELDS, Workspace, tick_in_block
+from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import StartError
 
@@ -36,7 +35,7 @@ def make_loop(
 
     getters: of the state, by `flight.simulation.tick.READ_FIELDS`.
     setters: by `flight.simulation.tick.OUTPUT`.
-    tick: `flight.simulation.tick.tick` on this workspace.
+    tick: the law's, on this workspace.
     run: steps JSBSim, ``steps`` times a tick.
     """
     # Each by its name: going through a list of them takes half as long again.
@@ -87,8 +86,6 @@ TICK = 1.0 / 60.0
 BLOCK = 1.0
 # Bank that guidance may add to the planned turns' to correct an error, rad.
 BANK_RESERVE = math.radians(3.0)
-# By its name in a scenario's `[flight] guidance`.
-LAWS = {"path": CROSS_TRACK, "l1": L1, "vector-field": VECTOR_FIELD}
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +171,7 @@ def fly_to_end(
 
 
 class Flight(Airborne):
-    """A flight that our guidance steers: `simulate` flies it in one go, the live vehicle in step with a clock."""
+    """A flight by the law of an autopilot: `simulate` flies it in one go, the live vehicle in step with a clock."""
 
     def __init__(
         self,
@@ -194,12 +191,10 @@ class Flight(Airborne):
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
         self._begin(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
-        self.memory.law = LAWS[setup.guidance]
-        if setup.parameters is not None:
-            self.memory.law = ARDUPILOT
-            self._work.parameters = setup.parameters.record()
+        law = setup.autopilot.law
+        law.begin(self.memory, self._workspace.own)
         self._disturb(setup)
-        self._loop = self._make_loop(self.fdm.loop_access())
+        self._loop = self._make_loop(self.fdm.loop_access(), law.tick)
 
     def _begin(self, setup: FlightSetup, model: Fdm, reference: float) -> None:
         """Trim the aircraft at the route's start, and guidance's controls with the model.
@@ -207,9 +202,8 @@ class Flight(Airborne):
         reference: airspeed at which the gains hold, m/s.
         """
         start = self._start(setup)
-        if setup.parameters is not None:
-            # ArduPlane takes over in level flight, and knows equivalent airspeeds alone.
-            true = start.airspeed * true_by_equivalent(start.amsl)
+        if setup.autopilot.equivalent_airspeeds:
+            true = start.airspeed * setup.autopilot.airspeed_factor(start.amsl)
             start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true))
         level = straight(model, reference, start.amsl)
         if level is None:
@@ -224,7 +218,7 @@ class Flight(Airborne):
     def _fly(self, count: int) -> int:
         return self._loop(count)
 
-    def _make_loop(self, access: LoopAccess) -> Callable[[int], int]:
+    def _make_loop(self, access: LoopAccess, tick: Tick) -> Callable[[int], int]:
         """Make what flies a number of ticks into the workspace's rows and returns the last tick's status."""
         work, space = self._work, self._workspace
         work.state_factors = access.factors[0]
@@ -235,7 +229,7 @@ class Flight(Airborne):
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
-            partial(tick_in_block, space.block, self._ground.heights),
+            partial(tick, space.block, self._ground.heights),
             space,
             access.run,
             self._steps,

@@ -1,4 +1,9 @@
-"""One tick of the compiled loop: judge the state, navigate, guide, make the wind, fill a row of the track."""
+"""The compiled loop's record of a flight, and what each tick does whoever steers.
+
+A tick takes the state to SI and to the map, looks up the ground and makes the navigation's error (`begin_tick`); an
+autopilot's law then fills the commands; the tick ends with the next wind, a row of the track and what to set in JSBSim
+(`end_tick`).  Every autopilot has a compiled tick of its own, made of these two and its law.
+"""
 
 import math
 from typing import Any
@@ -7,12 +12,9 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.law import ARDUPILOT_MEMORY, fly_as_ardupilot
-from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.gains import GAINS, Gains
-from flight.guidance.inner_loops import ARDUPILOT, GUIDANCE_MEMORY
-from flight.guidance.lateral import guide
+from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION, NAVIGATION_LAGS, navigate
 from flight.guidance.path import NODE, PIECE, FlyByPath, Records
@@ -97,8 +99,6 @@ WORKSPACE = record_dtype(
     ("navigation", NAVIGATION_LAGS),
     ("memory", GUIDANCE_MEMORY),
     ("gains", GAINS),
-    ("ardupilot", ARDUPILOT_MEMORY),
-    ("parameters", ARDUPILOT_PARAMETERS),
     ("timing", TIMING),
     ("settings", SETTINGS),
     ("position_map", POLYMAP),  # latitude and longitude to east and north
@@ -117,9 +117,13 @@ WORKSPACE_NUMBERS = WORKSPACE.itemsize // 8
 class Workspace:
     """One flight's record and path, in one block of memory, and plain views of what passes to and from JSBSim.
 
-    block: (n,) numbers, the workspace's and then the path's, for compiled code.
+    Numba looks at the type of each argument of a call, at a record's for twice as long as at an array's of numbers: so
+    all of it comes to compiled code as one block.
+
+    block: (n,) numbers: the workspace's, those that the autopilot's law keeps, and the path's.
     array: (1,) of `WORKSPACE`, for compiled code.
     record: its one record, for Python.
+    own: the record that the law keeps, None for none.
     path: of `PATH_ROW`, as many as there are pieces, nodes or waypoints.
     readings: (n,) the state's `READ_FIELDS`.
     output: (n,) the fields of `OUTPUT`.
@@ -130,12 +134,16 @@ class Workspace:
     rows: (BLOCK_TICKS,) of the track.
     """
 
-    def __init__(self, gains: Gains, path: FlyByPath, waypoints: Records) -> None:
+    def __init__(
+        self, gains: Gains, path: FlyByPath, waypoints: Records, own: np.dtype[np.record] | None = None
+    ) -> None:
         parts = {"piece": path.pieces, "node": path.nodes, "waypoint": waypoints}
         rows_of_path = max(map(len, parts.values()))
-        self.block: Floats = np.zeros(WORKSPACE_NUMBERS + rows_of_path * PATH_ROW.itemsize // 8)
+        path_begins = WORKSPACE_NUMBERS + (0 if own is None else own.itemsize // 8)
+        self.block: Floats = np.zeros(path_begins + rows_of_path * PATH_ROW.itemsize // 8)
         self.array: Records = self.block[:WORKSPACE_NUMBERS].view(WORKSPACE)
-        self.path: Records = self.block[WORKSPACE_NUMBERS:].view(PATH_ROW)
+        self.path: Records = self.block[path_begins:].view(PATH_ROW)
+        self.own: Record = None if own is None else self.block[WORKSPACE_NUMBERS:path_begins].view(own)[0]
         self.record: Record = self.array[0]
         self.record.gains = gains.record()
         for name, rows in parts.items():
@@ -165,7 +173,7 @@ class Workspace:
 
 
 STEEPEST_BANK = math.radians(75.0)
-# What `tick` returns, and how the flight ended by then.
+# What a tick returns, and how the flight ended by then.
 COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY = 1, 2, 3, 4, 5, 6, 7
 # A flight that passes the end of its route further than this from it, m, has missed it.
 FAR = 100.0
@@ -182,47 +190,23 @@ _STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
 
 
 @compiled
-def tick_in_block(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
-    """Do one `tick` on the block of a `flight.simulation.tick.Workspace`.
+def begin_tick(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
+    """Take the state as JSBSim gave it, in its units, and estimate the motion; False where the state is no number.
 
-    Numba looks at the type of each argument of a call, at a record's for twice as long as at an array's of numbers: so
-    both tables come in one.
+    work: a record of `WORKSPACE`.  heights: of the terrain.
     """
-    return tick(block[:WORKSPACE_NUMBERS].view(WORKSPACE), block[WORKSPACE_NUMBERS:].view(PATH_ROW), heights)
-
-
-@compiled
-def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: no cover - compiled
-    """Take the state as JSBSim gave it, in its units; return a key of `ENDS` or 0 to fly on.
-
-    What to set in JSBSim, in its units, then stands in the workspace's output.
-
-    workspace, path: of a `flight.simulation.tick.Workspace`.  heights: of the terrain.
-    """
-    work = workspace[0]
-    state, memory, timing, settings = work.state, work.memory, work.timing, work.settings
-    if not sense(work, heights):
-        return NOT_A_NUMBER
+    settings, timing = work.settings, work.timing
+    if not _sense(work, heights):
+        return False
     navigate(
         work.true, work.estimated, work.navigation, work.noise[timing.row].navigation,
         settings.navigation_sigma, settings.navigation_time, timing.dt,
     )  # fmt: skip
-    pieces, nodes, waypoints = (
-        path.piece[: settings.pieces], path.node[: settings.nodes], path.waypoint[: settings.waypoints],
-    )  # fmt: skip
-    if memory.law == ARDUPILOT:
-        fly_as_ardupilot(
-            state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.parameters, work.ardupilot,
-            work.commands, timing.dt,
-        )  # fmt: skip
-    else:
-        guide(state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.commands, timing.dt)
-    finish_tick(work)
-    return flight_status(work)
+    return True
 
 
 @compiled
-def sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
+def _sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
     """Take the state to SI and to the map, and look up the ground; False where the state is no number.
 
     Fills the state, the true motion and the place, of a record of `flight.simulation.tick.WORKSPACE`.
@@ -251,8 +235,11 @@ def sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compile
 
 
 @compiled
-def finish_tick(work: Record) -> None:  # pragma: no cover - compiled
-    """Make the next wind, fill a row of the track, count the tick, and state what to set in JSBSim."""
+def end_tick(work: Record) -> int:  # pragma: no cover - compiled
+    """Make the next wind, fill a row of the track, count the tick, and state what to set in JSBSim, in its units.
+
+    Returns a key of `ENDS`, or 0 to fly on.
+    """
     state, true, air, timing, place = work.state, work.true, work.air, work.timing, work.place
     cos, sin = place.north_cos, place.north_sin
     row = work.rows[timing.row]
@@ -265,14 +252,7 @@ def finish_tick(work: Record) -> None:  # pragma: no cover - compiled
     timing.tick += 1
     timing.row += 1
     _output(work.output, work.commands, air, work.scale_above, work.scale_below)
-
-
-@compiled
-def flight_status(work: Record) -> int:  # pragma: no cover - compiled
-    """How the flight stands after a tick: a key of `ENDS`, or 0 to fly on."""
-    return _status(
-        work.state, work.memory, work.place.clearance, work.settings.slowest, work.air.energy >= work.settings.battery
-    )
+    return _status(state, work.memory, place.clearance, work.settings.slowest, air.energy >= work.settings.battery)
 
 
 @compiled

@@ -19,6 +19,8 @@ import zstandard
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from flight.autopilots.autopilot import Autopilot, StoredAutopilot
+from flight.autopilots.catalog import restore_autopilot, stored_name
 from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
 from logs.recording.setup_schema import (
     EnvelopeTable,
@@ -32,7 +34,7 @@ from logs.recording.setup_schema import (
     read_parameters,
 )
 from planner.plan import Plan, parse_plan, plan_json
-from world.errors import LogError, PlanflyError
+from world.errors import LogError, ParameterError, PlanflyError
 from world.frames import MAX_TERMS, PolyMap
 from world.raster import MAX_PIXELS
 from world.scenario import Scenario, from_spec
@@ -231,6 +233,7 @@ class _Setup(SetupModel):
     fdm_hz: Literal[60, 120] = 120  # a log of before it could be chosen
     parameters: ParametersTable | None = None  # a log of before there were any was flown by planfly's guidance
     program: ProgramTable | None = None
+    autopilot: str | None = None  # left out where guidance, parameters and program say who flew
     source: ImportedLog | None = None
     mission: MissionTable
     route: RouteTable
@@ -285,6 +288,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         attachments[PLAN_FILE] = plan_json(setup.plan).encode()
     if setup.scenario.terrain is not None:
         attachments |= pack_terrain(setup.scenario.terrain)
+    stored = setup.autopilot.store()
     file = _Setup(
         aircraft=setup.aircraft,
         airspeed_mps=setup.airspeed,
@@ -292,12 +296,13 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         battery_wh=setup.battery,
         seed=setup.seed,
         external=setup.scenario.external,
-        guidance=setup.guidance,
+        guidance=stored.guidance,
         nav=setup.nav,
         guidance_hz=setup.guidance_hz,
         fdm_hz=setup.fdm_hz,
-        parameters=None if setup.parameters is None else parameters_table(setup.parameters),
-        program=None if setup.program is None else ProgramTable.of(setup.program),
+        parameters=None if stored.parameters is None else parameters_table(stored.parameters),
+        program=None if stored.program is None else ProgramTable.of(stored.program),
+        autopilot=stored_name(setup.autopilot),
         source=setup.source,
         mission=MissionTable.of(setup.mission),
         route=RouteTable.of(setup.route),
@@ -305,7 +310,8 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         versions=package_versions(),
         sha256={name: hashlib.sha256(data).hexdigest() for name, data in attachments.items()},
     )
-    return {SETUP_FILE: _json(file.model_dump(by_alias=True)), **attachments}
+    unstated = {"autopilot"} if file.autopilot is None else None
+    return {SETUP_FILE: _json(file.model_dump(by_alias=True, exclude=unstated)), **attachments}
 
 
 def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
@@ -343,15 +349,27 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         battery=file.battery_wh,
         seed=file.seed,
         plan=_plan(listed, source, terrain) if PLAN_FILE in listed else None,
-        guidance=file.guidance,
+        autopilot=_autopilot(file, where),
         nav=file.nav,
         guidance_hz=file.guidance_hz,
         fdm_hz=file.fdm_hz,
-        parameters=None if file.parameters is None else read_parameters(file.parameters, where),
-        program=None if file.program is None else file.program.program(),
         source=file.source,
     )
     return StoredSetup(setup, file.versions)
+
+
+def _autopilot(file: _Setup, where: str) -> Autopilot:
+    stored = StoredAutopilot(
+        file.guidance,
+        None if file.parameters is None else read_parameters(file.parameters),
+        None if file.program is None else file.program.program(),
+    )
+    try:
+        return restore_autopilot(file.autopilot, stored)
+    except ParameterError as error:
+        raise LogError(f"{where}: parameters.values: {error}", file=where, field="parameters.values") from error
+    except KeyError as error:
+        raise LogError.at(where, "autopilot", file.autopilot, "not an autopilot of this version") from error
 
 
 def _json(data: Any) -> bytes:

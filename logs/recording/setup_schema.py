@@ -13,11 +13,10 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from aircraft.envelope import Envelope
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, Origin, stored_parameters
+from flight.autopilots.autopilot import AutopilotProgram, Origin, ParameterValue, StoredParameters
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.route import Route
-from flight.simulation.setup import AutopilotProgram
-from world.errors import LogError, ParameterError
+from world.errors import LogError
 from world.geometry import leg_runs
 
 Made = TypeVar("Made")
@@ -163,7 +162,7 @@ class EnvelopeTable(SetupModel):
 
 
 class ParametersTable(SetupModel):
-    """ArduPlane's parameters as a table, in its units: each value, and who states it."""
+    """An autopilot's parameters as a table, in its units: each value, and who states it."""
 
     values: dict[str, Finite]
     origins: dict[str, Origin]
@@ -171,8 +170,8 @@ class ParametersTable(SetupModel):
     source: str
 
 
-def parameters_table(parameters: ArduPilotParameters) -> ParametersTable:
-    """Write ArduPlane's parameters as a table."""
+def parameters_table(parameters: StoredParameters) -> ParametersTable:
+    """Write an autopilot's parameters as a table."""
     return ParametersTable(
         values={name: value for name, value, _ in parameters.values},
         origins={name: origin for name, _, origin in parameters.values},
@@ -181,13 +180,10 @@ def parameters_table(parameters: ArduPilotParameters) -> ParametersTable:
     )
 
 
-def read_parameters(table: ParametersTable, file: str) -> ArduPilotParameters:
-    """Read the parameters of a table.  Raises LogError for a value that is not allowed."""
-    values = [(name, value, table.origins.get(name, "default")) for name, value in table.values.items()]
-    try:
-        return stored_parameters(values, table.unused, table.source)
-    except ParameterError as error:
-        raise LogError(f"{file}: parameters.values: {error}", file=file, field="parameters.values") from error
+def read_parameters(table: ParametersTable) -> StoredParameters:
+    """Read an autopilot's parameters of a table; the autopilot says whether they are allowed."""
+    values = (ParameterValue(name, value, table.origins.get(name, "default")) for name, value in table.values.items())
+    return StoredParameters(tuple(values), table.unused, table.source)
 
 
 class ProgramTable(SetupModel):

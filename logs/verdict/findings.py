@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from flight.autopilots.arduplane.parameters import NOT_FLOWN, ArduPilotParameters
-from flight.simulation.setup import AutopilotProgram
+from flight.autopilots.autopilot import AutopilotProgram, Parameters
 from logs.verdict.places import (
     AirframeAnswer,
     DecidingParameter,
@@ -136,7 +135,7 @@ class Verdict:
     notes: tuple[str, ...] = ()
     leg_ends: tuple[float, ...] = ()
     program: AutopilotProgram | None = None
-    parameters: ArduPilotParameters | None = None
+    parameters: Parameters | None = None
 
     @property
     def headline(self) -> str:
@@ -275,13 +274,13 @@ def verdict_json(verdict: Verdict) -> str:
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def _parameters_data(parameters: ArduPilotParameters) -> dict[str, Any]:
+def _parameters_data(parameters: Parameters) -> dict[str, Any]:
     """Each parameter's value, in ArduPlane's unit, and who states it; and what a file states that has no use."""
     return {
         "file": parameters.source,
         "values": [parameter._asdict() for parameter in parameters.values],
         "unused": list(parameters.unused),
-        "not_flown": list(NOT_FLOWN),
+        "not_flown": list(parameters.not_flown),
     }
 
 

@@ -85,8 +85,8 @@ def judge_flight(
         deciding=deciding,
         notes=setup.route.notes,
         leg_ends=() if aligned is None else aligned.leg_ends(),
-        program=setup.program,
-        parameters=setup.parameters,
+        program=setup.autopilot.program,
+        parameters=setup.autopilot.parameters,
     )
 
 

@@ -88,7 +88,7 @@ def unflyable_items(setup: FlightSetup) -> list[Finding]:
 
 def flown_level(setup: FlightSetup) -> LevelName:
     """The level that a flight of a setup answers."""
-    return "airframe" if setup.parameters is None else "autopilot"
+    return setup.autopilot.level
 
 
 def judge_unflown(requirements: RouteRequirements, ended: str, *, whole: bool = True) -> Verdict:

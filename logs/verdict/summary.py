@@ -2,10 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
-from flight.autopilots.arduplane.parameters import NOT_FLOWN
-from flight.simulation.setup import AutopilotProgram, FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import RULES, Finding, Verdict
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.wording import deciding_text, disagreement_text, place_text, shortened, suggestions_text
@@ -13,14 +11,7 @@ from world.html_table import html_table
 
 # Failed findings that the first line names.
 _NAMED = 4
-# Changed parameters of a real autopilot that its line names.
-_CHANGED = 8
 _UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
-_GUIDANCE = {
-    "path": "planfly's guidance on the fly-by path",
-    "l1": "L1 as ArduPlane flies it, along the legs",
-    "vector-field": "Beard and McLain's vector field on the fly-by path",
-}
 _NAV = {
     "perfect": "exact",
     "rtk": "with RTK's error (0.05 m on each axis)",
@@ -159,7 +150,7 @@ def summary_lines(
     levels: the verdict's own last, with the headline.
     """
     *others, own = levels
-    lines = [own.headline, *_whose_fault(levels, deciding, real=setup.program is not None)]
+    lines = [own.headline, *_whose_fault(levels, deciding, setup)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
@@ -183,7 +174,7 @@ def summary_lines(
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
     if level == "flown":
-        lines.append(f"Flown by: {flown_by(setup)}; navigation {_NAV[setup.nav]}")
+        lines.append(f"Flown by: {setup.autopilot.described(setup.aircraft)}; navigation {_NAV[setup.nav]}")
         lines += _parameter_lines(setup)
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
@@ -193,58 +184,33 @@ def summary_lines(
     return tuple(lines)
 
 
-def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, *, real: bool) -> list[str]:
-    """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides.
-
-    real: whether a real autopilot flew; other parameters are flown by its law.
-    """
+def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup) -> list[str]:
+    """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides."""
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe"):
         return []
-    why = "" if real else ": no single parameter that was tried would pass"
+    # Other parameters are flown by the law, whoever flew.
+    by_law = setup.autopilot.program is not None
+    why = "" if by_law else ": no single parameter that was tried would pass"
     if deciding is not None:
-        why = f": {deciding_text(deciding)}{', by the flight of its law' if real else ''}"
-    return [f"The aircraft can, ArduPlane with these parameters cannot{why}"]
-
-
-def flown_by(setup: FlightSetup) -> str:
-    """Who steers, in words: planfly's guidance or ArduPlane, with the parameters that decide most of its flight."""
-    parameters = setup.parameters
-    if setup.program is not None:
-        return _program_text(setup.program, setup.aircraft)
-    if parameters is None:
-        return _GUIDANCE[setup.guidance]
-    whose = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
-    return (
-        f"ArduPlane's law with {whose} (WP_RADIUS {parameters.wp_radius:g} m,"
-        f" NAVL1_PERIOD {parameters.navl1_period:g} s, TECS_HDEM_TCONST {parameters.tecs_height_demand_time:g} s)"
-    )
-
-
-def _program_text(program: AutopilotProgram, aircraft: str) -> str:
-    """A real autopilot in words; every parameter stands in the verdict's data."""
-    changed = [f"{name} {value:g}" for name, value in program.changed.items()]
-    more = f", +{len(changed) - _CHANGED} more" if len(changed) > _CHANGED else ""
-    return (
-        f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
-        f" {Path(aircraft).name}, changed: {', '.join(changed[:_CHANGED]) or 'none'}{more}"
-    )
+        why = f": {deciding_text(deciding)}{', by the flight of its law' if by_law else ''}"
+    return [f"The aircraft can, {setup.autopilot.title} with these parameters cannot{why}"]
 
 
 def _parameter_lines(setup: FlightSetup) -> list[str]:
-    """Where ArduPlane's parameters are from, if a file states any, and which of the file's have no use here."""
-    parameters = setup.parameters
+    """Where the parameters are from, if a file states any, and which of the file's have no use here."""
+    parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
         return []
     names = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
     unused = list(parameters.unused[:_NAMED])
     more = len(parameters.unused) - len(unused)
     said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
-    returns = [name for name in NOT_FLOWN if name in parameters.by_origin("file")]
+    returns = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
     said += f"; read, not flown: {', '.join(returns)}" if returns else ""
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
-        f" {names['default']} ArduPlane's defaults{said}"
+        f" {names['default']} {setup.autopilot.title}'s defaults{said}"
     ]
 
 

@@ -106,21 +106,9 @@ def _make_folder(args: argparse.Namespace) -> int:
 
 def _check_steering(chosen: "Aircraft") -> list[str]:
     """What lacks for a flight; raises PlanflyError for gains, parameters or servos that are there and broken."""
-    from flight.autopilots.arduplane.parameters import load_parameters
-    from flight.autopilots.arduplane_sitl.physics import SERVO_FILE, load_servo_map
-    from flight.guidance.gains import GAINS_FILE, load_gains
+    from flight.autopilots.catalog import AUTOPILOTS
 
-    load_parameters(chosen)
-    lacking = []
-    if (chosen.folder / GAINS_FILE).exists():
-        load_gains(chosen)
-    else:
-        lacking.append(f"{chosen.folder / GAINS_FILE}: missing: {chosen.name} does not fly without gains")
-    if (chosen.folder / SERVO_FILE).exists():
-        load_servo_map(chosen)
-    else:
-        lacking.append(f"{chosen.folder / SERVO_FILE}: missing: --autopilot needs to know which servo moves what")
-    return lacking
+    return [lacking for kind in AUTOPILOTS for lacking in kind.missing_files(chosen)]
 
 
 def _work_out(chosen: "Aircraft", *, motor_braking: bool) -> "AircraftNumbers":

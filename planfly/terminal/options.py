@@ -284,13 +284,21 @@ def flight_entries(args: argparse.Namespace) -> dict[str, str | float | None]:
     return {
         "aircraft": getattr(args, "aircraft", None),
         "airspeed_mps": getattr(args, "airspeed", None),
-        # A real one is an ArduPlane.
-        "autopilot": None if getattr(args, "autopilot", None) is None else "ardupilot",
+        "autopilot": _program_name(args),
         "guidance": getattr(args, "guidance", None),
         "nav": getattr(args, "nav", None),
         # Whatever folder the scenario is in.
         "params": None if params is None else whole_path(Path(params)),
     }
+
+
+def _program_name(args: argparse.Namespace) -> str | None:
+    """The autopilot that the program of ``--autopilot`` is, as [flight] names it; None without the option."""
+    if getattr(args, "autopilot", None) is None:
+        return None
+    from flight.autopilots.catalog import program_autopilot
+
+    return program_autopilot(Path(args.autopilot)).name
 
 
 def flight_limits(args: argparse.Namespace) -> FlightLimits:

@@ -238,8 +238,8 @@ def test_the_model_flies_the_legs_of_the_longest_stretch_in_the_wind_of_the_log(
     flown, model = again.legs[0].ground_speed
     assert flown == pytest.approx(25.0, abs=0.1)
     assert model == pytest.approx(25.6 - 3.0, abs=0.5)
-    assert again.setup.parameters is not None
-    assert again.setup.parameters.wp_radius == 60.0
+    assert again.setup.autopilot.parameters is not None
+    assert again.setup.autopilot.parameters.wp_radius == 60.0
 
 
 def test_another_aircraft_stands_in_where_none_is_named(tmp_path: Path) -> None:

@@ -9,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_parameters, load_parameters
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.verdict.findings import Fact, Finding, make_finding, verdict_json
@@ -35,9 +38,10 @@ class Flights:
         self.count = 0
         self._passes = passes
 
-    def __call__(self, parameters: ArduPilotParameters) -> bool:
+    def __call__(self, law: Autopilot) -> bool:
+        assert isinstance(law, ArduPlane)
         self.count += 1
-        return self._passes(parameters)
+        return self._passes(law.parameters)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +50,7 @@ class Flights:
 )
 def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> None:
     flights = Flights(lambda new: new.tecs_height_demand_time <= most)
-    found = deciding_parameter(default_parameters(), (LOW, HEIGHTS), flights)
+    found = deciding_parameter(ArduPlane(default_parameters()), (LOW, HEIGHTS), flights)
     assert found is not None
     assert (found.name, found.current, found.passing, found.unit) == ("TECS_HDEM_TCONST", 3.0, passing, "s")
     assert (found.rule, found.place, found.off) == ("clearance", LEG, -8.4)
@@ -56,10 +60,10 @@ def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> 
 
 def test_what_failed_says_where_to_look_first() -> None:
     passes = Flights(lambda new: new.tecs_height_demand_time < 2.0 or new.navl1_period < 15.0)
-    found = deciding_parameter(default_parameters(), (LOW,), passes)
+    found = deciding_parameter(ArduPlane(default_parameters()), (LOW,), passes)
     assert found is not None
     assert found.name == "TECS_HDEM_TCONST"
-    found = deciding_parameter(default_parameters(), (WIDE,), passes)
+    found = deciding_parameter(ArduPlane(default_parameters()), (WIDE,), passes)
     assert found is not None
     assert (found.name, found.passing, found.off) == ("NAVL1_PERIOD", 14.0, 210.0)
 
@@ -73,16 +77,16 @@ def test_what_failed_says_where_to_look_first() -> None:
     ],
 )
 def test_both_ways(name: str, passes: Callable[[ArduPilotParameters], bool], passing: float) -> None:
-    found = deciding_parameter(default_parameters(), (WIDE,), passes)
+    found = deciding_parameter(ArduPlane(default_parameters()), (WIDE,), Flights(passes))
     assert found is not None
     assert (found.name, found.passing) == (name, passing)
 
 
 def test_none_where_none_decides() -> None:
     flights = Flights(lambda new: False)
-    assert deciding_parameter(default_parameters(), (WIDE,), flights) is None
+    assert deciding_parameter(ArduPlane(default_parameters()), (WIDE,), flights) is None
     assert flights.count == 8
-    assert deciding_parameter(default_parameters(), (HEIGHTS,), flights) is None
+    assert deciding_parameter(ArduPlane(default_parameters()), (HEIGHTS,), flights) is None
 
 
 def test_a_value_beyond_the_farthest_is_not_tried() -> None:
@@ -93,13 +97,13 @@ def test_a_value_beyond_the_farthest_is_not_tried() -> None:
         seen.append(new.tecs_height_demand_time)
         return False
 
-    assert deciding_parameter(quick, (LOW,), passes) is None
+    assert deciding_parameter(ArduPlane(quick), (LOW,), Flights(passes)) is None
     assert set(seen) == {1.0}
 
 
 def test_findings_that_pass_are_not_blamed() -> None:
     fine: Finding = make_finding("corridor", LEG, ok=True, reason="")
-    assert deciding_parameter(default_parameters(), (fine,), lambda new: True) is None
+    assert deciding_parameter(ArduPlane(default_parameters()), (fine,), lambda new: True) is None
 
 
 # ----------------------------------------------------------------------
@@ -123,7 +127,7 @@ def over_a_hill(spare: float) -> FlightSetup:
     made = setup_maker(AIRCRAFT)(
         points, terrain={"kind": "peaks", "peak": [peak]}, limits={"min_clearance_m": REQUIRED}
     )
-    return replace(made, parameters=load_parameters(AIRCRAFT))
+    return replace(made, autopilot=ArduPlane(load_parameters(AIRCRAFT)))
 
 
 @pytest.fixture(scope="module")
@@ -205,12 +209,12 @@ def test_nothing_is_looked_for_where_nothing_failed() -> None:
 
 
 def test_planflys_guidance_has_no_flight_beside_it() -> None:
-    setup = replace(over_a_hill(30.0), parameters=None)
+    setup = replace(over_a_hill(30.0), autopilot=PlanflyGuidance())
     judged = fly_and_judge(setup, load_airframe(setup.scenario), None)
     assert judged.reference is None
     assert [level.name for level in judged.verdict.levels] == ["geometry", "airframe"]
 
 
 def test_the_airframe_knows_where_it_is_whatever_the_autopilot_does() -> None:
-    lost = replace(over_a_hill(30.0), nav="gnss", parameters=default_parameters())
+    lost = replace(over_a_hill(30.0), nav="gnss", autopilot=ArduPlane(default_parameters()))
     assert airframe_answer(lost, AIRCRAFT) == airframe_answer(replace(lost, nav="perfect"), AIRCRAFT)

@@ -3,14 +3,19 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
+from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
 from flight.guidance.inner_loops import follow_roll, steer_elevator
-from flight.guidance.lateral import find_on_path
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
-from flight.guidance.path import Records, profile
+from flight.guidance.path import find_on_path, profile
+from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
 from world.geometry import wrap
-from world.kernels import Record, compiled, record_dtype
+from world.kernels import Record, Records, compiled, record_dtype
+from world.terrain import Heights
+
+Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
 # What ArduPlane's laws keep from tick to tick.
@@ -55,6 +60,9 @@ ARDUPILOT_MEMORY = record_dtype(
     "pitch_demand",  # rad, without the trim
     "throttle_demand",  # 0..1
 )
+# What it keeps in a `flight.simulation.tick.Workspace`.
+ARDUPLANE = record_dtype(("memory", ARDUPILOT_MEMORY), ("parameters", ARDUPILOT_PARAMETERS))
+ARDUPLANE_NUMBERS = ARDUPLANE.itemsize // 8
 
 
 # ----------------------------------------------------------------------
@@ -351,7 +359,7 @@ def _estimate_airspeed(
 
 
 @compiled
-def weigh_energies(
+def update_tecs(
     state: Record, estimated: Record, parameters: Record, own: Record, airspeed: float, factor: float, dt: float
 ) -> None:  # pragma: no cover - compiled
     """Throttle and pitch demands for the height demand and an airspeed (m/s, true), into `own`.
@@ -489,6 +497,24 @@ def true_by_equivalent(amsl: float) -> float:  # pragma: no cover - compiled
 
 
 @compiled
+def arduplane_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+    """One tick on the block of a `flight.simulation.tick.Workspace`: a key of its `ENDS`, or 0 to fly on."""
+    path_begins = WORKSPACE_NUMBERS + ARDUPLANE_NUMBERS
+    work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
+    own = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE)[0]
+    path: Record = block[path_begins:].view(PATH_ROW)
+    settings = work.settings
+    if not begin_tick(work, heights):
+        return NOT_A_NUMBER
+    fly_as_ardupilot(
+        work.state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
+        path.waypoint[: settings.waypoints], work.gains, work.memory, own.parameters, own.memory,
+        work.commands, work.timing.dt,
+    )  # fmt: skip
+    return end_tick(work)
+
+
+@compiled
 def fly_as_ardupilot(
     state: Record,
     estimated: Record,
@@ -506,8 +532,8 @@ def fly_as_ardupilot(
 
     parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
     own: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
-    The others are as `flight.guidance.lateral.guide` takes them; the path is what the track is measured against, and no
-    part of the law.
+    The others are as `flight.autopilots.planfly.law.guide` takes them; the path is what the track is measured against,
+    and no part of the law.
     """
     find_on_path(estimated, pieces, memory)
     memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
@@ -521,7 +547,7 @@ def fly_as_ardupilot(
         demand_height(estimated, waypoints[own.leg + 1], parameters, own, NAVIGATION_TICK)
         wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
         memory.speed_command = wanted * factor
-        weigh_energies(state, estimated, parameters, own, wanted * factor, factor, NAVIGATION_TICK)
+        update_tecs(state, estimated, parameters, own, wanted * factor, factor, NAVIGATION_TICK)
     _follow(state, estimated, gains, memory, parameters, own, factor, commands, dt)
 
 

@@ -7,15 +7,16 @@ that states a parameter counts: the file that a person gives, the file `ardupilo
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
+from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters
 from world.errors import ParameterError
 from world.files import TextLine, read_small_file, utf8_text
 from world.kernels import Record, record_dtype
@@ -28,8 +29,8 @@ Floats = NDArray[np.float64]
 #
 # QGroundControl writes five columns with tabs between: vehicle, component, name, value, type.  MAVProxy and ArduPilot's
 # own default files have a name and a value with blanks between, Mission Planner has a comma.  In all of them a `#`
-# begins
-# a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's, "Plain-Text File Format").
+# begins a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's, "Plain-Text File
+# Format").
 
 # A vehicle has some 1,500 parameters in lines of 40 bytes.
 MAX_BYTES = 4 * 2**20
@@ -122,8 +123,6 @@ def _shown(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:37] + "...")
 
 
-Origin = Literal["file", "aircraft", "default"]
-
 # Of an aircraft, beside its model: what ArduPlane has to be told of it.
 AIRCRAFT_FILE = "ardupilot.parm"
 
@@ -196,14 +195,6 @@ NOT_FLOWN = ("RTL_ALTITUDE", "RTL_RADIUS")
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 
-class ParameterValue(NamedTuple):
-    """A parameter's value in ArduPlane's unit, and who states it."""
-
-    name: str
-    value: float
-    origin: Origin
-
-
 @dataclass(frozen=True, slots=True)
 class ArduPilotParameters:
     """What ArduPlane flies with; all but the first three are those of `DEFINITIONS`, made of ``values``.
@@ -229,6 +220,7 @@ class ArduPilotParameters:
     rtl_altitude: m over home, negative for the present height.  rtl_radius: m, 0 for that of a loiter.
     """
 
+    not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN
     values: tuple[ParameterValue, ...]
     unused: tuple[str, ...] = ()
     source: str = ""
@@ -342,24 +334,62 @@ def parameters_of(text: str, source: str) -> ArduPilotParameters:
     return _parameters([("file", values)], source, unused)
 
 
-def stored_parameters(
-    values: Iterable[tuple[str, float, Origin]], unused: tuple[str, ...], source: str
-) -> ArduPilotParameters:
+def stored_parameters(stored: StoredParameters) -> ArduPilotParameters:
     """Parameters that were recorded, by their present names; those that were not yet known have their defaults.
 
     Raises ParameterError for a value that is not allowed.
 
-    >>> stored_parameters([("WP_RADIUS", 50.0, "file")], (), "a.parm").wp_radius
+    >>> stored_parameters(StoredParameters((ParameterValue("WP_RADIUS", 50.0, "file"),), (), "a.parm")).wp_radius
     50.0
     """
     origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
-    for name, value, origin in values:
+    for name, value, origin in stored.values:
         if name in _BY_NAME:
             definition, _ = _BY_NAME[name]
             if not definition.low <= value <= definition.high:
-                raise _refused(source, name, value, f"allowed {definition.low:g}..{definition.high:g}")
+                raise _refused(stored.source, name, value, f"allowed {definition.low:g}..{definition.high:g}")
             origins[origin][name] = value
-    return _parameters(list(origins.items()), source, unused)
+    return _parameters(list(origins.items()), stored.source, stored.unused)
+
+
+# What has to be in order.
+_PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
+
+
+def logged_parameters(logged: Mapping[str, float], source: str) -> tuple[ArduPilotParameters, tuple[str, ...]]:
+    """The parameters of a flight log, by their names of any release, and what could not be used of them, in sentences.
+
+    A log without parameters has ArduPlane's defaults, and says so.  source: the log's file.
+
+    >>> made, notes = logged_parameters({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
+    >>> made.by_origin("file"), notes
+    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is taken',))
+    """
+    values: dict[str, float] = {}
+    notes = []
+    for definition in DEFINITIONS.values():
+        old = definition.old
+        if definition.name in logged:
+            value = logged[definition.name]
+        elif old is not None and old[0] in logged:
+            value = logged[old[0]] * old[1]
+        else:
+            continue
+        if definition.low <= value <= definition.high:
+            values[definition.name] = value
+        else:
+            notes.append(f"{definition.name} {value:g} of the log is not allowed: the default is taken")
+    for least, most in _PAIRS:
+        if least in values and most in values and values[least] >= values[most]:
+            notes.append(f"{least} {values[least]:g} and {most} {values[most]:g} of the log: the defaults are taken")
+            del values[least], values[most]
+    if not values:
+        notes.append("the log holds no parameters: ArduPlane's defaults are taken")
+    stated = tuple(ParameterValue(name, value, "file") for name, value in values.items())
+    try:
+        return stored_parameters(StoredParameters(stated, (), source)), tuple(notes)
+    except ParameterError as error:
+        return default_parameters(), (*notes, f"{error}: ArduPlane's defaults are taken")
 
 
 def _parameters(
@@ -382,7 +412,7 @@ def _parameters(
 def _check_order(made: ArduPilotParameters, source: str) -> None:
     """Refuse a least that is not below its most."""
     values = {name: value for name, value, _ in made.values}
-    for least, most in (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX")):
+    for least, most in _PAIRS:
         if values[least] >= values[most]:
             value, allowed = values[least], f"must be below {most} {values[most]:g}"
             message = f"{source}: {least} {value:g}: {allowed}"
@@ -418,6 +448,23 @@ def _refused(where: TextLine | str, name: str, value: float, allowed: str) -> Pa
     """The error of a value.  where: its line; of one that was recorded, the source, which the message does not name."""
     at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
     return ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)
+
+
+# ----------------------------------------------------------------------
+# Parameters that may decide a flight that fails, with the steps and ranges of the parameter reference.
+
+HEIGHT_CANDIDATES = (
+    Candidate("TECS_HDEM_TCONST", 0.2, 1.0, "s"),
+    Candidate("TECS_CLMB_MAX", 0.5, 10.0, "m/s"),
+    Candidate("TECS_SINK_MAX", 0.5, 10.0, "m/s"),
+    Candidate("TECS_TIME_CONST", 0.2, 3.0, "s"),
+)
+SIDE_CANDIDATES = (
+    Candidate("NAVL1_PERIOD", 1.0, 10.0, "s"),
+    Candidate("WP_RADIUS", 5.0, 30.0, "m"),
+    Candidate("WP_RADIUS", 5.0, 150.0, "m"),
+    Candidate("ROLL_LIMIT_DEG", 1.0, 60.0, "deg"),
+)
 
 
 # ----------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""A flight that a real autopilot steers, as a program of its own in lockstep with our physics."""
+"""A flight that ArduPlane itself steers, as a program of its own in lockstep with our physics."""
 
 import contextlib
 import math
@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
+from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.arduplane_sitl.link import AutopilotLink
 from flight.autopilots.arduplane_sitl.physics import (
     FRAME_HZ,
@@ -29,24 +31,23 @@ from flight.autopilots.arduplane_sitl.process import (
     check_binary,
     person_parameters,
 )
+from flight.autopilots.autopilot import AutopilotProgram
 from flight.guidance.gains import load_gains
-from flight.guidance.navigation_error import navigate
-from flight.guidance.path import Records, profile, project
-from flight.simulation.airborne import Airborne, Ground
-from flight.simulation.setup import AutopilotProgram, FlightSetup
+from flight.guidance.path import profile, project
+from flight.simulation.airborne import Ground, ProgramFlight
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Progress, SimulatedFlight, Sink, fly_to_end
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
     WORKSPACE,
     WORKSPACE_NUMBERS,
-    finish_tick,
-    flight_status,
-    sense,
+    begin_tick,
+    end_tick,
 )
 from world.errors import FlightError
 from world.frames import to_geo
-from world.kernels import Record, compiled
+from world.kernels import Record, Records, compiled
 from world.terrain import Heights
 
 Floats = NDArray[np.float64]
@@ -62,7 +63,7 @@ _AHEAD = 4
 
 @compiled
 def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
-    """Do a tick on the block of a `flight.simulation.tick.Workspace`, as `flight.simulation.tick.tick` does.
+    """Do a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
     The commands that stand in it are the other program's.  The flight completes where it passes the end of the path,
     once the program says that it has nothing before it but that.
@@ -70,13 +71,8 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
     settings, memory = work.settings, work.memory
-    if not sense(work, heights):
+    if not begin_tick(work, heights):
         return NOT_A_NUMBER
-    noise = work.noise[work.timing.row].navigation
-    navigate(
-        work.true, work.estimated, work.navigation, noise, settings.navigation_sigma, settings.navigation_time,
-        work.timing.dt,
-    )  # fmt: skip
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
     if settings.on_last_leg:
@@ -84,8 +80,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
         memory.done = beyond >= 0.0
         if memory.done:
             memory.cross_track = across
-    finish_tick(work)
-    return flight_status(work)
+    return end_tick(work)
 
 
 @compiled
@@ -125,12 +120,11 @@ RUN_IN, RUN_IN_SECONDS = 500.0, 20.0
 _LOST = 40.0
 
 
-class AutopilotFlight(Airborne):
-    """One flight of a real autopilot; a context manager, after which its program and its files are gone.
+class AutopilotFlight(ProgramFlight):
+    """One flight of ArduPlane itself; a context manager, after which its program and its files are gone.
 
     binary: its program.
     own: a person's parameters, by ArduPlane's names; None takes those of the scenario's file.
-    setup: with the program that flies it.
 
     The track begins where the aircraft passes the first waypoint, and the turbulence with it, as in our own flights.
     Before that it flies `RUN_IN` m straight and level in the mean wind, and before that it stands on a rail.  It takes
@@ -144,6 +138,8 @@ class AutopilotFlight(Airborne):
         self, setup: FlightSetup, aircraft: Aircraft, binary: Path, own: Mapping[str, float] | None = None
     ) -> None:
         self._binary = binary
+        autopilot = ArduPlaneSitl(_parameters(setup, aircraft), binary=binary)
+        setup = replace(setup, autopilot=autopilot)
         digest = check_binary(binary)
         servos = load_servo_map(aircraft)
         given = autopilot_parameters(setup, aircraft, servos, person_parameters(setup) if own is None else own)
@@ -165,7 +161,8 @@ class AutopilotFlight(Airborne):
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._mistake_place()
             self._converse(self._preflight.meet(given.given))
-            self.setup = replace(setup, program=_program(self._link, digest, given))
+            program = _program(self._link, digest, given)
+            self.setup = replace(setup, autopilot=replace(autopilot, program=program))
             self._stack = stack.pop_all()
 
     def __enter__(self) -> "AutopilotFlight":
@@ -275,6 +272,12 @@ class AutopilotFlight(Airborne):
         except FlightError:
             return False
         return True
+
+
+def _parameters(setup: FlightSetup, aircraft: Aircraft) -> ArduPilotParameters:
+    """The parameters of a setup's ArduPlane; the aircraft's, where another autopilot was to fly."""
+    made = setup.autopilot.parameters
+    return made if isinstance(made, ArduPilotParameters) else load_parameters(aircraft)
 
 
 def _program(link: AutopilotLink, digest: str, given: AutopilotParameters) -> AutopilotProgram:

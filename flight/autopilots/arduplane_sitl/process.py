@@ -278,4 +278,5 @@ def person_parameters(setup: FlightSetup) -> dict[str, float]:
         return {}
     old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     stated = {name: entry.value for name, entry in read_parameter_file(Path(file)).items() if name not in old}
-    return stated | ({} if setup.parameters is None else setup.parameters.by_origin("file"))
+    parameters = setup.autopilot.parameters
+    return stated | ({} if parameters is None else parameters.by_origin("file"))

@@ -208,7 +208,7 @@ def judge_field_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verd
     failed = any(item.ok is False for item in findings)
     flyable = bool(flown) and not failed
     complete = findings[-1].ok is True
-    own = LevelAnswer("airframe" if setup.parameters is None else "autopilot", flyable, headline(findings, flyable))
+    own = LevelAnswer(setup.autopilot.level, flyable, headline(findings, flyable))
     lines = field_lines(findings, setup, own, flown)
     return Verdict(
         findings,
@@ -219,7 +219,7 @@ def judge_field_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verd
         levels=(own,),
         notes=setup.route.notes,
         leg_ends=_leg_ends(setup, flown),
-        parameters=setup.parameters,
+        parameters=setup.autopilot.parameters,
     )
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.law import true_by_equivalent, turn_distance
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
@@ -48,12 +47,9 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
     tolerance = position_error(setup) + CLOSER[setup.scenario.wind.turbulence]
     if stated > 0.0:
         return Reach(stated, "mission", tolerance)
-    if setup.parameters is not None:
-        factor = float(true_by_equivalent(float(requirements.points[i, 2])))
+    if not setup.autopilot.follows_path:
         turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
-        return Reach(
-            float(turn_distance(0.0, turn, setup.parameters.wp_radius, math.inf, factor)), "autopilot", tolerance
-        )
+        return Reach(setup.autopilot.turn_distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance)
     return Reach(own, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
 
 
@@ -84,7 +80,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     turning = float(corner_depths(requirements)[leg : leg + 2].max()) + PASS
     if turning > half:
         return turning, "fly-by path"
-    return half, "default" if requirements.setup.parameters is None else "autopilot"
+    return half, "default" if requirements.setup.autopilot.follows_path else "autopilot"
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:

@@ -19,7 +19,6 @@ from aircraft.path_limits import (
     roll_reversal_length,
     turn_radius_between,
 )
-from flight.autopilots.arduplane.law import true_by_equivalent
 from flight.guidance.path import FlyByPath, path_polyline
 from flight.mission.fences import fence_zones
 from flight.mission.route import Route
@@ -346,20 +345,21 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 def true_route(setup: FlightSetup) -> Route:
     """A setup's route with true airspeeds.  ArduPlane flies equivalent ones: each leg's counts at its middle height.
 
+    >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import default_parameters
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
     >>> true_route(setup) is setup.route
     True
-    >>> faster = true_route(replace(setup, parameters=default_parameters()))
+    >>> faster = true_route(replace(setup, autopilot=ArduPlane(default_parameters())))
     >>> bool((faster.airspeed > setup.route.airspeed).all())
     True
     """
     route = setup.route
-    if setup.parameters is None:
+    if not setup.autopilot.equivalent_airspeeds:
         return route
     middle = 0.5 * (route.waypoints[1:, 2] + route.waypoints[:-1, 2])
-    return replace(route, airspeed=route.airspeed * [float(true_by_equivalent(up)) for up in middle])
+    return replace(route, airspeed=route.airspeed * [setup.autopilot.airspeed_factor(up) for up in middle])
 
 
 def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:

@@ -5,7 +5,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.parameters import takes_speed
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import measure_ability, steady_rows
@@ -82,12 +81,13 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
 
 
 def _not_taken(requirements: RouteRequirements, asked: float) -> list[str]:
-    """That ArduPlane does not take a commanded speed (m/s, equivalent)."""
-    parameters = requirements.setup.parameters
-    if parameters is None or takes_speed(asked, parameters):
+    """That the autopilot does not take a commanded speed (m/s)."""
+    autopilot = requirements.setup.autopilot
+    limits = autopilot.speed_limits
+    if limits is None or limits.min <= asked <= limits.max:
         return []
-    least, most = parameters.airspeed_min, parameters.airspeed_max
-    return [f"ArduPlane takes speeds from AIRSPEED_MIN {least:g} to AIRSPEED_MAX {most:g} m/s, and ignores this one"]
+    taken = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
+    return [f"{autopilot.title} takes speeds from {taken}, and ignores this one"]
 
 
 def _no_room(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:

@@ -196,7 +196,7 @@ def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) ->
     # Guidance's own limit: a corner sharper than it has no arc to be held to where its legs are short.
     least = fly_by_offset(turn, tightest) if turn < SHARPEST else math.inf
     # Another's autopilot does not follow the arc, and passes the waypoint as closely as it likes.
-    followed = setup.guidance == "path" and setup.source is None and not setup.route.fly_over[i]
+    followed = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
     if measure.passed is None or not math.isfinite(least) or not followed:
         return []
     tolerance = CLOSER_SHARE * least + CLOSER[setup.scenario.wind.turbulence]

@@ -35,8 +35,9 @@ def _planned(requirements: RouteRequirements, i: int) -> Finding:
     faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
-    elif requirements.setup.parameters is not None:
-        fact = f"ArduPlane turns to the next leg {near.radius:.0f} m before it, or where it is past it"
+    elif not requirements.setup.autopilot.follows_path:
+        title = requirements.setup.autopilot.title
+        fact = f"{title} turns to the next leg {near.radius:.0f} m before it, or where it is past it"
     elif offset > near.radius + ROUNDING:
         turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
         faults.append(
@@ -55,7 +56,7 @@ def _planned(requirements: RouteRequirements, i: int) -> Finding:
         limit=near.radius,
         source=near.source,
         tolerance=ROUNDING,
-        margin=near.radius - offset if requirements.setup.parameters is None else None,
+        margin=near.radius - offset if requirements.setup.autopilot.follows_path else None,
         unit="m",
         method="the fly-by arc",
     )
@@ -70,7 +71,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
         away, off = _closest(requirements, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", off, "m"),)
         ok = away <= most
-        beside = math.inf if ok or setup.parameters is None else _beside(requirements, aligned, i)
+        beside = math.inf if ok or setup.autopilot.follows_path else _beside(requirements, aligned, i)
         if beside <= setup.corridor:
             ok = True
         reason = f"passed at {away:.1f} m, {abs(off):.1f} m {'above' if off >= 0.0 else 'below'}"

@@ -242,7 +242,8 @@ def px4_log_bytes(log: FlightLog) -> bytes:
     for key, value in (("sys_name", "planfly"), ("ver_hw", "SITL"), ("sys_uuid", "planfly")):
         name = f"char[{len(value)}] {key}".encode()
         head += _message(b"I", bytes([len(name)]) + name + value.encode())
-    for parameter in () if log.setup.parameters is None else log.setup.parameters.values:
+    parameters = log.setup.autopilot.parameters
+    for parameter in () if parameters is None else parameters.values:
         name = f"float {parameter.name}".encode()
         head += _message(b"P", bytes([len(name)]) + name + struct.pack("<f", parameter.value))
     for number, topic in enumerate(topics):

@@ -160,7 +160,7 @@ def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[
         ("seed", str(a.seed), str(b.seed)),
         ("mission", a.mission_text, b.mission_text),
         ("wind", _wind(a), _wind(b)),
-        ("guidance", a.guidance, b.guidance),
+        ("guidance", a.autopilot.store().guidance, b.autopilot.store().guidance),
         ("navigation", a.nav, b.nav),
     ):
         if left != right:

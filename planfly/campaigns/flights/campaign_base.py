@@ -11,7 +11,6 @@ import numpy as np
 
 from aircraft.catalog import model_hash
 from aircraft.path_limits import Limits
-from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import straight
 from flight.mission.from_plan import plan_mission
@@ -19,7 +18,7 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
-from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.airframe import Airframe, choose_seed, load_airframe, with_tracking
 from planfly.campaigns.spread.draws import Draw
 from planfly.campaigns.spread.spread_file import FlightSpread, SpreadError
 from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission
@@ -66,7 +65,7 @@ class CampaignBase:
             mission_text(self.mission, "waypoints"),
             repr(self.mission.fences),
             model_hash(model),
-            repr(self.airframe.parameters),
+            repr(self.airframe.autopilot.parameters),
             json.dumps(self.spread.to_json(), sort_keys=True),
             str(self.seed),
         )
@@ -225,10 +224,4 @@ def _limits(airframe: Airframe, scenario: Scenario) -> Limits:
     """The airframe's limits in another wind."""
     old = airframe.limits
     limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
-    if airframe.parameters is None:
-        return replace(limits, tracking=old.tracking)
-    table, turbulence = scenario.flight, scenario.wind.turbulence
-    tracking = tracking_error(
-        airframe.parameters, old.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=turbulence
-    )
-    return replace(limits, tracking=tracking)
+    return with_tracking(limits, airframe.autopilot, scenario)

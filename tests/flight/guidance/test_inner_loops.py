@@ -9,21 +9,12 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.envelope import GRAVITY
+from flight.autopilots.planfly.law import CROSS_TRACK, L1, LAWS, VECTOR_FIELD, steer_bank, steer_height
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.gains import Gains, load_gains
-from flight.guidance.inner_loops import (
-    ARDUPILOT,
-    CROSS_TRACK,
-    GUIDANCE_MEMORY,
-    L1,
-    VECTOR_FIELD,
-    roll_model,
-    steer_bank,
-    steer_height,
-)
+from flight.guidance.inner_loops import GUIDANCE_MEMORY, roll_model
 from flight.guidance.navigation_error import MOTION
 from flight.guidance.path import NODE
-from flight.simulation.simulate import LAWS
 from world.kernels import Record, field_names
 from world.scenario_tables import FlightTable, Guidance
 
@@ -32,7 +23,6 @@ def test_every_law_of_a_scenario_has_its_number() -> None:
     assert set(LAWS) == set(get_args(Guidance))
     assert sorted(LAWS.values()) == sorted({CROSS_TRACK, L1, VECTOR_FIELD})
     assert (LAWS["l1"], LAWS["vector-field"]) == (L1, VECTOR_FIELD)
-    assert ARDUPILOT not in LAWS.values()
 
 
 def test_a_fresh_memory_steers_by_the_default_law_from_the_paths_beginning() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.lateral_reference_laws import (
     WAYPOINT,
     field_course,
@@ -75,7 +76,7 @@ def test_the_field_points_to_its_path() -> None:
 def test_a_reference_law_flies_the_mission(make_setup: MakeSetup, aerosonde: Aircraft, law: str) -> None:
     way = [[0, 0, 500], [0, 1500, 520], [1000, 2500, 520], [1000, 4000, 500]]
     setup = make_setup(way, wind=(5.0, 70.0))
-    flown = simulate(replace(setup, guidance=law), aerosonde)
+    flown = simulate(replace(setup, autopilot=PlanflyGuidance(law)), aerosonde)
     ours = simulate(setup, aerosonde)
     assert flown.ended == "completed"
     assert 0.3 < float(np.abs(flown.track.cross_track).max()) < 40.0

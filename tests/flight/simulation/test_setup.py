@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from aircraft.path_limits import Limits
-from flight.simulation.setup import AutopilotProgram, Damage, ImportedLog, make_limits
+from flight.autopilots.autopilot import AutopilotProgram
+from flight.simulation.setup import Damage, ImportedLog, make_limits
 from tests.setups import falling_envelope, route_along, setup_along, small_scenario
 from world.wind import Wind
 

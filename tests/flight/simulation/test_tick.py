@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flight.autopilots.planfly.law import planfly_tick
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.path import NODE, PIECE, FlyByPath
 from flight.simulation.tick import (
@@ -22,7 +23,6 @@ from flight.simulation.tick import (
     READ_FIELDS,
     STALLED,
     Workspace,
-    tick,
 )
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE
 from tests.flight.simulation.hand_made import (
@@ -144,7 +144,7 @@ def read(space: Workspace, east: float = 0.0, north: float = 1000.0, up: float =
 def status_of(**readings: float) -> int:
     space = make_workspace()
     read(space, **readings)
-    return tick(space.array, space.path, level_ground())
+    return planfly_tick(space.block, level_ground())
 
 
 def ticked(readings: dict[str, float] | None = None, **settings: Any) -> Workspace:
@@ -153,7 +153,7 @@ def ticked(readings: dict[str, float] | None = None, **settings: Any) -> Workspa
     for name, value in settings.items():
         setattr(space.record, name, value)
     read(space, **(readings or {}))
-    assert tick(space.array, space.path, level_ground()) == 0
+    assert planfly_tick(space.block, level_ground()) == 0
     return space
 
 
@@ -167,7 +167,7 @@ def test_steady_flight_goes_on() -> None:
 def test_a_reading_that_is_no_number_ends_the_flight(name: str, value: float) -> None:
     space = make_workspace()
     read(space, **{name: value})
-    assert tick(space.array, space.path, level_ground()) == NOT_A_NUMBER
+    assert planfly_tick(space.block, level_ground()) == NOT_A_NUMBER
     # Nothing of it gets into the track, what is flown with, or guidance's memory.
     assert (int(space.rows_filled[0]), int(space.ticks_flown[0])) == (0, 0)
     assert np.isfinite(space.output).all()
@@ -207,7 +207,7 @@ def test_a_flight_ends_just_beyond_each_limit_and_not_just_within(readings: dict
 def test_the_last_row_shows_how_the_flight_ended() -> None:
     space = make_workspace()
     read(space, up=GROUND_AMSL - 3.0)
-    assert tick(space.array, space.path, level_ground()) == GROUND
+    assert planfly_tick(space.block, level_ground()) == GROUND
     assert int(space.rows_filled[0]) == 1
     assert space.rows[0].clearance == pytest.approx(-3.0)
 
@@ -223,7 +223,7 @@ def test_unknown_ground_ends_nothing_and_the_last_known_one_stays() -> None:
     space = make_workspace()
     read(space, up=50.0)
     nowhere = level_ground(math.nan)
-    assert tick(space.array, space.path, nowhere) == 0
+    assert planfly_tick(space.block, nowhere) == 0
     assert math.isnan(space.rows[0].clearance)
     assert space.record.output.ground == GROUND_AMSL
 
@@ -252,7 +252,7 @@ def test_time_and_energy_add_up_tick_by_tick() -> None:
     space = make_workspace()
     for k in range(3):
         read(space, north=1000.0 + k, power=720.0)
-        assert tick(space.array, space.path, level_ground()) == 0
+        assert planfly_tick(space.block, level_ground()) == 0
     assert space.rows["time"][:3] == pytest.approx([0.0, DT, 2.0 * DT])
     # 720 W are 0.2 Wh a second.
     assert space.rows["energy"][:3] == pytest.approx([0.2 * DT, 0.4 * DT, 0.6 * DT])
@@ -266,7 +266,7 @@ def test_a_flight_ends_when_all_that_it_carries_is_used() -> None:
     statuses = []
     for k in range(3):
         read(space, north=1000.0 + k, power=720.0)
-        statuses.append(tick(space.array, space.path, level_ground()))
+        statuses.append(planfly_tick(space.block, level_ground()))
     assert statuses == [0, 0, EMPTY]
 
 
@@ -274,7 +274,7 @@ def test_readings_come_to_si_by_their_factors() -> None:
     space = make_workspace()
     space.record.state_factors.airspeed, space.record.state_factors.roll = 0.3048, 2.0
     read(space, airspeed=100.0, roll=0.1)
-    assert tick(space.array, space.path, level_ground()) == 0
+    assert planfly_tick(space.block, level_ground()) == 0
     assert space.rows[0].airspeed == pytest.approx(30.48)
     assert space.rows[0].attitude[0] == pytest.approx(0.2)
 
@@ -287,7 +287,7 @@ def test_outputs_are_scaled_each_by_its_own_factor_above_and_below_zero(name: st
         space.record.air.gust_down, space.record.memory.trim_throttle = -0.5, 0.6
         space.record.scale_above[name], space.record.scale_below[name] = above, below
         read(space, roll=0.2, up=HEIGHT + 3.0, pitch_rate=0.1)
-        tick(space.array, space.path, level_ground())
+        planfly_tick(space.block, level_ground())
         return {key: float(space.record.output[key]) for key in field_names(OUTPUT)}
 
     plain, scaled = outputs(above=1.0, below=1.0), outputs(above=3.0, below=7.0)
@@ -302,7 +302,7 @@ def test_the_wind_blows_where_it_goes_and_the_next_row_shows_it() -> None:
     space.record.wind = (5.0, 0.6, 0.8, 0.02, 400.0, 0.0)
     for _ in range(2):
         read(space)
-        assert tick(space.array, space.path, level_ground()) == 0
+        assert planfly_tick(space.block, level_ground()) == 0
     output = space.record.output
     assert (output.gust_north, output.gust_east, output.gust_down) == pytest.approx((4.2, 5.6, 0.0))
     assert space.rows[1].wind.tolist() == pytest.approx([5.6, 4.2, 0.0])
@@ -314,7 +314,7 @@ def test_where_true_north_is_the_maps_east_all_is_turned() -> None:
     space.record.wind = (7.0, 1.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(2):
         read(space, velocity_east=3.0, yaw=0.1)
-        assert tick(space.array, space.path, level_ground()) == 0
+        assert planfly_tick(space.block, level_ground()) == 0
     row = space.rows[1]
     # True north 25 and east 3 are the map's east and south; a true heading of 0.1 is a map course of 90 degrees more.
     assert row.velocity.tolist() == pytest.approx([25.0, -3.0, 0.0])
@@ -328,5 +328,5 @@ def test_a_flight_goes_on_across_the_180th_meridian() -> None:
     space = make_workspace()
     space.record.settings.middle = math.pi
     read(space, longitude=-math.pi + 1e-4)
-    tick(space.array, space.path, level_ground(math.nan))
+    planfly_tick(space.block, level_ground(math.nan))
     assert space.rows[0].position[0] == pytest.approx(RADIUS * (math.pi + 1e-4))

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from flight.simulation.tick import READ_FIELDS, Workspace, tick
+from flight.autopilots.planfly.law import planfly_tick
+from flight.simulation.tick import READ_FIELDS, Workspace
 from tests.flight.simulation.hand_made import HEIGHT, RADIUS, level_ground, make_workspace
 
 
@@ -30,7 +31,7 @@ def two_ticks(**readings: float) -> Workspace:
     }
     for _ in range(2):
         space.readings[:] = list((values | readings).values())
-        assert tick(space.array, space.path, level_ground()) == 0
+        assert planfly_tick(space.block, level_ground()) == 0
     return space
 
 

@@ -13,10 +13,13 @@ from mcap.reader import make_reader
 
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.autopilot import AutopilotProgram
 from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
-from flight.simulation.setup import AutopilotProgram, FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording import setup_attachments
 from logs.recording.reader import read_log
@@ -99,10 +102,10 @@ def test_the_setup_comes_back_whole(tmp_path: Path, track: Track, with_plan: boo
 def test_the_real_autopilot_that_flew_comes_back(tmp_path: Path, track: Track) -> None:
     given, changed = {"NAVL1_PERIOD": 15.0, "WP_RADIUS": 90.5}, {"NAVL1_PERIOD": 15.0}
     program = AutopilotProgram("ArduPlane V4.6.0 (0badc0de)", "ab" * 32, given, changed, ("FOO",))
-    setup = dataclasses.replace(make_setup(), program=program)
+    setup = dataclasses.replace(make_setup(), autopilot=ArduPlaneSitl(default_parameters(), program))
     log = read_log(record(tmp_path / "a.mcap", setup, track))
-    assert log.setup.program == program
-    assert read_log(record(tmp_path / "b.mcap", make_setup(), track)).setup.program is None
+    assert log.setup.autopilot.program == program
+    assert read_log(record(tmp_path / "b.mcap", make_setup(), track)).setup.autopilot.program is None
 
 
 def test_no_field_of_a_setup_is_left_behind() -> None:
@@ -110,7 +113,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     # out of its other fields, it works out again; the room that plans keep for an autopilot is no flight's.
     kinds = (FlightSetup, Limits, Mission, Route, Envelope)
     names = {kind: [item.name for item in dataclasses.fields(kind) if item.init] for kind in kinds}
-    assert len(names[FlightSetup]) == 16
+    assert len(names[FlightSetup]) == 14
     assert len(names[Limits]) == 9
     assert len(names[Mission]) == 7
     assert len(names[Route]) == 11
@@ -120,22 +123,22 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
 
 def test_arduplanes_parameters_come_back_with_who_states_them(tmp_path: Path, track: Track) -> None:
     parameters = parameters_of("NAVL1_PERIOD 16.3\nLIM_ROLL_CD 3210\nFS_LONG_ACTN 0\n", "mine.parm")
-    setup = dataclasses.replace(make_setup(with_plan=False), parameters=parameters, nav="gnss")
+    setup = dataclasses.replace(make_setup(with_plan=False), autopilot=ArduPlane(parameters), nav="gnss")
     log = read_log(record(tmp_path / "a.mcap", setup, track))
-    assert log.setup.parameters == parameters
+    assert log.setup.autopilot.parameters == parameters
     same(log.setup, setup)
 
 
 def test_a_log_of_before_there_were_parameters_was_flown_by_guidance(tmp_path: Path, track: Track) -> None:
     attachments = altered(make_setup(with_plan=False), lambda data: data.pop("parameters"))
-    assert unpack_setup(attachments, "old.mcap").setup.parameters is None
+    assert unpack_setup(attachments, "old.mcap").setup.autopilot.parameters is None
 
 
 def test_a_parameter_that_is_not_allowed_is_refused() -> None:
     def change(data: dict[str, Any]) -> None:
         data["parameters"]["values"]["WP_RADIUS"] = -5.0
 
-    setup = dataclasses.replace(make_setup(with_plan=False), parameters=default_parameters())
+    setup = dataclasses.replace(make_setup(with_plan=False), autopilot=ArduPlane(default_parameters()))
     with pytest.raises(LogError, match=r"setup.json: parameters.values: WP_RADIUS: -5: allowed"):
         unpack_setup(altered(setup, change), "a.mcap")
 

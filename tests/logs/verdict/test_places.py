@@ -6,8 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters
-from flight.simulation.setup import AutopilotProgram, FlightSetup
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.autopilot import AutopilotProgram
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.places import (
@@ -61,7 +65,7 @@ DECIDING = DecidingParameter("NAVL1_PERIOD", 17.0, 14.0, "s", "corridor", leg(1)
 
 @pytest.fixture(scope="module")
 def autopilot() -> FlightSetup:
-    return replace(make_setup(STRAIGHT, limits={"corridor_m": 60.0}), parameters=default_parameters())
+    return replace(make_setup(STRAIGHT, limits={"corridor_m": 60.0}), autopilot=ArduPlane(default_parameters()))
 
 
 def aside(setup: FlightSetup, metres: float, reference: ReferenceFlights | None) -> Verdict:
@@ -70,7 +74,7 @@ def aside(setup: FlightSetup, metres: float, reference: ReferenceFlights | None)
 
 
 def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> None:
-    ideal = replace(autopilot, parameters=None)
+    ideal = replace(autopilot, autopilot=PlanflyGuidance())
     asked = {
         ("geometry",): judge_geometry(ideal),
         ("geometry", "airframe"): aside(ideal, 0.0, None),
@@ -113,7 +117,7 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
 
 def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:
     program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0" * 64, {}, {})
-    real = replace(autopilot, program=program)
+    real = replace(autopilot, autopilot=ArduPlaneSitl(default_parameters(), program))
     said = aside(real, 70.0, ReferenceFlights(PASSED, DECIDING)).lines[1]
     assert said.endswith(f"cannot: {deciding_text(DECIDING)}, by the flight of its law")
     assert aside(real, 70.0, ReferenceFlights(PASSED)).lines[1].endswith("with these parameters cannot")
@@ -148,7 +152,7 @@ def test_words_of_a_deciding_parameter(rule: str, off: float | None, text: str) 
 
 
 def test_a_flight_that_never_began_fails_its_own_level_and_not_geometry(autopilot: FlightSetup) -> None:
-    for setup, name in ((autopilot, "autopilot"), (replace(autopilot, parameters=None), "airframe")):
+    for setup, name in ((autopilot, "autopilot"), (replace(autopilot, autopilot=PlanflyGuidance()), "airframe")):
         verdict = judge_flight(setup, fly_path(setup).rows(0, 0), "not started: no way made")
         assert [(level.name, level.flyable) for level in verdict.levels] == [("geometry", True), (name, False)]
         assert verdict.headline == verdict.levels[-1].headline

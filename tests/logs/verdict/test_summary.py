@@ -3,11 +3,11 @@
 from dataclasses import replace
 from xml.etree import ElementTree
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
-from flight.simulation.setup import AutopilotProgram
 from logs.verdict.findings import RULES, Finding, Verdict, make_finding, message
 from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
-from logs.verdict.summary import flown_by, headline, summary_lines, verdict_html
+from logs.verdict.summary import headline, summary_lines, verdict_html
 from tests.logs.verdict.judging import leg, missile, waypoint
 from tests.synthetic import make_setup
 
@@ -67,28 +67,17 @@ def test_a_take_off_or_a_landing_that_was_not_judged_is_named_too() -> None:
     assert headline([make_finding("takeoff", waypoint(1), ok=True, reason="")], True) == "flyable"
 
 
-def test_a_real_autopilot_is_named_by_its_version_its_digest_and_what_was_changed() -> None:
-    setup, given = make_setup([[0, 0, 300], [0, 2000, 300]]), {f"P{k}": float(k) for k in range(40)}
-    program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0826d539" + "e" * 56, given, {"P1": 1.0, "P2": 2.5})
-    assert flown_by(replace(setup, program=program)) == (
-        "ArduPlane V4.6.0-dev (7fbc1660) (sha256 0826d539...), 40 parameters set for aerosonde, changed: P1 1, P2 2.5"
-    )
-    assert flown_by(replace(setup, program=replace(program, changed={}))).endswith("changed: none")
-    # No more than eight by name.
-    assert flown_by(replace(setup, program=replace(program, changed=given))).endswith("P6 6, P7 7, +32 more")
-
-
 def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     setup = replace(make_setup([[0, 0, 300], [0, 2000, 300]]), nav="gnss")
     levels = (LevelAnswer("autopilot", True, "flyable"),)
-    lines = summary_lines([], replace(setup, parameters=default_parameters()), "flown", levels)
+    lines = summary_lines([], replace(setup, autopilot=ArduPlane(default_parameters())), "flown", levels)
     assert (
         "Flown by: ArduPlane's law with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
         " TECS_HDEM_TCONST 3 s); navigation with GNSS's error (1.5 m on each axis)"
     ) in lines
     assert not [line for line in lines if line.startswith("Parameters")]
     mine = parameters_of("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
-    lines = summary_lines([], replace(setup, parameters=mine), "flown", levels)
+    lines = summary_lines([], replace(setup, autopilot=ArduPlane(mine)), "flown", levels)
     assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
     known = len(mine.values) - 1
     assert (
@@ -96,7 +85,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
     returns = parameters_of("RTL_RADIUS 80\nALT_HOLD_RTL 12000\n", "mine.parm")
-    lines = summary_lines([], replace(setup, parameters=returns), "flown", levels)
+    lines = summary_lines([], replace(setup, autopilot=ArduPlane(returns)), "flown", levels)
     assert any(line.endswith("defaults; read, not flown: RTL_ALTITUDE, RTL_RADIUS") for line in lines)
 
 

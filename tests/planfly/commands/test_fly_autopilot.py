@@ -44,9 +44,9 @@ def test_a_flight_is_logged_judged_and_judged_again(
     assert (tmp_path / "f.BIN").read_bytes() == b"\xa3\x95fake"
     recorded = read_log(log)
     assert recorded.ended == "completed"
-    assert recorded.setup.program is not None
-    assert recorded.setup.program.unused == ("SERVO1_MIN",)
-    assert recorded.setup.parameters is not None
+    assert recorded.setup.autopilot.program is not None
+    assert recorded.setup.autopilot.program.unused == ("SERVO1_MIN",)
+    assert recorded.setup.autopilot.parameters is not None
     again = tmp_path / "again.json"
     assert main(["check", str(log), "--json", str(again)]) == code
     assert json.loads(again.read_text(encoding="utf-8")) == recorded.recorded_verdict

@@ -12,6 +12,7 @@ import pytest
 from aircraft.catalog import Aircraft
 from aircraft.envelope import GRAVITY
 from benchmarks.against_arduplane import BINARY, compare, flown_figures
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.law import (
     AIRSPEED_READING,
     ARDUPILOT_MEMORY,
@@ -22,7 +23,7 @@ from flight.autopilots.arduplane.law import (
     roll_demand,
     true_by_equivalent,
     turn_distance,
-    weigh_energies,
+    update_tecs,
 )
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
 from flight.mission_files.formats import parse_mission
@@ -132,7 +133,7 @@ def test_what_cannot_be_followed_waits(held: int) -> None:
 
 
 def weighed(own: Record, seen: Record, at: Record, **values: float) -> None:
-    weigh_energies(seen, at, parameters(**values), own, 25.0, 1.0, DT)
+    update_tecs(seen, at, parameters(**values), own, 25.0, 1.0, DT)
 
 
 def steady(**values: Any) -> Record:
@@ -205,7 +206,7 @@ def test_too_fast_it_pitches_up_and_throttles_back() -> None:
 
 def test_the_airspeed_demand_changes_within_what_the_energy_allows() -> None:
     own = steady()
-    weigh_energies(reading(), flying(), parameters(AIRSPEED_MAX=40.0), own, 30.0, 1.0, DT)
+    update_tecs(reading(), flying(), parameters(AIRSPEED_MAX=40.0), own, 30.0, 1.0, DT)
     assert own.airspeed_demand == pytest.approx(25.0 + 0.5 * 5.0 * GRAVITY / 25.0 * DT)
 
 
@@ -237,7 +238,7 @@ def test_the_least_airspeed_grows_with_the_load_in_a_bank(bank_deg: float, preve
     """18 m/s over the root of cos 30: as ArduPlane's log of a turn shows it, at once (19.32 m/s; TECS.spdem)."""
     own = steady(airspeed_demand=18.0, side_acceleration=GRAVITY * math.tan(math.radians(bank_deg)))
     values = parameters(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0, STALL_PREVENTION=prevents)
-    weigh_energies(reading(), flying(), values, own, 18.0, 1.0, DT)
+    update_tecs(reading(), flying(), values, own, 18.0, 1.0, DT)
     assert own.airspeed_demand == pytest.approx(least, abs=0.005)
 
 
@@ -387,7 +388,7 @@ def test_it_holds_an_equivalent_airspeed(
     make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters
 ) -> None:
     setup = make_setup([[0, 0, 2000.0], [0, 3000, 2000.0]], speeds=24.0)
-    track = simulate(replace(setup, parameters=usual), aerosonde).track
+    track = simulate(replace(setup, autopilot=ArduPlane(usual)), aerosonde).track
     late = track.airspeed[track.time > 40.0]
     # Standard density at 2,000 m: 1.0066.
     assert float(late.mean()) == pytest.approx(24.0 * math.sqrt(1.2250 / 1.0066), rel=0.005)
@@ -400,7 +401,7 @@ def test_a_climbing_leg_is_flown_a_time_constant_low(
     # 120 m in 3 km: 1 m/s of climb.
     setup = make_setup([[0, 0, 500.0], [0, 3000, 620.0]])
     for time in (1.0, 3.0):
-        track = simulate(replace(setup, parameters=usual.changed(TECS_HDEM_TCONST=time)), aerosonde).track
+        track = simulate(replace(setup, autopilot=ArduPlane(usual.changed(TECS_HDEM_TCONST=time))), aerosonde).track
         late = (track.time > 50.0) & (track.time < 100.0)
         climb = float(track.velocity[late, 2].mean())
         assert float(track.height_error[late].mean()) == pytest.approx(-time * climb, abs=0.15)
@@ -408,13 +409,13 @@ def test_a_climbing_leg_is_flown_a_time_constant_low(
 
 def test_bank_follows_its_demand_late(make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters) -> None:
     setup = make_setup([[0, 0, 500.0], [0, 1000, 500.0], [1000, 1600, 500.0]])
-    flight = Flight(replace(setup, parameters=usual), aerosonde)
+    flight = Flight(replace(setup, autopilot=ArduPlane(usual)), aerosonde)
     demanded, flown = [], []
     for _ in range(60 * 70):
         rows, ended = flight.block(1)
         if ended:
             break
-        demanded.append(float(flight._work.ardupilot.roll_demand))
+        demanded.append(float(flight._workspace.own.memory.roll_demand))
         flown.append(float(rows["attitude"][-1][0]))
     lag = round(ROLL_LAG * usual.roll_time * 60)
 
@@ -430,7 +431,7 @@ def test_bank_follows_its_demand_late(make_setup: MakeSetup, aerosonde: Aircraft
 def test_bank_keeps_roll_limit_deg(make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters) -> None:
     setup = make_setup([[0, 0, 500.0], [0, 1000, 500.0], [1000, 1000, 500.0]])
     for limit in (20.0, 35.0):
-        track = simulate(replace(setup, parameters=usual.changed(ROLL_LIMIT_DEG=limit)), aerosonde).track
+        track = simulate(replace(setup, autopilot=ArduPlane(usual.changed(ROLL_LIMIT_DEG=limit))), aerosonde).track
         assert math.degrees(float(np.abs(track.attitude[:, 0]).max())) == pytest.approx(limit, abs=0.5)
 
 
@@ -438,7 +439,7 @@ def test_a_wider_radius_turns_earlier(make_setup: MakeSetup, aerosonde: Aircraft
     setup = make_setup([[0, 0, 500.0], [0, 1000, 500.0], [1000, 1000, 500.0]])
     past = []
     for radius in (20.0, 60.0, 90.0):
-        track = simulate(replace(setup, parameters=usual.changed(WP_RADIUS=radius)), aerosonde).track
+        track = simulate(replace(setup, autopilot=ArduPlane(usual.changed(WP_RADIUS=radius))), aerosonde).track
         past.append(float(track.position[:, 1].max()) - 1000.0)
     # Each metre of radius is a metre less overshot.
     assert past[0] - past[1] == pytest.approx(40.0, abs=6.0)
@@ -450,7 +451,7 @@ def test_the_same_setup_gives_the_same_flight(
 ) -> None:
     setup = replace(
         make_setup([[0, 0, 500.0], [0, 800, 520.0], [800, 1000, 500.0]], wind=(6.0, 200.0), turbulence="moderate"),
-        parameters=usual, nav="gnss",
+        autopilot=ArduPlane(usual), nav="gnss",
     )  # fmt: skip
     first, second = (simulate(setup, aerosonde) for _ in range(2))
     assert first.ended == "completed"

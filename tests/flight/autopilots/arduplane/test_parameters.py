@@ -12,8 +12,10 @@ from flight.autopilots.arduplane.parameters import (
     ARDUPILOT_PARAMETERS,
     DEFINITIONS,
     MAX_BYTES,
+    ArduPilotParameters,
     default_parameters,
     load_parameters,
+    logged_parameters,
     parameters_of,
     parse_parameters,
     read_parameter_file,
@@ -21,6 +23,7 @@ from flight.autopilots.arduplane.parameters import (
     stored_parameters,
     takes_speed,
 )
+from flight.autopilots.autopilot import ParameterValue, StoredParameters
 from world.errors import ParameterError
 from world.kernels import field_names
 
@@ -205,11 +208,11 @@ def test_the_record_holds_every_field() -> None:
 
 def test_what_was_stored_comes_back_bit_for_bit() -> None:
     found = parameters_of(OLD + "NAVL1_PERIOD 16.3\nFOO 1\n", "mine.parm")
-    again = stored_parameters([tuple(value) for value in found.values], found.unused, found.source)
+    again = stored_parameters(StoredParameters(found.values, found.unused, found.source))
     assert again == found
     assert again.record().tolist() == found.record().tolist()
     with pytest.raises(ParameterError, match=r"WP_RADIUS: -5: allowed"):
-        stored_parameters([("WP_RADIUS", -5.0, "file")], (), "")
+        stored_parameters(StoredParameters((ParameterValue("WP_RADIUS", -5.0, "file"),), (), ""))
 
 
 def test_one_value_can_be_changed() -> None:
@@ -233,3 +236,33 @@ def test_speeds_within_the_limits_are_taken(airspeed: float, taken: bool) -> Non
 def test_a_speed_that_is_not_taken_leaves_the_one_before() -> None:
     commanded = np.array([17.0, 17.0, 20.0, 35.0, 31.0])
     assert speeds_flown(commanded, 25.0, PARAMETERS).tolist() == [25.0, 25.0, 20.0, 20.0, 31.0]
+
+
+# ----------------------------------------------------------------------
+# Logged parameters.
+
+
+def parameters(**values: float) -> tuple[ArduPilotParameters, tuple[str, ...]]:
+    return logged_parameters(values, "a.BIN")
+
+
+def test_older_names_and_units_are_taken() -> None:
+    found, notes = parameters(TRIM_ARSPD_CM=1800.0, LIM_ROLL_CD=4500.0)
+    assert (found.airspeed_cruise, found.by_origin("file")["ROLL_LIMIT_DEG"], notes) == (18.0, 45.0, ())
+
+
+def test_what_is_not_allowed_is_told_and_the_default_taken() -> None:
+    found, notes = parameters(WP_RADIUS=-5.0, NAVL1_PERIOD=20.0)
+    assert (found.wp_radius, found.navl1_period) == (90.0, 20.0)
+    assert notes == ("WP_RADIUS -5 of the log is not allowed: the default is taken",)
+
+
+def test_a_least_beyond_its_most_gives_way() -> None:
+    found, notes = parameters(AIRSPEED_MIN=30.0, AIRSPEED_MAX=20.0)
+    assert (found.airspeed_min, found.airspeed_max) == (9.0, 22.0)
+    assert notes[0].startswith("AIRSPEED_MIN 30 and AIRSPEED_MAX 20")
+
+
+def test_a_log_without_parameters_says_that_defaults_are_taken() -> None:
+    _, notes = parameters()
+    assert notes == ("the log holds no parameters: ArduPlane's defaults are taken",)

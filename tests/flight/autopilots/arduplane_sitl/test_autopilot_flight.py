@@ -69,8 +69,8 @@ def test_an_autopilot_flies_the_mission_to_its_end(fake_autopilot: MakeFake, tmp
     assert track.leg[-1] == 1
     assert abs(track.position[:, 2] - 500.0).max() < 15.0
     assert track.energy[-1] > track.energy[len(track) // 2] > 0.0
-    assert setup.program is not None
-    assert setup.program.version == "ArduPlane V0.0-fake (0badc0de)"
+    assert setup.autopilot.program is not None
+    assert setup.autopilot.program.version == "ArduPlane V0.0-fake (0badc0de)"
     assert kept.read_bytes() == b"\xa3\x95fake"
     assert (children(), left_behind()) == (before, folders)
 
@@ -191,7 +191,7 @@ def test_satellites_mistake_the_place_as_the_setup_says(fake_autopilot: MakeFake
 @pytest.mark.client
 def test_arduplane_flies_a_bend_as_its_law_has_it(arduplane: Path, tmp_path: Path) -> None:
     flown, setup = fly_autopilot(make_setup(wind=(5.0, 250.0)), AEROSONDE, arduplane, {"WP_RADIUS": 60.0})
-    track, program = flown.track, setup.program
+    track, program = flown.track, setup.autopilot.program
     assert flown.ended == "completed"
     assert program is not None
     assert program.version.startswith("ArduPlane V")
@@ -210,7 +210,7 @@ def test_arduplane_flies_a_bend_as_its_law_has_it(arduplane: Path, tmp_path: Pat
 def test_arduplane_names_what_it_does_not_know(arduplane: Path) -> None:
     own = {"WP_NO_SUCH": 1.0, "SERVO1_REVERSED": 1.0, "NAVL1_PERIOD": 17.0}
     with AutopilotFlight(make_setup(), AEROSONDE, arduplane, own) as flight:
-        program = flight.setup.program
+        program = flight.setup.autopilot.program
     assert program is not None
     assert program.unused == ("SERVO1_REVERSED", "WP_NO_SUCH")
     assert program.changed == {"NAVL1_PERIOD": 17.0}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import aircraft_names, load_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import load_parameters
 from flight.autopilots.arduplane_sitl.physics import load_servo_map
 from flight.autopilots.arduplane_sitl.process import (
@@ -29,7 +30,7 @@ def setup_at(speed: float = 25.0, params: Path | None = None) -> FlightSetup:
     if params is None:
         return setup
     scenario = with_flight(setup.scenario, params=str(params))
-    return replace(setup, scenario=scenario, parameters=load_parameters(AEROSONDE, params))
+    return replace(setup, scenario=scenario, autopilot=ArduPlane(load_parameters(AEROSONDE, params)))
 
 
 def test_the_simulations_the_servos_and_the_aircrafts_are_all_given() -> None:

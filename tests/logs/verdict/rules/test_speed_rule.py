@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
@@ -47,7 +48,7 @@ def test_arduplane_takes_a_command_for_equivalent_airspeed() -> None:
     for up, ok in ((0.0, True), (1000.0, False)):
         points = [[e, n, up] for e, n, _ in STRAIGHT]
         made = make_setup(points, airspeed=31.0, terrain={"kind": "flat", "amsl_m": -400.0})
-        setup = replace(made, parameters=default_parameters())
+        setup = replace(made, autopilot=ArduPlane(default_parameters()))
         item = of(judge_geometry(setup), "speed", leg(0))
         true = 31.0 * math.sqrt(1.225 / (1.225 if up == 0.0 else 1.112))
         assert (item.ok, item.planned) == (ok, pytest.approx(true, rel=1e-3))

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -85,7 +86,9 @@ def test_arduplane_turns_at_its_own_radius() -> None:
     turns = {0.0: 0.0, 45.0: 45.0, 90.0: 90.0, 120.0: 90.0}
     for turn, radius in turns.items():
         points = [[e, n, 0.0] for e, n, _ in corner(turn)]
-        setup = replace(make_setup(points, terrain={"kind": "flat", "amsl_m": -400.0}), parameters=default_parameters())
+        setup = replace(
+            make_setup(points, terrain={"kind": "flat", "amsl_m": -400.0}), autopilot=ArduPlane(default_parameters())
+        )
         verdict = judge_geometry(setup)
         assert of(verdict, "waypoint", waypoint(1)).limit == pytest.approx(radius)
         assert of(verdict, "waypoint", waypoint(2)).limit == pytest.approx(90.0)
@@ -93,14 +96,14 @@ def test_arduplane_turns_at_its_own_radius() -> None:
         assert all(item.ok for item in verdict.findings if item.rule == "waypoint")
     # True by equivalent airspeed squared is the ratio of densities: 1.225 by 1.112 kg/m^3 at 1,000 m (US Standard
     # Atmosphere, 1976).
-    high = replace(make_setup([[e, n, 1000.0] for e, n, _ in corner(90.0)]), parameters=default_parameters())
+    high = replace(make_setup([[e, n, 1000.0] for e, n, _ in corner(90.0)]), autopilot=ArduPlane(default_parameters()))
     assert of(judge_geometry(high), "waypoint", waypoint(1)).limit == pytest.approx(90.0 * 1.225 / 1.112, rel=1e-3)
 
 
 @pytest.mark.parametrize(("aside", "ok"), [(59.0, True), (-59.0, True), (61.0, False), (-61.0, False)])
 def test_past_the_line_beside_it_counts_for_arduplane_within_the_corridor(aside: float, ok: bool) -> None:
     stated = make_setup(STRAIGHT, limits={"corridor_m": 60.0})
-    setup = replace(accepting(stated, 10.0), parameters=default_parameters())
+    setup = replace(accepting(stated, 10.0), autopilot=ArduPlane(default_parameters()))
     track = fly_path(setup, across=bump(3000.0, aside, 150.0))
     item = of(judge(setup, track), "waypoint", waypoint(1))
     assert item.ok is ok
@@ -136,7 +139,7 @@ def test_a_waypoints_margin_is_what_is_left_of_its_radius(aside: float, ok: bool
 
 
 def test_past_the_line_beside_it_there_is_no_margin() -> None:
-    setup = replace(accepting(make_setup(STRAIGHT), 10.0), parameters=default_parameters())
+    setup = replace(accepting(make_setup(STRAIGHT), 10.0), autopilot=ArduPlane(default_parameters()))
     for aside, margin in ((50.0, None), (4.0, 6.0)):
         item = of(judge(setup, fly_path(setup, across=bump(3000.0, aside, 150.0))), "waypoint", waypoint(1))
         assert item.ok

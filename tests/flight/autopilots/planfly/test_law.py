@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aircraft.catalog import Aircraft
+from flight.autopilots.planfly.law import guide
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.gains import Gains, load_gains
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
-from flight.guidance.lateral import guide
 from flight.guidance.navigation_error import MOTION
 from flight.guidance.path import fly_by_path, waypoint_records
 from flight.simulation.setup import FlightSetup

@@ -1,4 +1,4 @@
-"""The guidance core: from the state to the four commands, on records with named fields, compiled.
+"""Planfly's guidance: from the state to the four commands, on records with named fields, compiled.
 
 Three lateral laws: ours, a second-order cross-track law with curvature feed-forward, about the line beside the path
 that a rolling aircraft can follow, which answers gusts by bank, and by a skid where bank ends; L1 along the legs, as
@@ -9,8 +9,11 @@ law alone. None asks for the wind: all steer by the velocity over the ground.  N
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from aircraft.envelope import GRAVITY
-from flight.guidance.inner_loops import L1, VECTOR_FIELD, roll_model, steer_bank, steer_height
+from flight.guidance.inner_loops import follow_roll, roll_model, steer_elevator
 from flight.guidance.lateral_reference_laws import (
     WAYPOINT_RADIUS,
     field_course,
@@ -20,14 +23,43 @@ from flight.guidance.lateral_reference_laws import (
     l1_length,
     l1_reached,
 )
-from flight.guidance.path import Records, mean_curvature, most_curvature, project
+from flight.guidance.path import find_on_path, mean_curvature, most_curvature, profile
+from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
 from world.geometry import wrap
-from world.kernels import Record, compiled
+from world.kernels import Record, Records, compiled
+from world.scenario_tables import Guidance
+from world.terrain import Heights
 
+Floats = NDArray[np.float64]
+
+# The lateral laws, as `memory.law` names them.
+CROSS_TRACK, L1, VECTOR_FIELD = range(3)
+# By their names in a scenario's `[flight] guidance`.
+LAWS: dict[Guidance, int] = {"path": CROSS_TRACK, "l1": L1, "vector-field": VECTOR_FIELD}
+# Time constants of the energy rate and of the airspeed without its gusts, s.
+_ENERGY_LAG = 1.0
+_AIRSPEED_LAG = 2.0
+# Full throttle for this long (s) means that the aircraft gives all it has: then height gives way to speed.
+_ALL_IT_HAS = 1.0
 # Of the lateral acceleration at the greatest bank, what an arc may take before the aircraft slows down for it.
 ARC_SHARE = 0.95
 # Longest tick that the whole lead of a correction is for, s.
 LEAD_TICK = 1.0 / 60.0
+
+
+@compiled
+def planfly_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+    """One tick on the block of a `flight.simulation.tick.Workspace`: a key of its `ENDS`, or 0 to fly on."""
+    work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
+    path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
+    settings = work.settings
+    if not begin_tick(work, heights):
+        return NOT_A_NUMBER
+    guide(
+        work.state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
+        path.waypoint[: settings.waypoints], work.gains, work.memory, work.commands, work.timing.dt,
+    )  # fmt: skip
+    return end_tick(work)
 
 
 @compiled
@@ -62,26 +94,6 @@ def guide(
         bank = _along_path(state, estimated, pieces, gains, memory, course, dt)
     steer_height(state, estimated, nodes, gains, memory, commands, course, dt)
     steer_bank(state, gains, memory, commands, bank, dt)
-
-
-@compiled
-def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  # pragma: no cover - compiled
-    """Note in the memory where on the path the aircraft is, and return the path's course there, rad.
-
-    estimated, pieces, memory: as `guide` takes them.
-    """
-    k = memory.piece
-    along, cross, course = project(pieces[k], estimated.east, estimated.north)
-    while along > pieces[k].length and k + 1 < pieces.shape[0]:
-        k += 1
-        along, cross, course = project(pieces[k], estimated.east, estimated.north)
-    piece = pieces[k]
-    memory.piece = k
-    memory.distance = piece.start + along
-    memory.leg = piece.leg + (1 if memory.distance > piece.leg_change else 0)
-    memory.cross_track = cross
-    memory.done = k + 1 == pieces.shape[0] and along >= piece.length
-    return course
 
 
 @compiled
@@ -241,3 +253,99 @@ def _field(
     if bank == wanted:
         memory.course_sum = min(1.0, max(-1.0, memory.course_sum + error * dt))
     return bank
+
+
+@compiled
+def steer_height(
+    state: Record,
+    estimated: Record,
+    nodes: Records,
+    gains: Record,
+    memory: Record,
+    commands: Record,
+    course: float,
+    dt: float,
+) -> None:  # pragma: no cover - compiled
+    """Elevator from the height profile through the load factor; throttle from the airspeed."""
+    airspeed = max(8.0, state.airspeed)
+    along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
+    height, slope, _ = profile(nodes, memory.distance)
+    _, ahead_slope, bend = profile(nodes, memory.distance + along * gains.slope_lead)
+    error = estimated.up - height
+    memory.height_error = error
+    climb_rate = estimated.velocity_up
+    frequency = gains.height_frequency
+    rate_gain = 2.0 * gains.height_damping * frequency
+    wanted_rate = slope * along
+    correction = min(4.0, max(-4.0, -error * frequency * frequency / rate_gain))
+    memory.bend_acceleration = bend * along * along
+    push = memory.bend_acceleration + rate_gain * (wanted_rate + correction - climb_rate)
+    push -= gains.height_integral * memory.height_sum
+    ceiling = _push_ceiling(gains, memory, airspeed, climb_rate, rate_gain, dt)
+    held = push > ceiling
+    push = min(8.0, max(-6.0, min(push, ceiling)))
+    if not held and abs(error) < 5.0:
+        memory.height_sum = min(5.0, max(-5.0, memory.height_sum + error * dt))
+    steer_elevator(state, gains, memory, commands, climb_rate, push)
+    _set_throttle(estimated, gains, memory, commands, airspeed, ahead_slope, along, dt)
+
+
+@compiled
+def _push_ceiling(
+    gains: Record, memory: Record, airspeed: float, climb_rate: float, rate_gain: float, dt: float
+) -> float:  # pragma: no cover - compiled
+    """Most acceleration upwards that the energy allows, m/s^2; infinite while the aircraft has more to give.
+
+    What the aircraft gains now is what it can climb at a steady airspeed.
+    """
+    if memory.last_airspeed < 0.0:
+        memory.last_airspeed = airspeed
+        memory.airspeed = airspeed
+        memory.energy_rate = climb_rate
+    energy_rate = climb_rate + airspeed * (airspeed - memory.last_airspeed) / (dt * GRAVITY)
+    memory.last_airspeed = airspeed
+    memory.energy_rate += (energy_rate - memory.energy_rate) * dt / _ENERGY_LAG
+    memory.airspeed += (airspeed - memory.airspeed) * dt / _AIRSPEED_LAG
+    if memory.full_throttle <= _ALL_IT_HAS:
+        return math.inf
+    excess = memory.airspeed - (memory.speed_command - gains.slow_margin)
+    ceiling: float = rate_gain * (memory.energy_rate + excess * airspeed / (GRAVITY * 3.0) - climb_rate)
+    return ceiling
+
+
+@compiled
+def _set_throttle(
+    estimated: Record,
+    gains: Record,
+    memory: Record,
+    commands: Record,
+    airspeed: float,
+    ahead_slope: float,
+    along: float,
+    dt: float,
+) -> None:  # pragma: no cover - compiled
+    """Throttle: level flight's, for the slope to the air ahead, and for the airspeed's error."""
+    slow = memory.speed_command - airspeed
+    if memory.arc_speed > 0.0:
+        # In an arc and before it the ground speed counts too, as far as the air allows.
+        over = math.hypot(estimated.velocity_east, estimated.velocity_north) - memory.arc_speed
+        slow = min(slow, max(-over, slow - gains.arc_slowing_max))
+    steady = memory.trim_throttle + gains.throttle_per_slope * ahead_slope * along / airspeed
+    wanted = steady + gains.speed_gain * slow + gains.speed_integral * memory.speed_sum
+    commands.throttle = min(1.0, max(0.0, wanted))
+    memory.full_throttle = memory.full_throttle + dt if wanted >= 1.0 else 0.0
+    if (wanted < 1.0 or slow < 0.0) and (wanted > 0.0 or slow > 0.0):
+        memory.speed_sum = min(60.0, max(-60.0, memory.speed_sum + slow * dt))
+
+
+@compiled
+def steer_bank(
+    state: Record, gains: Record, memory: Record, commands: Record, bank: float, dt: float
+) -> None:  # pragma: no cover - compiled
+    """Aileron from a bank command through a model of how the aircraft shall roll; rudder for coordination and damping.
+
+    The model answers the command as a critically damped oscillator within the limits of roll rate and acceleration, so
+    it never overshoots; `follow_roll` makes the aircraft roll as it does.
+    """
+    bank, rate, turn = roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
+    follow_roll(state, gains, memory, commands, bank, rate, turn, dt)

@@ -1,0 +1,139 @@
+"""ArduPlane's law as an autopilot, with the parameters that it flies by."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
+
+import numpy as np
+
+from aircraft.catalog import Aircraft
+from aircraft.tracking import TrackingError
+from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick, true_by_equivalent, turn_distance
+from flight.autopilots.arduplane.parameters import (
+    HEIGHT_CANDIDATES,
+    SIDE_CANDIDATES,
+    ArduPilotParameters,
+    default_parameters,
+    load_parameters,
+    logged_parameters,
+    speeds_flown,
+    stored_parameters,
+)
+from flight.autopilots.arduplane.tracking_error import tracking_error
+from flight.autopilots.autopilot import Autopilot, Floats, SpeedLimits, StoredAutopilot, StoredParameters, Tick
+from world.kernels import Record
+from world.scenario_tables import FlightTable, Navigation
+from world.wind import Turbulence
+
+
+@dataclass(frozen=True)
+class ArduPlane(Autopilot):
+    """ArduPlane's law: L1 along the legs, TECS for height and airspeed.
+
+    >>> made = ArduPlane(default_parameters())
+    >>> made.acceptance_radius, made.turn_distance(math.radians(45.0), 0.0), made.speed_limits[:2]
+    (90.0, 45.0, (9.0, 22.0))
+    """
+
+    name: ClassVar = "ardupilot"
+    title: ClassVar = "ArduPlane"
+    own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE
+    equivalent_airspeeds: ClassVar = True
+    height_candidates: ClassVar = HEIGHT_CANDIDATES
+    side_candidates: ClassVar = SIDE_CANDIDATES
+    parameters: ArduPilotParameters = field()
+
+    @classmethod
+    def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
+        """With the parameters of the person's file, of the aircraft, and ArduPlane's defaults."""
+        return cls(load_parameters(aircraft, table.params))
+
+    @classmethod
+    def restore(cls, stored: StoredAutopilot) -> Self:
+        """With the parameters that a log stores."""
+        return cls(default_parameters() if stored.parameters is None else stored_parameters(stored.parameters))
+
+    def store(self) -> StoredAutopilot:
+        """Its parameters."""
+        parameters = self.parameters
+        stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
+        return StoredAutopilot(parameters=stored, program=self.program)
+
+    @classmethod
+    def of_flight_log(
+        cls, program: str, parameters: Mapping[str, float], source: str
+    ) -> tuple[Self, tuple[str, ...]] | None:
+        """ArduPlane with the log's parameters, for a log that any release of it wrote."""
+        if not program.startswith("ArduP"):
+            return None
+        made, notes = logged_parameters(parameters, source)
+        return cls(made), notes
+
+    @classmethod
+    def missing_files(cls, aircraft: Aircraft) -> list[str]:
+        """None: what the aircraft does not state has ArduPlane's defaults."""
+        load_parameters(aircraft)
+        return []
+
+    @property
+    def tick(self) -> Tick:
+        """One tick of the law."""
+        return arduplane_tick
+
+    def begin(self, memory: Record, own: Record) -> None:
+        """Hand over the parameters."""
+        own.parameters = self.parameters.record()
+
+    def described(self, aircraft: str) -> str:
+        """The law with the parameters that decide most of a flight."""
+        made = self.parameters
+        whose = f"the parameters of {made.source}" if made.source else "its default parameters"
+        return (
+            f"ArduPlane's law with {whose} (WP_RADIUS {made.wp_radius:g} m,"
+            f" NAVL1_PERIOD {made.navl1_period:g} s, TECS_HDEM_TCONST {made.tecs_height_demand_time:g} s)"
+        )
+
+    @property
+    def acceptance_radius(self) -> float | None:
+        """WP_RADIUS."""
+        return self.parameters.wp_radius
+
+    def turn_distance(self, turn: float, amsl: float) -> float:
+        """WP_RADIUS for a right angle, in thin air more, and a share of it for a gentler turn."""
+        factor = float(true_by_equivalent(amsl))
+        return float(turn_distance(0.0, turn, self.parameters.wp_radius, math.inf, factor))
+
+    def airspeed_factor(self, amsl: float) -> float:
+        """True by equivalent airspeed."""
+        return float(true_by_equivalent(amsl))
+
+    @property
+    def speed_limits(self) -> SpeedLimits | None:
+        """AIRSPEED_MIN and AIRSPEED_MAX."""
+        return SpeedLimits(self.parameters.airspeed_min, self.parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
+
+    def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
+        """The last speed that it took."""
+        return speeds_flown(commanded, cruise, self.parameters)
+
+    @property
+    def stated_airspeed(self) -> tuple[float, str] | None:
+        """AIRSPEED_CRUISE of a person's file."""
+        stated = self.parameters.by_origin("file")
+        return (stated["AIRSPEED_CRUISE"], "AIRSPEED_CRUISE") if "AIRSPEED_CRUISE" in stated else None
+
+    @property
+    def stated_bank(self) -> float | None:
+        """ROLL_LIMIT_DEG of a person's file."""
+        return self.parameters.roll_limit if "ROLL_LIMIT_DEG" in self.parameters.by_origin("file") else None
+
+    def tracking_error(
+        self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
+    ) -> TrackingError | None:
+        """How far its law strays with these parameters."""
+        return tracking_error(self.parameters, airspeed, nav, fly_over=fly_over, turbulence=turbulence)
+
+    def with_parameters(self, **values: float) -> "ArduPlane":
+        """The law, whoever flew before, with other parameters."""
+        return ArduPlane(self.parameters.changed(**values))

@@ -1,0 +1,310 @@
+"""What steers a flight, as an interface: everything that the rest of planfly asks of an autopilot.
+
+An `Autopilot` carries its own settings: a `FlightSetup` holds one, and whoever plans, flies, judges or records asks it
+and never which one it is.  Each has a folder beside this file; `flight.autopilots.catalog.AUTOPILOTS` lists them.
+
+The base class answers for an autopilot that flies the fly-by path as it was planned, at the true airspeeds that it is
+told, without parameters.  An autopilot overrides what it does otherwise.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal, NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from aircraft.tracking import TrackingError
+from world.errors import ScenarioError
+from world.kernels import Record
+from world.scenario_tables import FlightTable, Guidance, Navigation
+from world.terrain import Heights
+from world.wind import Turbulence
+
+Floats = NDArray[np.float64]
+
+# One tick of the compiled loop, on the block of a `flight.simulation.tick.Workspace`: a key of `ENDS`, 0 to fly on.
+Tick = Callable[[Floats, Heights], int]
+
+# What a flight answers: whether the aircraft can fly it at all, or whether it goes well with an autopilot.
+Level = Literal["airframe", "autopilot"]
+
+# ----------------------------------------------------------------------
+# Parameters: what a person's file, the aircraft's folder or the autopilot itself states.
+
+Origin = Literal["file", "aircraft", "default"]
+
+
+class ParameterValue(NamedTuple):
+    """A parameter's value in the autopilot's unit, and who states it."""
+
+    name: str
+    value: float
+    origin: Origin
+
+
+class Parameters(Protocol):
+    """An autopilot's parameters by its own names and in its own units.
+
+    values: every parameter that its law knows.  unused: names that the file states and the law has no use for.
+    source: the file that a person gave, "" for none.  not_flown: read, but no flight shows them.
+    """
+
+    not_flown: ClassVar[tuple[str, ...]]
+
+    @property
+    def values(self) -> tuple[ParameterValue, ...]:
+        """As above."""
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """As above."""
+
+    @property
+    def source(self) -> str:
+        """As above."""
+
+    def changed(self, **values: float) -> Self:
+        """The same parameters but for these."""
+
+    def by_origin(self, origin: Origin) -> dict[str, float]:
+        """The values that one source states, by name."""
+
+
+class SpeedLimits(NamedTuple):
+    """Airspeeds (m/s) that an autopilot takes from a mission, and the parameters that set them."""
+
+    min: float
+    max: float
+    min_name: str
+    max_name: str
+
+
+class Candidate(NamedTuple):
+    """A parameter that may decide a flight that fails.
+
+    name: the autopilot's.
+    step: the increment that its parameter reference gives, or a few of them.
+    far: the farthest value that is tried, within the range that the reference gives.
+    unit: of both.
+    """
+
+    name: str
+    step: float
+    far: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotProgram:
+    """Which program steered a flight.
+
+    version: what it calls itself.
+    sha256: of its file, hex.
+    parameters: by name, what it was given over its own defaults, as it had them.
+    changed: those of them that a person's file stated otherwise than the aircraft's.
+    unused: names in the person's file that it does not know, or that belong to other hardware.
+    """
+
+    version: str
+    sha256: str
+    parameters: Mapping[str, float]
+    changed: Mapping[str, float]
+    unused: tuple[str, ...] = ()
+
+
+class StoredParameters(NamedTuple):
+    """Parameters as a log stores them: the fields of `Parameters`."""
+
+    values: tuple[ParameterValue, ...]
+    unused: tuple[str, ...]
+    source: str
+
+
+class StoredAutopilot(NamedTuple):
+    """An autopilot's settings as a log stores them.
+
+    guidance: the law of planfly's guidance, "path" for every other autopilot.
+    """
+
+    guidance: Guidance = "path"
+    parameters: StoredParameters | None = None
+    program: AutopilotProgram | None = None
+
+
+# ----------------------------------------------------------------------
+
+
+class Autopilot(ABC):
+    """What steers a flight, with its settings; subclasses are frozen dataclasses.
+
+    name: as `[flight] autopilot` states it.
+    title: as texts name it.
+    level: which question its flight answers.  At "airframe" it stands for the aircraft alone; at "autopilot" its
+    verdict is set beside a reference flight by planfly's guidance.
+    parameters: None for an autopilot that has none.
+    program: that flew it, None for a law and before the flight.
+    own: type of the record that its law keeps beside `flight.guidance.inner_loops.GUIDANCE_MEMORY`; None for none.
+    equivalent_airspeeds: whether commanded airspeeds count as equivalent ones, which are less than true ones at height;
+    it then takes over in level flight.
+    height_candidates, side_candidates: parameters that may decide a flight which fails by its height or its track.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    level: ClassVar[Level] = "autopilot"
+    own: ClassVar[np.dtype[np.record] | None] = None
+    equivalent_airspeeds: ClassVar[bool] = False
+    height_candidates: ClassVar[tuple[Candidate, ...]] = ()
+    side_candidates: ClassVar[tuple[Candidate, ...]] = ()
+    parameters: Parameters | None = None
+    program: AutopilotProgram | None = None
+
+    # How it is made: of a scenario, of a log.
+
+    @classmethod
+    def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
+        """The autopilot of a scenario's [flight] table, which `scenario` names in messages.
+
+        Raises ScenarioError for an entry that it does not take, and ParameterError for a bad file of parameters.
+        """
+        if table.params is not None:
+            allowed = f'not a key of autopilot = "{cls.name}", which has no parameters'
+            raise ScenarioError.at(scenario, "flight.params", table.params, allowed)
+        return cls()
+
+    @classmethod
+    def restore(cls, stored: StoredAutopilot) -> Self:
+        """The autopilot that a log stores.  Raises ParameterError for a value that is not allowed."""
+        return cls()
+
+    def store(self) -> StoredAutopilot:
+        """Its settings as a log stores them: what `restore` takes."""
+        return StoredAutopilot()
+
+    @classmethod
+    def of_flight_log(
+        cls, program: str, parameters: Mapping[str, float], source: str
+    ) -> tuple[Self, tuple[str, ...]] | None:
+        """The autopilot that wrote a log, and what of its parameters could not be used; None for another's log.
+
+        program: as the log names what flew.  parameters: by name.  source: the log's file.
+        """
+        return None
+
+    @classmethod
+    def recognises(cls, program: Path) -> bool:
+        """Whether it is flown by such a program, which --autopilot names; False for a law."""
+        return False
+
+    @classmethod
+    def missing_files(cls, aircraft: Aircraft) -> list[str]:
+        """What an aircraft's folder lacks to be flown by it, in sentences.  Raises PlanflyError for a broken file."""
+        return []
+
+    # What flies.
+
+    @property
+    def law(self) -> "Autopilot":
+        """The autopilot whose law flies where no program does: itself, but for a program."""
+        return self
+
+    @property
+    @abstractmethod
+    def tick(self) -> Tick:
+        """One tick of its law, compiled."""
+
+    def begin(self, memory: Record, own: Record) -> None:
+        """Set what its law needs to know before the first tick.
+
+        memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.  own: of the type `own`, None where that is None.
+        """
+        return
+
+    # What a plan, a mission and a verdict have to know of it.
+
+    def described(self, aircraft: str) -> str:
+        """Who steers, in words, with the settings that decide most of the flight."""
+        return self.title
+
+    @property
+    def acceptance_radius(self) -> float | None:
+        """Distance (m) from a waypoint at which it turns to the next leg where the mission states none.
+
+        None for an autopilot that follows the fly-by path.  Any other flies from leg to leg, and has reached a
+        waypoint too where it passes the line across the leg there.
+        """
+        return None
+
+    @property
+    def follows_path(self) -> bool:
+        """Whether it follows the fly-by path, and does not turn by an acceptance radius."""
+        return self.acceptance_radius is None
+
+    @property
+    def keeps_to_arcs(self) -> bool:
+        """Whether how closely it passes a waypoint tells the radius of its turn."""
+        return True
+
+    def turn_distance(self, turn: float, amsl: float) -> float:
+        """How far (m) before a waypoint it turns to the next leg at most; 0 for one that follows the fly-by path.
+
+        turn: rad, positive; pi at the mission's end.  amsl: height of the waypoint, m.
+        """
+        return 0.0
+
+    def airspeed_factor(self, amsl: float) -> float:
+        """True airspeed that it flies by the commanded one, at a height (m AMSL)."""
+        return 1.0
+
+    @property
+    def speed_limits(self) -> SpeedLimits | None:
+        """Airspeeds that it takes from a mission: it ignores a command of another; None for no limits."""
+        return None
+
+    def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
+        """Airspeeds (l,) that it flies on each leg, of those commanded (l,), m/s.
+
+        cruise: its airspeed until it takes up the first.
+        """
+        return commanded
+
+    @property
+    def stated_airspeed(self) -> tuple[float, str] | None:
+        """Cruise airspeed (m/s) that a person's file of parameters states, and the parameter; None for none."""
+        return None
+
+    @property
+    def stated_bank(self) -> float | None:
+        """Bank limit (rad) that a person's file of parameters states; None for none."""
+        return None
+
+    def tracking_error(
+        self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
+    ) -> TrackingError | None:
+        """How far it strays from the legs it is given, which a plan has to leave free; None where it holds its path.
+
+        airspeed: commanded, m/s.  nav: how well it knows where it is.  fly_over: whether it flies on to each waypoint
+        before it turns.  turbulence: of the wind.
+        """
+        return None
+
+    def with_parameters(self, **values: float) -> "Autopilot":
+        """The same law with other values of parameters, by its own names and in its own units."""
+        raise ValueError(f"{self.title} has no parameters")
+
+
+def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -> str:
+    """A program in words; every parameter stands in the verdict's data.
+
+    named: changed parameters that are named.
+    """
+    changed = [f"{name} {value:g}" for name, value in program.changed.items()]
+    more = f", +{len(changed) - named} more" if len(changed) > named else ""
+    return (
+        f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
+        f" {Path(aircraft).name}, changed: {', '.join(changed[:named]) or 'none'}{more}"
+    )

@@ -1,0 +1,84 @@
+"""Every autopilot that planfly knows: the one list that a new autopilot is added to."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.autopilot import Autopilot, StoredAutopilot
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from flight.simulation.airborne import ProgramAutopilot
+from world.errors import ScenarioError
+from world.files import did_you_mean
+from world.scenario import Scenario
+
+# Laws before the programs that they model; of several programs the first that recognises its own file is taken.
+AUTOPILOTS: tuple[type[Autopilot], ...] = (
+    ArduPlane,
+    PlanflyGuidance,
+    ArduPlaneSitl,
+)
+# By the name that a scenario states.
+_LAWS = {kind.name: kind for kind in AUTOPILOTS if not issubclass(kind, ProgramAutopilot)}
+_PROGRAMS = tuple(kind for kind in AUTOPILOTS if issubclass(kind, ProgramAutopilot))
+
+
+def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
+    """The autopilot that a scenario names, with its settings.
+
+    Raises ScenarioError for a name that is not listed, and as `Autopilot.load` does.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from world.scenario import load_scenario
+    >>> load_autopilot(load_scenario("tight"), load_aircraft("aerosonde")).title
+    'ArduPlane'
+    """
+    name = scenario.flight.steering.autopilot
+    if name not in _LAWS:
+        known = " or ".join(f"'{known}'" for known in _LAWS)
+        allowed = f"{known} is expected{did_you_mean(name, sorted(_LAWS))}"
+        raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
+    return _LAWS[name].load(scenario.flight, aircraft, scenario.name)
+
+
+def program_autopilot(program: Path) -> type[ProgramAutopilot]:
+    """The autopilot that such a program is.
+
+    >>> program_autopilot(Path("arduplane")).name
+    'ardupilot'
+    """
+    return next(kind for kind in _PROGRAMS if kind.recognises(program))
+
+
+def autopilot_of_log(
+    program: str, parameters: Mapping[str, float], source: str
+) -> tuple[Autopilot, tuple[str, ...]] | None:
+    """The law of the autopilot that wrote a flight log, and what could not be used of its parameters.
+
+    None for an autopilot that planfly does not know.  program: as the log names it.  source: the log's file.
+    """
+    return next(filter(None, (kind.of_flight_log(program, parameters, source) for kind in _LAWS.values())), None)
+
+
+def restore_autopilot(name: str | None, stored: StoredAutopilot) -> Autopilot:
+    """The autopilot that a log stores.  Raises ParameterError for a value that is not allowed, KeyError for a name.
+
+    name: None where what is stored says who it is.
+    """
+    kinds = _LAWS if stored.program is None else {kind.name: kind for kind in _PROGRAMS}
+    return kinds[name or _implied_name(stored)].restore(stored)
+
+
+def stored_name(autopilot: Autopilot) -> str | None:
+    """The name that a log has to state of an autopilot; None where what it stores says who it is.
+
+    >>> stored_name(PlanflyGuidance("l1")) is None
+    True
+    """
+    return None if _implied_name(autopilot.store()) == autopilot.name else autopilot.name
+
+
+def _implied_name(stored: StoredAutopilot) -> str:
+    """Who flew by a log without a name: ArduPlane where it has parameters or a program, else planfly's guidance."""
+    return (PlanflyGuidance if stored.parameters is None and stored.program is None else ArduPlane).name

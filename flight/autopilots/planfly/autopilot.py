@@ -1,0 +1,70 @@
+"""Planfly's own guidance as an autopilot: it knows the fly-by path and follows it, by one of three lateral laws."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.autopilot import Autopilot, Level, StoredAutopilot, Tick
+from flight.autopilots.planfly.law import LAWS, planfly_tick
+from flight.guidance.gains import GAINS_FILE, load_gains
+from world.kernels import Record
+from world.scenario_tables import FlightTable, Guidance
+
+_DESCRIBED = {
+    "path": "planfly's guidance on the fly-by path",
+    "l1": "L1 as ArduPlane flies it, along the legs",
+    "vector-field": "Beard and McLain's vector field on the fly-by path",
+}
+
+
+@dataclass(frozen=True)
+class PlanflyGuidance(Autopilot):
+    """Planfly's guidance, which stands for what the aircraft itself can fly.
+
+    guidance: its lateral law, as `[flight] guidance` names it.
+    """
+
+    name: ClassVar = "ideal"
+    title: ClassVar = "planfly's guidance"
+    level: ClassVar[Level] = "airframe"
+    guidance: Guidance = "path"
+
+    @classmethod
+    def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
+        """The law that the table names; a table with parameters names another autopilot."""
+        return cls(table.steering.guidance)
+
+    @classmethod
+    def restore(cls, stored: StoredAutopilot) -> Self:
+        """The law that a log stores."""
+        return cls(stored.guidance)
+
+    def store(self) -> StoredAutopilot:
+        """Its law."""
+        return StoredAutopilot(self.guidance)
+
+    @classmethod
+    def missing_files(cls, aircraft: Aircraft) -> list[str]:
+        """The gains, if they are missing: every law flies through the inner loops that they tune."""
+        if (aircraft.folder / GAINS_FILE).exists():
+            load_gains(aircraft)
+            return []
+        return [f"{aircraft.folder / GAINS_FILE}: missing: {aircraft.name} does not fly without gains"]
+
+    @property
+    def tick(self) -> Tick:
+        """All three laws' tick."""
+        return planfly_tick
+
+    def begin(self, memory: Record, own: Record) -> None:
+        """Choose the lateral law."""
+        memory.law = LAWS[self.guidance]
+
+    def described(self, aircraft: str) -> str:
+        """The lateral law in words."""
+        return _DESCRIBED[self.guidance]
+
+    @property
+    def keeps_to_arcs(self) -> bool:
+        """The reference laws pass a waypoint as closely as they like."""
+        return self.guidance == "path"

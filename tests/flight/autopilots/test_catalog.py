@@ -1,0 +1,112 @@
+"""The list of autopilots: every one can be told by its name, stored in a log and restored, and told from the others."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+
+from aircraft.catalog import load_aircraft
+from flight.autopilots import catalog
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.autopilot import Autopilot, AutopilotProgram, StoredAutopilot
+from flight.autopilots.catalog import (
+    AUTOPILOTS,
+    autopilot_of_log,
+    load_autopilot,
+    program_autopilot,
+    restore_autopilot,
+    stored_name,
+)
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from world.errors import ScenarioError
+from world.scenario import Scenario, load_scenario, with_flight
+
+AEROSONDE = load_aircraft("aerosonde")
+GIVEN = {f"P{k}": float(k) for k in range(40)}
+PROGRAM = AutopilotProgram("ArduPlane V4.6.0 (7fbc1660)", "0826d539" + "e" * 56, GIVEN, {"P1": 1.0, "P2": 2.5})
+MINE = parameters_of("WP_RADIUS 50\nFOO 1\n", "mine.parm")
+
+
+@dataclass(frozen=True)
+class Other(PlanflyGuidance):
+    """Planfly's guidance by another name."""
+
+    name: ClassVar = "other"
+
+
+@pytest.fixture
+def listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(catalog._LAWS, Other.name, Other)
+
+
+def tight(**flight: str) -> Scenario:
+    return with_flight(load_scenario("tight"), **flight)
+
+
+def test_a_scenario_names_its_autopilot() -> None:
+    assert load_autopilot(tight(autopilot="ardupilot"), AEROSONDE).parameters is not None
+    assert load_autopilot(tight(guidance="l1"), AEROSONDE) == PlanflyGuidance("l1")
+
+
+def test_a_name_that_is_not_listed_is_one_line() -> None:
+    with pytest.raises(ScenarioError) as refused:
+        load_autopilot(tight(autopilot="ardupilott"), AEROSONDE)
+    assert str(refused.value) == (
+        "tight: flight.autopilot: 'ardupilott': 'ardupilot' or 'ideal' is expected: did you mean 'ardupilot'?"
+    )
+    assert (refused.value.field, refused.value.value) == ("flight.autopilot", "ardupilott")
+
+
+@pytest.mark.usefixtures("listed")
+def test_one_without_parameters_takes_no_file_of_them() -> None:
+    assert load_autopilot(tight(autopilot="other"), AEROSONDE) == Other()
+    with pytest.raises(ScenarioError, match=r"^tight: flight.params: x.parm: not a key of autopilot = .other.,"):
+        Autopilot.load.__func__(Other, tight(autopilot="other", params="x.parm").flight, AEROSONDE, "tight")
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "name"),
+    [
+        (PlanflyGuidance("vector-field"), None),
+        (ArduPlane(MINE), None),
+        (ArduPlaneSitl(MINE, PROGRAM), None),
+        (Other("l1"), "other"),
+    ],
+)
+@pytest.mark.usefixtures("listed")
+def test_each_is_stored_and_restored(autopilot: Autopilot, name: str | None) -> None:
+    assert stored_name(autopilot) == name
+    assert restore_autopilot(name, autopilot.store()) == autopilot
+
+
+def test_a_name_of_another_version_is_not_restored() -> None:
+    with pytest.raises(KeyError):
+        restore_autopilot("other", StoredAutopilot())
+
+
+def test_a_program_is_flown_in_the_place_of_its_law() -> None:
+    kind = program_autopilot(Path("arduplane"))
+    flown = kind.flying(ArduPlane(MINE), Path("arduplane"))
+    assert flown == ArduPlaneSitl(MINE)
+    assert flown.law == ArduPlane(MINE)
+    assert all(kind.name == law.name for law in AUTOPILOTS if law is ArduPlane)
+
+
+def test_a_log_says_who_wrote_it() -> None:
+    flown, notes = autopilot_of_log("ArduPlane V4.3.7", {"WP_RADIUS": 60.0}, "a.BIN") or (None, ())
+    assert flown is not None
+    assert (flown.acceptance_radius, notes) == (60.0, ())
+    assert autopilot_of_log("PX4 v1.14.0", {"WP_RADIUS": 60.0}, "a.ulg") is None
+
+
+def test_a_program_is_named_by_its_version_its_digest_and_what_was_changed() -> None:
+    flown = ArduPlaneSitl(default_parameters(), PROGRAM)
+    assert flown.described("aerosonde") == (
+        "ArduPlane V4.6.0 (7fbc1660) (sha256 0826d539...), 40 parameters set for aerosonde, changed: P1 1, P2 2.5"
+    )
+    assert replace(flown, program=replace(PROGRAM, changed={})).described("a").endswith("changed: none")
+    # No more than eight by name.
+    assert replace(flown, program=replace(PROGRAM, changed=GIVEN)).described("a").endswith("P6 6, P7 7, +32 more")
