@@ -172,7 +172,7 @@ class UdpStation:
         self.log += found
         return list(found)
 
-    def until(self, condition: Callable[[Any], bool], limit: float = 30.0) -> Any:
+    def until(self, condition: Callable[[Any], bool], limit: float = 120.0) -> Any:
         """The first message that meets a condition; fails after ``limit`` s."""
         end = time.monotonic() + limit
         while time.monotonic() < end:
@@ -196,7 +196,7 @@ class UdpStation:
 
     def upload(self, items: list[Any], kind: int = 0) -> int:
         uploader = Uploader(Station(self.to, 1, 1), items, kind, patience=0.5)
-        end = time.monotonic() + 30.0
+        end = time.monotonic() + 120.0
         while uploader.result is None and time.monotonic() < end:
             for message in uploader.tick(time.monotonic()):
                 self.send(message)

@@ -9,10 +9,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from types import FrameType
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from flight.live.link import Access, check_access, read_key
-from planfly.crash_safe_log import FlightLimits
 from planfly.terminal.arguments import (
     MISSIONS,
     aircraft_words,
@@ -28,7 +26,12 @@ from planfly.terminal.arguments import (
 from planfly.terminal.command_parser import CommandParser, OptionTaker
 from world.errors import FlightError
 from world.files import whole_path
-from world.scenario import Scenario, with_flight, with_wind
+
+# Help is given without what a command needs to run.
+if TYPE_CHECKING:
+    from flight.live.link import Access
+    from planfly.crash_safe_log import FlightLimits
+    from world.scenario import Scenario
 
 # ----------------------------------------------------------------------
 # The option that has a real autopilot fly.
@@ -247,8 +250,10 @@ def stop_signals() -> Iterator[Stopped]:
             signal.signal(number, handler)
 
 
-def link_access(args: argparse.Namespace) -> Access:
+def link_access(args: argparse.Namespace) -> "Access":
     """Who may talk to us, from the command line.  Raises FlightError or PlanflyError."""
+    from flight.live.link import Access, check_access, read_key
+
     allowed = frozenset(_ip("--allow", part.strip()) for part in (args.allow or "").split(",") if part.strip())
     key = read_key(Path(args.sign_key)) if args.sign_key else None
     access = Access(
@@ -301,17 +306,21 @@ def _program_name(args: argparse.Namespace) -> str | None:
     return program_autopilot(Path(args.autopilot)).name
 
 
-def flight_limits(args: argparse.Namespace) -> FlightLimits:
+def flight_limits(args: argparse.Namespace) -> "FlightLimits":
     """How long a flight may take, and how large its log may grow."""
+    from planfly.crash_safe_log import FlightLimits
+
     return FlightLimits(args.max_hours, args.max_log)
 
 
-def scenario_change(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
+def scenario_change(args: argparse.Namespace) -> "Callable[[Scenario], Scenario]":
     """What the options given change in a scenario; options that a command does not have change nothing."""
     return partial(_changed, args)
 
 
-def _changed(args: argparse.Namespace, scenario: Scenario) -> Scenario:
+def _changed(args: argparse.Namespace, scenario: "Scenario") -> "Scenario":
+    from world.scenario import with_flight, with_wind
+
     speed, from_deg = getattr(args, "wind", None) or (None, None)
     from_course = None if from_deg is None else math.radians(from_deg)
     flown = with_flight(scenario, **flight_entries(args))

@@ -5,11 +5,14 @@ or a command may name.
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from aircraft.path_limits import Limits
 from world.errors import ScenarioError
 from world.files import did_you_mean
+
+# A command's help names the algorithms without what they run on.
+if TYPE_CHECKING:
+    from aircraft.path_limits import Limits
 
 Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 
@@ -158,6 +161,6 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     return found
 
 
-def limits_for(algorithm: Algorithm, limits: Limits) -> Limits:
+def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":
     """Limits for an algorithm: those with the paper's violation counts ignore the autopilot's tracking error."""
     return limits if algorithm.graded else replace(limits, tracking=None)

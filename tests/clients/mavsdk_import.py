@@ -42,7 +42,7 @@ def main() -> None:
     print(sdk.add_any_connection(f"udpin://127.0.0.1:{port}"), file=sys.stderr)
     stop = threading.Event()
     threading.Thread(target=beat, args=(port, stop), daemon=True).start()
-    raw = MissionRaw(sdk.first_autopilot(20.0))
+    raw = MissionRaw(sdk.first_autopilot(120.0))
     out = []
     for name in sys.argv[1:]:
         reader = raw.import_qgroundcontrol_mission if name.endswith(".plan") else raw.import_mission_planner_mission

@@ -20,7 +20,7 @@ from mavsdk.plugins.mission_raw import MissionItem, MissionRaw, MissionRawError
 from mavsdk.plugins.telemetry import Telemetry
 
 # Seconds that a request may take, and what stands for the answer of one that takes longer.
-LIMIT, TRAPPED = 6.0, "NO END"
+LIMIT, TRAPPED = 30.0, "NO END"
 
 
 def main() -> None:
@@ -28,7 +28,7 @@ def main() -> None:
     rows = json.loads(Path(name).read_text(encoding="utf-8"))
     sdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     print(sdk.add_any_connection(f"udpin://127.0.0.1:{port}"), file=sys.stderr)
-    system = sdk.first_autopilot(20.0)
+    system = sdk.first_autopilot(120.0)
     if system is None:
         raise SystemExit("no vehicle")
     if task == "ask":
@@ -47,9 +47,8 @@ def by_items(system: System, rows: list[list[float]], flown: bool) -> dict[str, 
         MissionItem(k, frame, command, int(k == 0), 1, p1, p2, 0.0, 0.0, x, y, z, 0)
         for k, (frame, command, p1, p2, x, y, z) in enumerate(rows)
     ]
-    begun = time.monotonic()
     raw.upload_mission(items)
-    found: dict[str, object] = {"upload_s": time.monotonic() - begun}
+    found: dict[str, object] = {}
     back, found["downloads"] = downloaded(raw)
     found["back"] = [[i.frame, i.command, i.param1, i.param2, i.x, i.y, i.z] for i in back]
     if flown:
@@ -78,7 +77,7 @@ def by_plan(system: System, rows: list[list[float]]) -> dict[str, object]:
 
 
 def by_asking(system: System, rows: list[list[float]]) -> dict[str, object]:
-    """Ask for what a person may ask for, on the ground and in flight: the seconds that each took, and its answer."""
+    """Ask for what a person may ask for, on the ground and in flight: each one's answer."""
     mission, action, telemetry = Mission(system), Action(system), Telemetry(system)
     mission.upload_mission(MissionPlan([PlanItem(y, x, z, 25.0, True) for y, x, z in rows]))
     wait(telemetry.health_all_ok)
@@ -98,7 +97,7 @@ def by_asking(system: System, rows: list[list[float]]) -> dict[str, object]:
     # sends one every 0.5 s, at once with the news that it is in the air: what comes half-way between is least likely
     # to be crossed.
     time.sleep(0.25)
-    found: list[tuple[float, str]] = [(LIMIT, TRAPPED)]
+    found = [TRAPPED]
     request = threading.Thread(
         target=lambda: found.append(asked(lambda: mission.set_current_mission_item(0))), daemon=True
     )
@@ -108,14 +107,13 @@ def by_asking(system: System, rows: list[list[float]]) -> dict[str, object]:
     return {"ground": ground, "flight": flight}
 
 
-def asked(request: Callable[[], object]) -> tuple[float, str]:
-    """Seconds that a request took, and MAVSDK's name for what came of it."""
-    begun = time.monotonic()
+def asked(request: Callable[[], object]) -> str:
+    """MAVSDK's name for what came of a request."""
     try:
         request()
     except Exception as error:  # one class a plugin
-        return time.monotonic() - begun, str(error).split(";")[0]
-    return time.monotonic() - begun, "SUCCESS"
+        return str(error).split(";")[0]
+    return "SUCCESS"
 
 
 def fly(system: System, start: Callable[[], object], is_finished: Callable[[], bool]) -> dict[str, object]:
@@ -128,7 +126,7 @@ def fly(system: System, start: Callable[[], object], is_finished: Callable[[], b
     start()
     begun = time.monotonic()
     seen: set[float] = set()
-    while not is_finished() and time.monotonic() < begun + 90.0:
+    while not is_finished() and time.monotonic() < begun + 300.0:
         time.sleep(0.02)
         seen.add(telemetry.position().longitude_deg)
     return {
@@ -142,8 +140,8 @@ def fly(system: System, start: Callable[[], object], is_finished: Callable[[], b
 
 
 def wait(condition: Callable[[], bool]) -> bool:
-    """Whether a condition comes true within 20 s."""
-    end = time.monotonic() + 20.0
+    """Whether a condition comes true, waited for at most two minutes."""
+    end = time.monotonic() + 120.0
     while not condition() and time.monotonic() < end:
         time.sleep(0.05)
     return condition()

@@ -13,6 +13,7 @@ import pytest
 
 from planfly.cli import main
 from tests.logs.blank_pictures import draw_nothing
+from tests.stopwatch import Stopwatch, processes_of
 
 FIELD = """name = "field"
 [terrain]
@@ -53,7 +54,7 @@ class Served:
         try:
             first = self.wait(lambda line: line.startswith("vehicle "))
             self.port = int(first.split(",")[0].rsplit(":", 1)[1])
-            self.wait(lambda line: line.endswith(" ready"), 300.0)
+            self.wait(lambda line: line.endswith(" ready"))
         except AssertionError:
             self.kill()
             raise
@@ -62,7 +63,7 @@ class Served:
         for line in self.process.stdout:
             self.lines.append(line.rstrip("\n"))
 
-    def wait(self, condition: Callable[[str], bool], limit: float = 60.0) -> str:
+    def wait(self, condition: Callable[[str], bool], limit: float = 300.0) -> str:
         """The first line that meets a condition."""
         end = time.monotonic() + limit
         while time.monotonic() < end:
@@ -73,18 +74,8 @@ class Served:
         raise AssertionError("\n".join(self.lines))
 
     def children(self) -> list[int]:
-        """Process ids of the whole family."""
-        found = []
-        for entry in Path("/proc").iterdir():
-            if entry.name.isdigit():
-                try:
-                    fields = (entry / "stat").read_text(encoding="ascii", errors="replace").rsplit(")", 1)[1].split()
-                except OSError:
-                    continue
-                # A zombie only waits for its parent to take note.
-                if int(fields[3]) == self.process.pid and fields[0] != "Z":
-                    found.append(int(entry.name))
-        return found
+        """Process ids of the full family."""
+        return processes_of(self.process.pid)
 
     def cpu(self) -> float:
         """Seconds of processor time that the family has used."""
@@ -97,18 +88,19 @@ class Served:
         return ticks / os.sysconf("SC_CLK_TCK")
 
     def stop(self, number: signal.Signals = signal.SIGINT) -> int:
-        """End it as Ctrl-C does, within 2 s and with all its processes, and give its exit code."""
+        """End it as Ctrl-C does, within 2 s (`Stopwatch`) and with all its processes, and give its exit code."""
         if self.process.poll() is None:
             # To all of them, as from a terminal.
             os.killpg(self.process.pid, number)
-        begun = time.monotonic()
-        code = self.process.wait(30.0)
-        # What multiprocessing starts to clean up after it ends once it sees that its parent has.
-        while self.children() and time.monotonic() - begun < 2.0:
-            time.sleep(0.02)
-        assert time.monotonic() - begun < 2.0
+        with Stopwatch(self.process.pid) as watch:
+            code = self.process.wait(120.0)
+            # What multiprocessing starts to clean up after it ends once it sees that its parent has.
+            end = time.monotonic() + 60.0
+            while self.children() and time.monotonic() < end:
+                time.sleep(0.02)
+        assert watch.seconds < 2.0
         assert self.children() == []
-        self._reader.join(5.0)
+        self._reader.join(60.0)
         self.process.stdout.close()
         return code
 
@@ -116,8 +108,8 @@ class Served:
         """End the whole family at once, as a power cut does."""
         for number in self.children():
             os.kill(number, signal.SIGKILL)
-        self.process.wait(10.0)
-        self._reader.join(5.0)
+        self.process.wait(120.0)
+        self._reader.join(60.0)
         self.process.stdout.close()
 
 

@@ -37,6 +37,7 @@ class MemoryLog:
     rows: int = 0
     # How often it asks whether to hurry before it closes.
     patience: int = 0
+    looks: int = 0
     closed: list[str] = field(default_factory=list)
 
     def write(self, block: Track) -> None:
@@ -48,6 +49,7 @@ class MemoryLog:
         for _ in range(self.patience):
             if hurry():
                 break
+            self.looks += 1
             time.sleep(0.01)
         self.closed.append(ended)
         return FlightJudged(ended == "completed", ())
@@ -126,7 +128,7 @@ def test_a_full_disk_ends_the_flight_and_not_the_process() -> None:
 def test_a_judgement_is_hurried_when_the_process_is_to_end(gone: bool) -> None:
     """By an order behind another that waits, or by a link that is gone; nothing else hurries it."""
     ours, theirs = Pipe()
-    log = MemoryLog(patience=3000)
+    log = MemoryLog(patience=60_000)
     factory = OneSetup(setup_of(wp(0, 0), wp(0, 500)), log, speed=500.0)
     thread = Thread(target=serve_flights, args=(theirs, factory))
     thread.start()
@@ -141,9 +143,9 @@ def test_a_judgement_is_hurried_when_the_process_is_to_end(gone: bool) -> None:
         ours.close()
     else:
         ours.send(EndFlight(quit=True))
-    begun = time.monotonic()
-    thread.join(20.0)
-    assert time.monotonic() - begun < 5.0
+    thread.join(120.0)
+    assert not thread.is_alive()
+    assert log.looks < log.patience
     assert log.closed == ["completed"]
     if not gone:
         # What waited is answered in its turn, before the end.

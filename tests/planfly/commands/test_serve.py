@@ -21,6 +21,7 @@ from planfly.cli import main
 from tests.planfly.conftest import FIELD, Served
 from tests.soak import SOAK, scaled, tally, widen
 from tests.stations import UdpStation, item
+from tests.stopwatch import Stopwatch
 
 LAT, LON = 460_000_000, 80_000_000
 ROUTE = [
@@ -60,12 +61,14 @@ def test_a_served_flight_is_the_flight_of_fly_at_real_time(serve: Callable[..., 
         station.fly()
         station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0)
         before, begun, used = len(station.log), time.monotonic(), vehicle.cpu()
-        station.listen(5.0)
+        with Stopwatch(vehicle.process.pid) as watch:
+            station.listen(5.0)
         seconds = time.monotonic() - begun
         share = (vehicle.cpu() - used) / seconds
         counts = Counter(message.get_type() for message in station.log[before:])
-        assert counts["ATTITUDE"] / seconds == pytest.approx(30.0, rel=0.05)
-        assert counts["GLOBAL_POSITION_INT"] / seconds == pytest.approx(10.0, rel=0.05)
+        for kind, rate in (("ATTITUDE", 30.0), ("GLOBAL_POSITION_INT", 10.0)):
+            # What it waits for a core may cost it messages.
+            assert 0.95 * rate * watch.seconds < counts[kind] < 1.05 * rate * seconds
         assert {"VFR_HUD", "SYS_STATUS", "WIND", "HOME_POSITION", "EXTENDED_SYS_STATE", "HEARTBEAT"} <= set(counts)
         print(f"{share:.3f} of a core, attitude {counts['ATTITUDE'] / seconds:.2f} Hz")
         assert share < 0.15, f"{share:.3f} of a core"

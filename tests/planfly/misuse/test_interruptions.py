@@ -3,6 +3,7 @@
 A few moments of a few commands; with PLANFLY_SOAK=1 moments all over the time that every command takes.
 """
 
+import contextlib
 import json
 import os
 import shutil
@@ -21,6 +22,7 @@ from tests.autopilots import find_arduplane
 from tests.instances import make_instance, scenario_text
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK, note
+from tests.stopwatch import Stopwatch, processes_of
 
 pytestmark = pytest.mark.alone
 
@@ -110,19 +112,14 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def alive(session: int) -> list[str]:
     """Command lines of a session's processes that have not ended."""
     found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                fields = (entry / "stat").read_text(encoding="ascii", errors="replace").rsplit(")", 1)[1].split()
-                if int(fields[3]) == session and fields[0] != "Z":
-                    found.append((entry / "cmdline").read_text(encoding="utf-8").replace("\0", " "))
-            except OSError:
-                continue
+    for number in processes_of(session):
+        with contextlib.suppress(OSError):
+            found.append(Path(f"/proc/{number}/cmdline").read_text(encoding="utf-8").replace("\0", " "))
     return found
 
 
 def interrupted(case: Case, inputs: Path, folder: Path) -> tuple[int | None, float, str]:
-    """Run a command and interrupt it: exit code, seconds that its end took, and what it said.
+    """Run a command and interrupt it: exit code, seconds of its own that its end took (`Stopwatch`), and what it said.
 
     A code of None is a command that had ended before the signal came.
     """
@@ -141,7 +138,7 @@ def interrupted(case: Case, inputs: Path, folder: Path) -> tuple[int | None, flo
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )  # fmt: skip
     try:
-        until = time.monotonic() + 300.0
+        until = time.monotonic() + 900.0
         while process.poll() is None and not begun_work(case, said, work):
             assert time.monotonic() < until, said.read_text(encoding="utf-8")
             time.sleep(0.02)
@@ -152,9 +149,8 @@ def interrupted(case: Case, inputs: Path, folder: Path) -> tuple[int | None, flo
             os.killpg(process.pid, case.number)
         elif not over:
             process.send_signal(case.number)
-        begun = time.monotonic()
-        code = process.wait(60.0)
-        took = time.monotonic() - begun
+        with Stopwatch(process.pid) as watch:
+            code = process.wait(300.0)
         time.sleep(0.1)
         left = alive(process.pid)
     finally:
@@ -166,7 +162,7 @@ def interrupted(case: Case, inputs: Path, folder: Path) -> tuple[int | None, flo
     assert [str(path) for path in temporary.rglob("*")] == [], f"{case}: a temporary file is left"
     check_whole(work)
     assert not over or code in (0, 3, 4), f"{case}: {code}: {said.read_text(encoding='utf-8')}"
-    return (None if over else code), took, said.read_text(encoding="utf-8")
+    return (None if over else code), watch.seconds, said.read_text(encoding="utf-8")
 
 
 def begun_work(case: Case, said: Path, work: Path) -> bool:

@@ -52,7 +52,7 @@ def test_a_log_is_played_into_a_station(tmp_path: Path, served_log: Path) -> Non
         _, station.to = station.socket.recvfrom(4096)
         station.socket.settimeout(0.01)
         station.until(done)
-        _, errors = play.communicate(timeout=20.0)
+        _, errors = play.communicate(timeout=120.0)
     assert play.returncode == 0, errors
     east = [m.lon for m in station.log if m.get_type() == "GLOBAL_POSITION_INT"]
     assert len(set(east)) > 15

@@ -33,7 +33,7 @@ def started(program: Path) -> AutopilotProcess:
 
 
 def wait_for(file: Path) -> str:
-    for _ in range(500):
+    for _ in range(6000):
         if file.exists() and file.read_text():
             return file.read_text()
         time.sleep(0.01)
@@ -78,7 +78,7 @@ def test_leaving_kills_a_program_that_would_stay(tmp_path: Path) -> None:
 )
 def test_a_watch_tells_how_the_program_ended(tmp_path: Path, text: str, said: str) -> None:
     def watch() -> None:
-        for _ in range(500):
+        for _ in range(6000):
             process.watch()
             time.sleep(0.01)
 

@@ -5,9 +5,7 @@ import math
 import re
 import socket
 import struct
-import threading
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -121,9 +119,31 @@ def port() -> Iterator[PhysicsPort]:
 def autopilot(port: PhysicsPort) -> Iterator[socket.socket]:
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     opened.connect(("127.0.0.1", port.port))
-    opened.settimeout(5.0)
+    opened.settimeout(60.0)
     yield opened
     opened.close()
+
+
+class Looks:
+    """A program that is looked at, and a clock that goes on by a quarter of a second with each look, leaps beside."""
+
+    def __init__(self, leaps: dict[int, float] | None = None) -> None:
+        self.now, self.count, self._leaps = 100.0, 0, leaps or {}
+
+    def __call__(self) -> None:
+        self.count += 1
+        self.now += 0.25 + self._leaps.get(self.count, 0.0)
+
+
+@pytest.fixture
+def looked_at(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Looks]:
+    def begin(silence: float, leaps: dict[int, float] | None = None) -> Looks:
+        looks = Looks(leaps)
+        monkeypatch.setattr(physics, "SILENCE", silence)
+        port.watch, port._clock = looks, link.RunningClock(lambda: looks.now)
+        return looks
+
+    return begin
 
 
 def test_frames_are_taken_in_order_and_answered_to_their_sender(port: PhysicsPort, autopilot: socket.socket) -> None:
@@ -135,19 +155,24 @@ def test_frames_are_taken_in_order_and_answered_to_their_sender(port: PhysicsPor
 
 
 def test_a_frame_that_is_asked_for_again_is_told_again_and_no_frame(
-    port: PhysicsPort, autopilot: socket.socket
+    port: PhysicsPort, autopilot: socket.socket, looked_at: Callable[..., Looks]
 ) -> None:
+    looks = looked_at(10.0)
     autopilot.send(packet(3))
     port.receive()
     port.answer(b"the third")
-    time.sleep(0.15)
+    looks.now += 0.15
     for frame in (3, 3, 4):
         autopilot.send(packet(frame))
     assert port.receive().frame == 4
     assert [autopilot.recv(100) for _ in range(3)] == [b"the third"] * 3
 
 
-def test_what_was_asked_before_the_answer_came_has_had_it(port: PhysicsPort, autopilot: socket.socket) -> None:
+def test_what_was_asked_before_the_answer_came_has_had_it(
+    port: PhysicsPort, autopilot: socket.socket, looked_at: Callable[..., Looks]
+) -> None:
+    looked_at(10.0)
+    port.watch = lambda: None
     for frame in (3, 3, 3):
         autopilot.send(packet(frame))
     port.receive()
@@ -166,57 +191,34 @@ def test_a_frame_that_was_before_is_a_new_beginning(port: PhysicsPort, autopilot
         port.receive()
 
 
-def test_silence_ends_the_wait_and_not_sooner(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(physics, "SILENCE", 0.6)
-    started = time.monotonic()
+def test_silence_ends_the_wait_and_not_sooner(port: PhysicsPort, looked_at: Callable[..., Looks]) -> None:
+    looks = looked_at(0.6)
     with pytest.raises(FlightError, match="silent for 1 s; ended"):
         port.receive()
-    assert 0.6 < time.monotonic() - started < 2.0
+    # At 0, 0.25, 0.5 and 0.75 s.
+    assert looks.count == 4
 
 
-def test_a_sleeping_laptop_is_no_silence(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sleeping_laptop_is_no_silence(port: PhysicsPort, looked_at: Callable[..., Looks]) -> None:
     """Its clock leaps by an hour in the middle of a wait: the program, which slept too, is still waited for."""
-    leap = 0.0
-    real = time.monotonic
-    monkeypatch.setattr(link.time, "monotonic", lambda: real() + leap)
-    monkeypatch.setattr(physics, "SILENCE", 1.6)
-    looks = 0
-
-    def watch() -> None:
-        nonlocal leap, looks
-        looks += 1
-        leap = 3600.0 if looks >= 2 else 0.0
-
-    fresh = PhysicsPort()
-    fresh.watch = watch
+    looks = looked_at(1.6, {2: 3600.0})
     with pytest.raises(FlightError, match="silent"):
-        fresh.receive()
-    fresh.close()
-    # A look is a quarter of a second, and the leap counts as one second at most.
-    assert looks >= 4
+        port.receive()
+    # The leap counts as one second: at 0, 0.25, 1.25, 1.5 and 1.75 s.
+    assert looks.count == 5
 
 
 def test_the_same_question_without_end_is_no_understanding(
-    port: PhysicsPort, autopilot: socket.socket, monkeypatch: pytest.MonkeyPatch
+    port: PhysicsPort, autopilot: socket.socket, looked_at: Callable[..., Looks]
 ) -> None:
-    monkeypatch.setattr(physics, "SILENCE", 0.5)
+    looked_at(0.5)
     autopilot.send(packet(7))
     port.receive()
     port.answer(b"what it does not understand")
-    over = threading.Event()
-
-    def ask() -> None:
-        while not over.wait(0.05):
-            autopilot.send(packet(7))
-
-    asking = threading.Thread(target=ask)
-    asking.start()
-    try:
-        with pytest.raises(FlightError, match="does not understand the physics it is sent: asked for frame 7 again"):
-            port.receive()
-    finally:
-        over.set()
-        asking.join()
+    for _ in range(5):
+        autopilot.send(packet(7))
+    with pytest.raises(FlightError, match="does not understand the physics it is sent: asked for frame 7 again"):
+        port.receive()
 
 
 def test_a_wait_watches_the_program(port: PhysicsPort) -> None:
