@@ -1,38 +1,71 @@
-"""Whatever log a person brings: told by its first bytes and its suffix, and read."""
+"""Flight logs of other programs: which formats there are, how a file's is told, and what reads it."""
 
+import re
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from logs.importers.raw_log import RawLog
 from world.errors import LogError
 
+if TYPE_CHECKING:
+    from logs.importers.raw_log import RawLog
+
+    Reader = Callable[[Path], RawLog]
+
+
+class LogFormat(NamedTuple):
+    """One format.
+
+    name: for messages.
+    suffixes: of its files, in lower case.
+    content: what the first bytes of such a file hold, a regular expression.
+    reader: module and function, which takes a path, gives a `RawLog` and raises LogError; imported where it is needed,
+    for each brings its own library along.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    content: bytes
+    reader: str
+
+
+# Every format that is read; where a file's first bytes fit several, its suffix decides, and then the order here.
+FORMATS = (
+    LogFormat("PX4 .ulg", (".ulg",), rb"\AULog\x01\x12\x35", "px4_log.read_px4"),
+    LogFormat("ArduPilot .BIN", (".bin",), rb"\xa3\x95", "dataflash_log.read_dataflash"),
+    # Eight bytes of time, big-endian us since 1970 (2000 to 2111), and the first byte of a MAVLink packet.
+    LogFormat("MAVLink .tlog", (".tlog",), rb"\x00[\x03-\x0f].{6}[\xfd\xfe]", "telemetry_log.read_telemetry"),
+    LogFormat(".gpx", (".gpx",), rb"<gpx", "track_files.read_gpx"),
+    LogFormat(".igc", (".igc",), rb"(\A|[\r\n])HFDTE", "track_files.read_igc"),
+    LogFormat(".kml or .kmz", (".kml", ".kmz"), rb"<kml|\APK\x03\x04", "track_files.read_kml"),
+)
+SUFFIXES = tuple(suffix for known in FORMATS for suffix in known.suffixes)
+# A dataflash log as text, which is refused, and the suffix that such files have.
+_AS_TEXT, _TEXT_SUFFIX = rb"\A\s*FMT, ?128,", ".log"
 # A day of a vehicle that logs all it can takes less.
 MAX_BYTES = 2 * 2**30
-SUFFIXES = (".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml", ".kmz")
-# Refused by name.
-_NAMED = (".log",)
 _HEAD = 512
-_PX4_MAGIC, _ZIP_MAGIC = b"ULog\x01\x12\x35", b"PK\x03\x04"
 
 
 def is_imported_log(path: Path) -> bool:
-    """Whether a file is a log that others write, by its suffix.
+    """Whether a file is another program's log, by its suffix.
 
     >>> is_imported_log(Path("00000042.BIN")), is_imported_log(Path("flight.mcap"))
     (True, False)
     """
-    return path.suffix.lower() in (*SUFFIXES, *_NAMED)
+    return path.suffix.lower() in (*SUFFIXES, _TEXT_SUFFIX)
 
 
-def open_log(path: Path) -> RawLog:
+def open_log(path: Path) -> "RawLog":
     """Read a log.  Raises LogError, in one line, for a file that is none or that holds no place and time.
 
     >>> open_log(Path("nothing.BIN"))
     Traceback (most recent call last):
-    world.errors.LogError: nothing.BIN: no such file: a log (.bin, .tlog, .ulg, .gpx, .igc, .kml, .kmz) is expected
+    world.errors.LogError: nothing.BIN: no such file: a log (.ulg, .bin, .tlog, .gpx, .igc, .kml, .kmz) is expected
     """
+    import numpy as np
+
     try:
         if not path.is_file():
             raise LogError(f"{path}: no such file: a log ({', '.join(SUFFIXES)}) is expected", file=path)
@@ -43,52 +76,31 @@ def open_log(path: Path) -> RawLog:
             head = file.read(_HEAD)
         if not head:
             raise LogError(f"{path}: empty: a log is expected", file=path)
-        # What is no number in a damaged log is left out later, and told.
+        module, function = log_format(path, head).reader.split(".")
+        read: Reader = getattr(import_module(f"logs.importers.{module}"), function)
+        # What is no number in a damaged log is left out later, and reported.
         with np.errstate(all="ignore"):
-            return _reader(path, head)(path)
+            return read(path)
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory", file=path) from None
 
 
-def _reader(path: Path, head: bytes) -> Callable[[Path], RawLog]:
-    """What reads such a file; each brings its own library along."""
-    if head.startswith(_PX4_MAGIC):
-        from logs.importers.px4_log import read_px4
+def log_format(path: Path, head: bytes) -> LogFormat:
+    """The format of a file, by its first bytes and its suffix; by its suffix alone where they fit none.
 
-        return read_px4
-    if b"\xa3\x95" in head[:_HEAD] and path.suffix.lower() not in (".tlog", ".ulg"):
-        from logs.importers.dataflash_log import read_dataflash
+    Raises LogError where neither is known, and for a dataflash log as text.
 
-        return read_dataflash
-    if head.startswith(_ZIP_MAGIC):
-        from logs.importers.track_files import read_kml
-
-        return read_kml
-    text = head.decode("utf-8", errors="replace").lstrip("\ufeff \r\n\t").lower()
-    if text.startswith("<") or "<gpx" in text or "<kml" in text:
-        if "<kml" in text or path.suffix.lower() == ".kml":
-            from logs.importers.track_files import read_kml
-
-            return read_kml
-        from logs.importers.track_files import read_gpx
-
-        return read_gpx
-    if text.startswith("fmt, 128,") or text.startswith("fmt,128,"):
+    >>> log_format(Path("flight.igc"), b"<gpx>").name, log_format(Path("a.BIN"), bytes(9)).name
+    ('.gpx', 'ArduPilot .BIN')
+    """
+    if re.search(_AS_TEXT, head, re.IGNORECASE):
         raise LogError(f"{path}: a dataflash log as text: the .BIN that it was made of is read", file=path)
-    if path.suffix.lower() == ".igc":
-        from logs.importers.track_files import read_igc
-
-        return read_igc
-    from logs.importers.telemetry_log import looks_like_telemetry
-
-    if path.suffix.lower() == ".tlog" or looks_like_telemetry(head):
-        from logs.importers.telemetry_log import read_telemetry
-
-        return read_telemetry
-    raise LogError(
-        f"{path}: not a log that is known (it starts with {head[:8]!r}): ArduPilot .BIN, MAVLink .tlog, PX4 .ulg,"
-        " .gpx, .igc, .kml or .kmz is expected",
-        file=path,
-    )
+    fitting = [known for known in FORMATS if re.search(known.content, head, re.DOTALL | re.IGNORECASE)]
+    named = [known for known in FORMATS if path.suffix.lower() in known.suffixes]
+    if not fitting and not named:
+        names = ", ".join(known.name for known in FORMATS)
+        message = f"not a log that is known (it starts with {head[:8]!r}): {names} is expected"
+        raise LogError(f"{path}: {message}", file=path)
+    return next((known for known in named if known in fitting), (fitting or named)[0])

@@ -118,17 +118,6 @@ class TelemetryReader:
             return None
 
 
-def looks_like_telemetry(head: bytes) -> bool:
-    """Whether a file's first bytes are a time and a packet's beginning.
-
-    >>> looks_like_telemetry(_STAMP.pack(1_700_000_000_000_000) + bytes([0xFD, 9]))
-    True
-    """
-    if len(head) < _STAMP.size + 2:
-        return False
-    return _FIRST <= _STAMP.unpack_from(head)[0] <= _LAST and head[_STAMP.size] in (_V1, _V2)
-
-
 # ----------------------------------------------------------------------
 # The messages of one system in a telemetry log: those of numbers as rows, so that a long log stays small.
 

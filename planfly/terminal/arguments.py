@@ -5,6 +5,8 @@ import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from logs.importers.open_log import SUFFIXES
+
 # ----------------------------------------------------------------------
 # Texts of the command line as values: each refuses what it cannot take, saying what it expects.
 
@@ -154,7 +156,7 @@ SHELLS = ("bash", "zsh", "fish")
 # Beside which file the embedded ones stand: their modules would load numbers first.
 _ROOT = Path(__file__).parents[2]
 MISSIONS = ("json", "waypoints", "plan", "txt")
-IMPORTED_LOGS = ("BIN", "bin", "log", "tlog", "ulg", "gpx", "igc", "kml")
+IMPORTED_LOGS = ("BIN", "log", *(suffix[1:] for suffix in SUFFIXES))
 
 
 def completed(action: argparse.Action, completer: Completer) -> argparse.Action:

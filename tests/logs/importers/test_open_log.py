@@ -1,10 +1,11 @@
 import zipfile
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from logs.importers.open_log import MAX_BYTES, is_imported_log, open_log
+from logs.importers.open_log import FORMATS, MAX_BYTES, is_imported_log, log_format, open_log
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
 from world.errors import LogError
 
@@ -32,6 +33,35 @@ def test_by_what_is_in_it_whatever_it_is_called(tmp_path: Path, name: str) -> No
     assert open_log(path).format == name
 
 
+@pytest.mark.parametrize(
+    ("name", "head", "format_name"),
+    [
+        ("a.BIN", bytes(512), "ArduPilot .BIN"),
+        ("a.tlog", bytes(100) + b"\xa3\x95" + bytes(9) + b"\x00\x05" + bytes(6) + b"\xfd", "MAVLink .tlog"),
+        ("a.bin", b"\xa3\x95" + b"\x00\x05" + bytes(6) + b"\xfd", "ArduPilot .BIN"),
+        ("a.igc", b"AXXX001\r\n", ".igc"),
+        ("a.txt", b"AXXX001\rHFDTE160726\r", ".igc"),
+        ("a.xml", b"\xef\xbb\xbf<?xml version='1.0'?>\n<GPX>", ".gpx"),
+        ("a.gpx", b"<?xml version='1.0'?><kml>", ".kml or .kmz"),
+        ("a.ulg", b"ULog\x01\x12\x36", "PX4 .ulg"),
+    ],
+)
+def test_the_suffix_decides_where_the_first_bytes_do_not(name: str, head: bytes, format_name: str) -> None:
+    assert log_format(Path(name), head).name == format_name
+
+
+def test_a_log_whose_first_page_is_lost_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.tlog"
+    path.write_bytes(bytes(600) + telemetry(tmp_path / "whole.tlog").read_bytes())
+    assert open_log(path).damage.size == 600
+
+
+def test_every_reader_is_there() -> None:
+    for known in FORMATS:
+        module, function = known.reader.split(".")
+        assert callable(getattr(import_module(f"logs.importers.{module}"), function))
+
+
 def test_a_log_that_claims_ten_gigabytes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.BIN"
     with path.open("wb") as file:
@@ -47,6 +77,15 @@ def test_what_is_no_log_is_refused_in_a_line(tmp_path: Path, data: bytes) -> Non
     with pytest.raises(LogError) as caught:
         open_log(path)
     assert "\n" not in str(caught.value)
+
+
+def test_what_neither_its_bytes_nor_its_name_tell_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    path.write_bytes(b"hello, this is no log at all")
+    with pytest.raises(
+        LogError, match=r"not a log that is known \(it starts with b'hello, t'\): PX4 \.ulg, .* expected"
+    ):
+        open_log(path)
 
 
 def test_a_folder_is_no_log(tmp_path: Path) -> None:

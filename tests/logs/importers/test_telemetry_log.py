@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flight.mission.items import Home
 from logs.importers.raw_log import example_raw_log
-from logs.importers.telemetry_log import SystemMessages, TelemetryReader, looks_like_telemetry, read_telemetry
+from logs.importers.telemetry_log import SystemMessages, TelemetryReader, read_telemetry
 from tests.logs.importers.written_logs import telemetry
 from world.errors import LogError
 
@@ -44,12 +44,6 @@ def test_bytes_that_are_no_packet_are_passed_over_and_counted(tmp_path: Path) ->
 def test_a_cut_is_told(tmp_path: Path) -> None:
     _, reader = read(telemetry(tmp_path / "a.tlog").read_bytes()[:-7])
     assert reader.damage().cut
-
-
-def test_a_telemetry_log_is_known_by_its_first_bytes(tmp_path: Path) -> None:
-    assert looks_like_telemetry(telemetry(tmp_path / "a.tlog").read_bytes())
-    assert not looks_like_telemetry(b"\x00" * 20)
-    assert not looks_like_telemetry(b"\x00")
 
 
 # ----------------------------------------------------------------------
