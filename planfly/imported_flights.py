@@ -1,4 +1,4 @@
-"""Imported flights as setups and tracks of planfly's: in a scenario, along a mission, in the wind of their log."""
+"""Imported flights: another program's log in a scenario, along its mission, in its wind: judged, and flown again."""
 
 import hashlib
 import math
@@ -38,13 +38,12 @@ from world.scenario_tables import FlightTable
 
 Floats = NDArray[np.float64]
 
-
 _BLOCK = 2**20
 
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """What a person says of a flight beside its log; None where nothing is.
+    """What the options say of a flight beside its log; None where they say nothing.
 
     plan: a mission file or plan.json that was to be flown.
     scenario: to judge it in.  terrain: an elevation file.

@@ -144,8 +144,7 @@ def _frame_at(data: bytes, at: int) -> MavlinkFrame | None:
 # MAVLink 2 message signing: a signature is verified before anything about its packet is believed or kept.
 #
 # (mavlink.io, "Message Signing".)  pymavlink keeps a packet's timestamp before it checks the signature: one forged
-# packet
-# from the future then locks the real station out.
+# packet from the future then locks the real station out.
 
 # Timestamps count 10 us from 2015-01-01; a stream that is new may lag by a minute.
 EPOCH = 1_420_070_400.0

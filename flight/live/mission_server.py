@@ -2,7 +2,8 @@
 
 A mission, a fence and rally points are each taken whole or not at all: an upload is collected beside the list that is
 there and replaces it only when its last item is in and every item is valid.  One station uploads at a time; another is
-denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)
+denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)  pymavlink has the
+messages and a station's lists (`mavwp`), and nothing of the vehicle's side.
 """
 
 import math

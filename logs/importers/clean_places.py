@@ -1,4 +1,7 @@
-"""The places of a log put in order: what is doubled, late, impossible or missing is counted, and never made up."""
+"""The places of a log in order: rows that are doubled, late or impossible are dropped and counted, none is made up.
+
+First the clock is made steady, then rows are sorted, then places that no aircraft can have been at are taken out.
+"""
 
 import math
 from dataclasses import dataclass
@@ -15,8 +18,7 @@ Flags = NDArray[np.bool_]
 
 
 # ----------------------------------------------------------------------
-# The clock of a log put right: jumps back for good are taken out, and rows that came late find their place.
-
+# The clock: jumps back for good are taken out, and rows that came late find their place.
 
 # A clock that is behind by this (s) over this many rows in a row has jumped; less is a row out of order.
 BEHIND, ROWS_BEHIND = 1.0, 8
@@ -69,6 +71,9 @@ def _first_for_good(behind: Ints, time: Floats, latest: Floats) -> int:
             return int(k)
     return -1
 
+
+# ----------------------------------------------------------------------
+# Places, gaps and glitches.
 
 # A pause between rows longer than this (s), or than so many usual steps where rows are rarer, is a gap.
 LONGEST_STEP, USUAL_STEPS = 1.0, 1.5

@@ -2,7 +2,8 @@
 
 A message is 0xA3, 0x95, its type, and a body whose length and fields the log itself states in messages named FMT
 (ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message counts where the next one, or the
-file's end, begins right behind it.  pymavlink's `DFFormat` says what the letters of a format stand for.
+file's end, begins right behind it.  pymavlink's `DFFormat` says what the letters of a format stand for; its `DFReader`
+counts no damage, stopped at message 471 of 4,737 in a log with 400 wrong bytes, and takes 6 to 14 times as long.
 """
 
 import contextlib
@@ -28,7 +29,6 @@ Ints = NDArray[np.int64]
 
 # ----------------------------------------------------------------------
 # The bytes of a log without its size in memory: mapped, and let go of again piece by piece.
-
 
 # Bytes that are looked at before they are let go of.
 PIECE = 16 * 2**20
@@ -71,6 +71,9 @@ def pieces(size: int, let_go: Callable[[], None]) -> Iterator[int]:
         yield end
         let_go()
 
+
+# ----------------------------------------------------------------------
+# Messages: their formats, where they begin, and their fields as columns.
 
 HEADER = 3
 FMT = 128

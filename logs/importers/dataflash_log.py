@@ -1,6 +1,7 @@
 """ArduPilot's dataflash logs (`.BIN`): the messages that say where the vehicle was, what it felt, and what it was told.
 
-Names of messages and fields are those of ArduPilot's log documentation; of older releases those that stood there then.
+`logs.importers.dataflash_frames` finds the messages; here they become a `RawLog`.  Names of messages and fields are
+those of ArduPilot's log documentation; of older releases those that stood there then.
 """
 
 import math
@@ -23,9 +24,7 @@ from world.errors import LogError
 Floats = NDArray[np.float64]
 
 
-# ----------------------------------------------------------------------
-# Missions of ArduPilot's dataflash logs: the messages CMD, and home from ORGN where they hold none.
-
+# Missions: the messages CMD, and home from ORGN where they hold none.
 
 _NUMBERS = ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng", "Alt")
 # ORGN.Type of home; the other is where the estimator's map has its origin.

@@ -1,4 +1,8 @@
-"""A log made one flight: rows at the times of its places, and everything else it holds brought to those times."""
+"""One flight of a log: rows at the times of its places, and everything else the log holds brought to those times.
+
+A log may hold several flights, each flown along several missions: `make_flight` chooses one.  From it come the heights
+of a plan that states none, the mean wind, and the track that is judged.
+"""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +24,6 @@ Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
 # The flights of a log, and the stretches of them that were flown along a mission.
-
 
 # m/s over the ground as a median over `_OVER` s: more is flight.  An aircraft against the wind may be slower for so
 # many seconds.

@@ -1,4 +1,4 @@
-"""Missions, parameters and flight modes as logs hold them, by the names of any release."""
+"""What several formats hold alike: missions, ArduPlane's parameters and flight modes, by the names of any release."""
 
 from collections.abc import Iterable
 from dataclasses import replace

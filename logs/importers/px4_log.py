@@ -1,7 +1,7 @@
 """PX4's logs (`.ulg`): the topics that say where the vehicle was, what it felt, and what it was told.
 
-pyulog reads the container; names of topics and fields are those of PX4's message documentation, of older releases those
-that stood there then.
+pyulog reads the container; what of it is damaged is counted here, for pyulog says only whether anything is.  Names of
+topics and fields are those of PX4's message documentation, of older releases those that stood there then.
 """
 
 import contextlib
@@ -27,7 +27,6 @@ from world.kernels import compiled
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
 
 FORMAT = "PX4 log"
 # Bytes before the first record, and the letters of all records (PX4, "ULog File Format").

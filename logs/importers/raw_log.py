@@ -14,7 +14,6 @@ from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]
 
-
 # What kind of vehicle wrote it: "unknown" where the log does not say.
 VehicleKind = Literal["plane", "copter", "rover", "boat", "submarine", "tracker", "blimp", "unknown"]
 

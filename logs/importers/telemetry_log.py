@@ -1,6 +1,7 @@
 """Telemetry logs (`.tlog`) of ground stations: what an ArduPlane or PX4 sent, and the missions it was sent.
 
-The clock is the vehicle's, `time_boot_ms`; messages without it are placed by the time at which they were received.
+The packets are found and decoded first, then sorted by the system that sent them, then read as a `RawLog`.  The clock
+is the vehicle's, `time_boot_ms`; messages without it are placed by the time at which they were received.
 """
 
 import math
@@ -31,8 +32,8 @@ Floats = NDArray[np.float64]
 # The messages of a telemetry log (`.tlog`): each a time of eight bytes, and a MAVLink packet as it was received.
 #
 # MAVLink 1 packets begin with 0xFE, those of MAVLink 2 with 0xFD (mavlink.io, "Packet Serialization"); pymavlink
-# decodes
-# them and checks their checksums.  The time is in microseconds since 1970, big-endian (QGroundControl, MAVProxy).
+# decodes them and checks their checksums.  The time is in microseconds since 1970, big-endian (QGroundControl,
+# MAVProxy).
 
 _STAMP = struct.Struct(">Q")
 _V1, _V2 = 0xFE, 0xFD

@@ -1,4 +1,9 @@
-"""Track files: GPX, IGC flight recorders and KML, as flights without attitude or controls."""
+"""Track files: GPX, IGC flight recorders and KML, as flights without attitude or controls.
+
+GPX is read by gpxpy.  aerofiles 1.5 reads IGC in 3.7 times the time and raises KeyError for a file without a date;
+fastkml 1.4 reads KML in 8 times the time, a track with one damaged coordinate raises TypeError, and one with a damaged
+time pairs all later times with the wrong places.
+"""
 
 import calendar
 import math
@@ -132,8 +137,9 @@ def _routes(found: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
 # place of `A` says that there is no height by GNSS.
 
 IGC = "IGC flight recorder file"
-_PLACE = r"(\d{2})(\d{2})(\d{3})([NS])(\d{3})(\d{2})(\d{3})([EW])"
-_FIX = re.compile(rf"B(\d{{2}})(\d{{2}})(\d{{2}}){_PLACE}([AV])(-\d{{4}}|\d{{5}})(-\d{{4}}|\d{{5}})")
+_PLACE = r"(\d\d)([0-5]\d)(\d{3})([NS])(\d{3})([0-5]\d)(\d{3})([EW])"
+_HEIGHT = r"(-\d{4}|\d{5})"
+_FIX = re.compile(rf"B([01]\d|2[0-3])([0-5]\d)([0-5]\d){_PLACE}([AV]){_HEIGHT}{_HEIGHT}")
 _TASK_POINT = re.compile(rf"C{_PLACE}")
 _DATE = re.compile(r"HFDTE(?:DATE:?\s*)?(\d{2})(\d{2})(\d{2})")
 _DAY = 86_400.0

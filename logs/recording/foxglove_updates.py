@@ -33,13 +33,11 @@ from world.threats import Threats
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-
 # ----------------------------------------------------------------------
 # The flown track as a line that keeps up: every 2 s all of it so far, in a bounded number of points.
 #
 # A viewer that seeks gets the newest message alone, so that each holds the whole track; for a file that stays small,
 # older parts lose the points that lie nearest to the straight way between their neighbours.
-
 
 # s between messages.
 EVERY = 2
@@ -93,7 +91,6 @@ def thinned(points: Floats, wanted: int) -> Floats:
 
 # ----------------------------------------------------------------------
 # What happens in flight, noted when it happens: legs that begin, threats whose reach is entered and left.
-
 
 # `name` of these in the log: what a timeline works out for itself is not read back.
 NAME = "flight"

@@ -137,6 +137,9 @@ def _messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogCh
             yield LogMessage(channels[message.channel_id], message.log_time, message.data)
 
 
+# ----------------------------------------------------------------------
+# A log as one flight.
+
 _MESSAGE = struct.Struct("<HIQQ")
 _LEVEL_NAMES = {number: name for name, number in LEVELS.items()}
 

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 import zstandard
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 
 from flight.autopilots.autopilot import Autopilot, StoredAutopilot
 from flight.autopilots.catalog import restore_autopilot, stored_name
@@ -86,24 +86,18 @@ _ENCODING = "float32 bits, difference to the west modulo 2^32, byte planes (low 
 _PART_PIXELS = 4 * 2**20
 
 
-_Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class _File(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
+class _File(SetupModel):
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{TERRAIN_SCHEMA}$")] = TERRAIN_SCHEMA
     encoding: Annotated[str, Field(max_length=200)] = _ENCODING
     rows: Annotated[int, Field(ge=2)]
     cols: Annotated[int, Field(ge=2, le=_PART_PIXELS)]
-    spacing_m: Annotated[_Finite, Field(gt=0.0)]
+    spacing_m: Annotated[Finite, Field(gt=0.0)]
     source: str
     sha256: str
     datum: str
     vertical_error_m: float | None
-    map_to_pixel: Annotated[
-        list[list[Annotated[float, Field(allow_inf_nan=False)]]], Field(min_length=4, max_length=2 + 2 * MAX_TERMS)
-    ]
+    map_to_pixel: Annotated[list[list[Finite]], Field(min_length=4, max_length=2 + 2 * MAX_TERMS)]
     map_residual_pixels: float
     parts: list[str]
 
@@ -198,6 +192,9 @@ def _coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
         raise LogError.at(f"{source}: {TERRAIN_FILE}", "map_to_pixel", rows[1][:2], "not above 0", shown=shown)
     return np.array(rows)
 
+
+# ----------------------------------------------------------------------
+# The setup itself.
 
 LOG_SCHEMA = "planfly.log/1"
 _PACKAGES = (

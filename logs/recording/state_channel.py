@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 # Message objects of the protobuf library cost some microseconds each: ten thousand of them as much as minutes of
 # flight.
 
-
 _FIXED64, _LENGTH_DELIMITED = 1, 2  # wire types
 
 

@@ -66,7 +66,7 @@ def test_what_unpacks_to_more_than_is_read_is_refused(tmp_path: Path, monkeypatc
 
 
 # ----------------------------------------------------------------------
-# Gpx track.
+# GPX.
 
 
 def test_rows_are_what_gpxpy_reads(tmp_path: Path) -> None:
@@ -179,15 +179,27 @@ def test_the_declared_task_is_a_plan_without_heights(tmp_path: Path) -> None:
         assert item.lon_deg == pytest.approx(one.lon_deg, abs=1e-5)
 
 
-def test_fixes_that_cannot_be_read_are_counted(tmp_path: Path) -> None:
-    raw = read(tmp_path, f"{HEAD}{FIX}\r\nB11GARBAGE\r\n{FIX.replace('110135', '110136')}\r\n")
+@pytest.mark.parametrize(
+    "line",
+    [
+        "B11GARBAGE",
+        FIX.replace("B110135", "B240000"),
+        FIX.replace("B110135", "B116000"),
+        FIX.replace("B110135", "B110160"),
+        FIX.replace("5206343N", "5260000N"),
+        FIX.replace("00006198W", "00060000W"),
+    ],
+)
+def test_fixes_that_cannot_be_read_are_counted(tmp_path: Path, line: str) -> None:
+    raw = read(tmp_path, f"{HEAD}{FIX}\r\n{line}\r\n{FIX.replace('110135', '110136')}\r\n")
     assert raw.damage.unreadable == 1
+    assert raw.series["position"].time.tolist() == [0.0, 1.0]
     with pytest.raises(LogError, match=r"0 fixes \(B records\)"):
         read(tmp_path, HEAD)
 
 
 # ----------------------------------------------------------------------
-# Kml track.
+# KML.
 
 
 def test_a_track_has_times_and_places(tmp_path: Path) -> None:
