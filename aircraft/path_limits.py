@@ -131,8 +131,11 @@ def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -
     >>> slower.climb.round(3).tolist(), slower.descent.tolist()
     ([0.201, 0.201], [0.3, 0.3])
     """
-    most = [math.asin(min(1.0, rate / table.airspeed)) for rate in (climb_rate, sink_rate)]
-    climb, descent = _read_only(np.minimum(table.climb, most[0])), _read_only(np.minimum(table.descent, most[1]))
+    climb_limit, descent_limit = [math.asin(min(1.0, rate / table.airspeed)) for rate in (climb_rate, sink_rate)]
+    climb, descent = (
+        _read_only(np.minimum(table.climb, climb_limit)),
+        _read_only(np.minimum(table.descent, descent_limit)),
+    )
     return table._replace(climb=climb, descent=descent)
 
 

@@ -36,7 +36,7 @@ class FlightLimits:
     hours: float = MAX_HOURS
     megabytes: float = MAX_MEGABYTES
 
-    def most_ticks(self, dt: float) -> int:
+    def max_ticks(self, dt: float) -> int:
         """Guidance ticks of dt s that are flown at most."""
         return round(3600.0 * self.hours / dt)
 
@@ -73,7 +73,7 @@ def flight_text(setup: FlightSetup) -> str:
 INTERRUPTED = "interrupted"
 
 
-class WholeLog:
+class CrashSafeLog:
     """A `Recorder` as a context manager that Ctrl-C may end anywhere: what is written is written whole.
 
     An interrupted flight's log ends with how far it had got and holds no verdict, which `planfly check` gives; one
@@ -87,7 +87,7 @@ class WholeLog:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = Path(folder) / "flight.mcap"
     ...     try:
-    ...         with WholeLog(path, flown.setup) as log:
+    ...         with CrashSafeLog(path, flown.setup) as log:
     ...             log.write(track_rows(flown.track)[:100])
     ...             raise KeyboardInterrupt
     ...     except KeyboardInterrupt:
@@ -118,7 +118,7 @@ class WholeLog:
                 path.unlink(missing_ok=True)
             raise
 
-    def __enter__(self) -> "WholeLog":
+    def __enter__(self) -> "CrashSafeLog":
         """Return the log itself."""
         return self
 

@@ -26,14 +26,14 @@ from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.crash_safe_log import FlightLimits, WholeLog
+from planfly.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.reference_flights import judge_with_reference_flights
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
 from world.scenario import Scenario, load_scenario
 
-# Takes how far a stage is: done, whole, a remark.
+# Takes how far a stage is: done, total, a remark.
 Advance = Callable[[float, float, str], None]
 
 # Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
@@ -86,7 +86,7 @@ class OffNominal:
 class JudgedFlight:
     """A flight from its first tick to its verdict.
 
-    setup: with the real autopilot that flew, if one did.
+    setup: with the program that flew, if one did.
     track: the rows that are recorded, all of them where there is no log; none of a flight that could not begin.
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
@@ -184,15 +184,15 @@ def fly_and_judge(
     autopilot: Path | None = None,
     off_nominal: OffNominal | None = None,
     reference: bool = True,
-    most: FlightLimits = _USUAL_LIMITS,
+    limits: FlightLimits = _USUAL_LIMITS,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
-    autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
-    off_nominal: how the flight differs from what guidance knows; none of a real ArduPlane's.
+    autopilot: the program of ArduPlane (SITL) or another autopilot, which then flies; its own log is kept beside ours.
+    off_nominal: how the flight differs from what guidance knows; none of a program's.
     reference: whether the flights below are flown; whether it is flyable does not depend on them.
-    most: how long it may fly, and how large its log may grow.
+    limits: how long it may fly, and how large its log may grow.
 
     An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
     one passes, flights with other parameters.
@@ -207,10 +207,10 @@ def fly_and_judge(
     try:
         if autopilot is not None:
             program = program_autopilot(autopilot).flying(setup.autopilot, autopilot)
-            return _fly_program(setup, program, airframe, log, advance, every, most)
+            return _fly_program(setup, program, airframe, log, advance, every, limits)
         how = off_nominal or OffNominal(Variation())
         flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
-        return _record_and_judge(setup, airframe, flight, log, advance, every, most, reference=reference)
+        return _record_and_judge(setup, airframe, flight, log, advance, every, limits, reference=reference)
     except StartError as error:
         return _unflown(setup, log, f"not started: {error.reason}")
 
@@ -218,8 +218,8 @@ def fly_and_judge(
 def _stores_needed(setup: FlightSetup) -> float:
     """How many times the energy carried a route takes by prediction; 0 where not even full power all the way would."""
     seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
-    most = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
-    return needed_energy(setup) / setup.battery if most > MAX_ENERGY_RATIO * setup.battery else 0.0
+    full_energy = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
+    return needed_energy(setup) / setup.battery if full_energy > MAX_ENERGY_RATIO * setup.battery else 0.0
 
 
 def _fly_program(
@@ -229,12 +229,12 @@ def _fly_program(
     log: Path | None,
     advance: Advance | None,
     every: int,
-    most: FlightLimits,
+    limits: FlightLimits,
 ) -> JudgedFlight:
     with program.start(setup, airframe.aircraft) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every, most)
+            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every, limits)
         except FlightError:
             if log is not None:
                 log.unlink(missing_ok=True)
@@ -245,7 +245,7 @@ def _fly_program(
 
 
 def autopilot_log(log: Path) -> Path:
-    """Where a real autopilot's own log is kept, beside ours.
+    """Where the log that an autopilot's program writes is kept, beside ours.
 
     >>> autopilot_log(Path("runs/flight.mcap")).name
     'flight.BIN'
@@ -260,21 +260,21 @@ def _record_and_judge(
     log: Path | None,
     advance: Advance | None,
     every: int,
-    most: FlightLimits,
+    limits: FlightLimits,
     *,
     reference: bool = True,
 ) -> JudgedFlight:
-    flight.most_ticks = min(flight.most_ticks, most.most_ticks(flight.dt))
+    flight.max_ticks = min(flight.max_ticks, limits.max_ticks(flight.dt))
 
-    def report(done: float, whole: float) -> None:
+    def report(done: float, total: float) -> None:
         if advance is not None:
-            advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
+            advance(done, total, f"{done / 1000:.1f} of {total / 1000:.1f} km")
 
     if log is None:
         flown = fly_to_end(flight, progress=report)
         return _judged(setup, airframe, flown.track, flown.ended, reference=reference)
-    with WholeLog(log, setup, every=every, batch=BATCH) as recorder:
-        flown = fly_to_end(flight, recorder.write, report, lambda: most.log_full(recorder.size))
+    with CrashSafeLog(log, setup, every=every, batch=BATCH) as recorder:
+        flown = fly_to_end(flight, recorder.write, report, lambda: limits.log_full(recorder.size))
         recorder.ended = flown.ended
         judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended, reference=reference)
         for event in judged.events:

@@ -119,7 +119,7 @@ def find_deciding_parameter(
     """The parameter with another value of which a flight that failed passes; None where there is none.
 
     verdict: on the flight with the setup's own parameters.  progress: of each flight.  Takes about ten flights, by
-    ArduPlane's law: of a real autopilot's flight they say something where the law's own flight fails as well, and
+    its law: of a program's flight they say something where the law's own flight fails as well, and
     nothing where it passes.
     """
     if setup.autopilot.parameters is None or verdict.flyable:

@@ -94,10 +94,10 @@ def roll_model(
     A critically damped oscillator within limits of roll rate and acceleration.
     """
     frequency = gains.roll_frequency
-    most = gains.roll_acceleration_max
-    change = min(most, max(-most, frequency * (frequency * (wanted - bank) - 2.0 * rate)))
-    most = gains.roll_rate_max
-    change = min((most - rate) / dt, max((-most - rate) / dt, change))
+    limit = gains.roll_acceleration_max
+    change = min(limit, max(-limit, frequency * (frequency * (wanted - bank) - 2.0 * rate)))
+    limit = gains.roll_rate_max
+    change = min((limit - rate) / dt, max((-limit - rate) / dt, change))
     rate += change * dt
     return bank + rate * dt, rate, change
 

@@ -105,16 +105,16 @@ def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float: 
 
 
 @compiled
-def most_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
+def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
     """Sharpest curvature of the path between two distances, both at or after piece ``k``, 1/m, positive."""
-    most = 0.0
+    sharpest = 0.0
     for i in range(k, pieces.shape[0]):
         piece = pieces[i]
         if piece.start > end:
             break
         if piece.start + piece.length > start:
-            most = max(most, abs(piece.curvature))
-    return most
+            sharpest = max(sharpest, abs(piece.curvature))
+    return sharpest
 
 
 @compiled

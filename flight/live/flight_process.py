@@ -264,10 +264,10 @@ def _in_step(
     while not ended:
         now = clock()
         due = int((now - started) * speed / TICK) - ticks
-        most = max(1, int(_BEHIND * speed / TICK))
-        if due > most:
-            started += (due - most) * TICK / speed
-            due = most
+        max_due = max(1, int(_BEHIND * speed / TICK))
+        if due > max_due:
+            started += (due - max_due) * TICK / speed
+            due = max_due
         if due > 0:
             rows, ended = flight.block(due)
             ticks += due

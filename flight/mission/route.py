@@ -295,11 +295,11 @@ def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
         if limits is None:
             return PLAIN_SLOPE, PLAIN_SLOPE
         found = []
-        for k, most in enumerate((limits.max_climb, limits.max_dive)):
+        for k, stated in enumerate((limits.max_climb, limits.max_dive)):
             limit = min(limits.slopes(course, up, airspeed)[k] for course in np.arange(8) * (math.pi / 4.0))
-            least = min(limit, math.inf if most is None else most)
+            slope = min(limit, math.inf if stated is None else stated)
             # An aircraft that cannot climb at all gets a plain spiral, and the slope rule says so.
-            found.append(SPIRAL_SHARE * math.tan(least) if 0.0 < least < 1.5 else PLAIN_SLOPE)
+            found.append(SPIRAL_SHARE * math.tan(slope) if 0.0 < slope < 1.5 else PLAIN_SLOPE)
         return found[0], found[1]
 
     return slopes

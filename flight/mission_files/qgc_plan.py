@@ -35,9 +35,8 @@ from world.scenario_file import first_fault
 # ----------------------------------------------------------------------
 # QGroundControl's ComplexItems as the simple items that they stand for.
 #
-# Surveys and corridor scans carry their items with them (TransectStyleComplexItem.Items); a fixed-wing landing
-# pattern is
-# three items.  Anything else is a recipe that only its ground station can follow.
+# Surveys and corridor scans carry their items with them (TransectStyleComplexItem.Items); a fixed-wing landing pattern
+# is three items.  Anything else is a recipe that only its ground station can follow.
 
 _TRANSECTS = ("survey", "CorridorScan")
 _LANDING = "fwLandingPattern"

@@ -120,19 +120,26 @@ def _row(where: TextLine, line: str) -> _Row:
             f"{where}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})", file=where.file
         )
     values = dict(zip(_COLUMNS, fields, strict=True))
-    whole = {name: _whole(where, name, values[name]) for name in _ALLOWED}
+    integers = {name: _integer(where, name, values[name]) for name in _ALLOWED}
     p1, p2, p3, p4, lat, lon, alt = (_number(where, name, values[name]) for name in _COLUMNS[4:11])
     # A home line of Mission Planner may carry command 0.
-    command = whole["command"] or (Command.NAV_WAYPOINT if whole["seq"] == 0 else 0)
-    if is_located(command, whole["frame"]) and position_problem(lat, lon) is None:
+    command = integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0)
+    if is_located(command, integers["frame"]) and position_problem(lat, lon) is None:
         lat, lon = on_grid(lat), on_grid(lon)
     item = MissionItem(
-        whole["seq"], int(command), whole["frame"], (p1, p2, p3, p4), lat, lon, alt, bool(whole["autocontinue"])
+        integers["seq"],
+        int(command),
+        integers["frame"],
+        (p1, p2, p3, p4),
+        lat,
+        lon,
+        alt,
+        bool(integers["autocontinue"]),
     )
     problem = item_problem(item)
     if problem is not None:
         raise MissionError(**problem.at(where.file, where))
-    return _Row(where, bool(whole["current"]), item)
+    return _Row(where, bool(integers["current"]), item)
 
 
 def _refused(where: TextLine, field: str, value: str | int, shown: str, allowed: str) -> MissionError:
@@ -141,7 +148,7 @@ def _refused(where: TextLine, field: str, value: str | int, shown: str, allowed:
     )
 
 
-def _whole(where: TextLine, name: str, text: str) -> int:
+def _integer(where: TextLine, name: str, text: str) -> int:
     low, high = _ALLOWED[name]
     if not _WHOLE.fullmatch(text) or not low <= int(text) <= high:
         raise _refused(where, name, text, _shown(text), f"a whole number {low}..{high} is expected")
@@ -223,8 +230,8 @@ def _text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
 def _line(item: MissionItem, *, current: bool) -> str:
     numbers = [_decimal(value, 0) for value in item.params]
     position = [_decimal(item.lat_deg, 8), _decimal(item.lon_deg, 8), _decimal(item.alt, 3)]
-    whole = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
-    return "\t".join([*whole, *numbers, *position, str(int(item.autocontinue))])
+    integers = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
+    return "\t".join([*integers, *numbers, *position, str(int(item.autocontinue))])
 
 
 def _decimal(value: float, places: int) -> str:

@@ -208,7 +208,7 @@ class Airborne(ABC):
     map: from JSBSim's positions, around area and route.
     memory: guidance's, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     fdm: the aircraft that flies.
-    most_ticks: after so many its time is up.
+    max_ticks: after so many its time is up.
     """
 
     def __init__(
@@ -246,7 +246,7 @@ class Airborne(ABC):
         self._work.settings.middle = self.map.middle
         self._work.settings.battery = setup.battery
         patience = PATIENCE * self.path.length / _slowest_leg(setup, self._airspeeds) + PATIENCE_SECONDS
-        self.most_ticks = int(patience / self.dt)
+        self.max_ticks = int(patience / self.dt)
 
     @abstractmethod
     def _fly(self, count: int) -> int:
@@ -329,14 +329,14 @@ class Airborne(ABC):
         space.turbulence[:count] = self._random.standard_normal((count, 3))
         if self._navigation_random is not None:
             space.navigation[:count] = self._navigation_random.standard_normal((count, 3))
-        left = self.most_ticks - int(space.ticks_flown[0])
+        left = self.max_ticks - int(space.ticks_flown[0])
         space.rows_filled[0] = 0
         status = self._fly(min(count, left))
         rows = quantised(space.rows[: space.rows_filled[0]])
         if status:
             return rows, ENDS[status]
         if left <= count:
-            return rows, f"time limit: not finished after {self.most_ticks * self.dt:.0f} s"
+            return rows, f"time limit: not finished after {self.max_ticks * self.dt:.0f} s"
         return rows, ""
 
 

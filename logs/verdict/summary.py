@@ -189,12 +189,13 @@ def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | No
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe"):
         return []
+    whose = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameters are flown by the law, whoever flew.
     by_law = setup.autopilot.program is not None
-    why = "" if by_law else ": no single parameter that was tried would pass"
+    why = "" if by_law or not whose else ": no single parameter that was tried would pass"
     if deciding is not None:
         why = f": {deciding_text(deciding)}{', by the flight of its law' if by_law else ''}"
-    return [f"The aircraft can, {setup.autopilot.title} with these parameters cannot{why}"]
+    return [f"The aircraft can, {setup.autopilot.title}{whose} cannot{why}"]
 
 
 def _parameter_lines(setup: FlightSetup) -> list[str]:

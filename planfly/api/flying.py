@@ -159,7 +159,7 @@ def fly(
         check_binary(program)
     target = None if log is None else Path(log)
     most = FlightLimits(max_hours, max_log)
-    flown = fly_and_judge(opened.setup, opened.airframe, target, every=60 // log_hz, autopilot=program, most=most)
+    flown = fly_and_judge(opened.setup, opened.airframe, target, every=60 // log_hz, autopilot=program, limits=most)
     kept = target if len(flown.track) else None
     return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, kept)
 

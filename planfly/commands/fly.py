@@ -36,7 +36,7 @@ def fly(args: argparse.Namespace) -> int:
     with progress(f"flying {flight_text(opened.setup)}") as advance:
         every = 60 // args.log_hz
         flown = fly_and_judge(
-            opened.setup, opened.airframe, target, advance, every=every, autopilot=program, most=flight_limits(args)
+            opened.setup, opened.airframe, target, advance, every=every, autopilot=program, limits=flight_limits(args)
         )
     print_verdict(flown.verdict, opened.setup.route.notes)
     print(f"log       {target}" if len(flown.track) else "log       none: nothing was flown")

@@ -142,7 +142,7 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
     with progress(f"flying {flight_text(setup)}") as advance:
         flown = fly_and_judge(
-            setup, airframe, folder / "flight.mcap", advance, every=task.every, autopilot=task.program, most=task.most
+            setup, airframe, folder / "flight.mcap", advance, every=task.every, autopilot=task.program, limits=task.most
         )
     write_verdict(folder / "verdict.json", flown.verdict)
     with progress("drawing"):

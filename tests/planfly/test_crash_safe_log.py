@@ -11,7 +11,7 @@ from logs.recording.example_log import example_log
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from planfly.cli import main
-from planfly.crash_safe_log import FlightLimits, WholeLog, flight_text, predicted_seconds
+from planfly.crash_safe_log import CrashSafeLog, FlightLimits, flight_text, predicted_seconds
 from planfly.open_mission import OpenedMission, open_mission
 from planfly.pipeline import fly_and_judge
 from tests.planfly.conftest import FIELD
@@ -99,7 +99,7 @@ def test_a_log_is_full_beyond_its_limit(size: int, full: bool) -> None:
 
 
 def test_the_limit_of_time_is_in_ticks() -> None:
-    assert FlightLimits(hours=0.5).most_ticks(1.0 / 60.0) == 1800 * 60
+    assert FlightLimits(hours=0.5).max_ticks(1.0 / 60.0) == 1800 * 60
 
 
 def test_a_short_flight_is_told_in_seconds() -> None:
@@ -115,7 +115,7 @@ FLOWN = example_log()
 def test_an_interrupted_flight_keeps_every_row_it_was_handed(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     rows = track_rows(FLOWN.track)
-    with pytest.raises(Interrupted), WholeLog(path, FLOWN.setup, batch=60) as log:  # noqa: PT012
+    with pytest.raises(Interrupted), CrashSafeLog(path, FLOWN.setup, batch=60) as log:  # noqa: PT012
         log.write(rows[:37])
         log.write(rows[37:123])
         interrupt(2)
@@ -132,14 +132,14 @@ def test_a_signal_in_the_middle_of_a_write_waits(tmp_path: Path, monkeypatch: py
         written(self, rows)
 
     monkeypatch.setattr(Recorder, "write_rows", struck)
-    with pytest.raises(Interrupted), WholeLog(path, FLOWN.setup) as log:
+    with pytest.raises(Interrupted), CrashSafeLog(path, FLOWN.setup) as log:
         log.write(track_rows(FLOWN.track)[:50])
     assert len(read_log(path).track) == 50
 
 
 def test_a_flight_that_was_over_is_said_to_be(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
-    with pytest.raises(KeyboardInterrupt), WholeLog(path, FLOWN.setup) as log:  # noqa: PT012
+    with pytest.raises(KeyboardInterrupt), CrashSafeLog(path, FLOWN.setup) as log:  # noqa: PT012
         log.write(track_rows(FLOWN.track))
         log.ended = "completed"
         raise KeyboardInterrupt
@@ -156,14 +156,14 @@ def test_a_log_without_a_row_is_not_left(opening: bool, tmp_path: Path, monkeypa
 
     if opening:
         monkeypatch.setattr(Recorder, "__init__", struck)
-    with pytest.raises(KeyboardInterrupt), WholeLog(path, FLOWN.setup):
+    with pytest.raises(KeyboardInterrupt), CrashSafeLog(path, FLOWN.setup):
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_error_leaves_the_log_unfinished(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
-    with pytest.raises(LogError), WholeLog(path, FLOWN.setup) as log:  # noqa: PT012
+    with pytest.raises(LogError), CrashSafeLog(path, FLOWN.setup) as log:  # noqa: PT012
         log.write(track_rows(FLOWN.track))
         raise LogError("full")
     assert not read_log(path).complete
@@ -175,10 +175,10 @@ def test_a_target_that_is_a_link_is_never_removed(there: bool, tmp_path: Path) -
     link = tmp_path / "link.mcap"
     link.symlink_to(tmp_path / ("real.mcap" if there else "link.mcap"))
     if there:
-        with pytest.raises(Interrupted), WholeLog(link, FLOWN.setup):
+        with pytest.raises(Interrupted), CrashSafeLog(link, FLOWN.setup):
             interrupt(2)
         assert not (tmp_path / "real.mcap").exists()
     else:
         with pytest.raises(OSError, match="symbolic links"):
-            WholeLog(link, FLOWN.setup)
+            CrashSafeLog(link, FLOWN.setup)
     assert link.is_symlink()

@@ -69,8 +69,7 @@ ARDUPLANE_NUMBERS = ARDUPLANE.itemsize // 8
 # How ArduPlane flies along a mission's legs: the L1 law, when it turns to the next leg, and loiters.
 #
 # The L1 law is that of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900)
-# as
-# ArduPlane's documentation gives its parameters (ardupilot.org, Plane, "Navigation Tuning"), with the formulas of
+# as ArduPlane's documentation gives its parameters (ardupilot.org, Plane, "Navigation Tuning"), with the formulas of
 # `flight.guidance.lateral_reference_laws`.  ArduPlane navigates ten times a second: what it demands stays until then.
 
 # An acceptance is sent as whole metres in a byte.
@@ -92,8 +91,8 @@ def turn_distance(
     stated = math.floor(min(MAX_ACCEPTANCE, acceptance))
     if stated > 0.0:
         return stated
-    whole: float = min(radius * air_density_factor * air_density_factor, length)
-    return whole * min(1.0, turn / (0.5 * math.pi))
+    right_angle: float = min(radius * air_density_factor * air_density_factor, length)
+    return right_angle * min(1.0, turn / (0.5 * math.pi))
 
 
 @compiled
@@ -214,14 +213,14 @@ def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> f
 
 
 @compiled
-def least_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover - compiled
+def min_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover - compiled
     """Least airspeed that is flown in a wanted bank (rad), equivalent, m/s: AIRSPEED_MIN, for the load in the bank.
 
     A bank of phi takes 1 / sqrt(cos phi) of the least airspeed.
     """
     load = math.sqrt(math.cos(min(math.radians(85.0), abs(bank)))) if parameters.stall_prevention > 0.0 else 1.0
-    least: float = parameters.airspeed_min / load
-    return least
+    slowest: float = parameters.airspeed_min / load
+    return slowest
 
 
 @compiled
@@ -244,13 +243,11 @@ def roll_demand(
 # ----------------------------------------------------------------------
 # How ArduPlane keeps heights and speeds: the height demand along a leg, and TECS, which weighs energies.
 #
-# TECS (Total Energy Control System) gives the throttle what total energy is missing, and the pitch angle what is
-# amiss in
-# its balance between height and speed; the idea is Lambregts' (AIAA 83-2239).  What its parameters mean is from
+# TECS (Total Energy Control System) gives the throttle what total energy is missing, and the pitch angle what is amiss
+# in its balance between height and speed; the idea is Lambregts' (AIAA 83-2239).  What its parameters mean is from
 # ArduPilot's documentation (ardupilot.org, Plane, "TECS ... Tuning Guide" and the parameter list); how they combine was
 # found by regression of ArduPlane 4.6's flight logs (messages TECS, TEC2, TEC3), whose pitch demands these formulas
-# give
-# to eight digits.
+# give to eight digits.
 #
 # Energies are of a kilogram, m^2/s^2; their rates m^2/s^3.  Speeds are true airspeeds.
 
@@ -369,25 +366,25 @@ def update_tecs(
     """
     _estimate_airspeed(state, estimated, parameters, own, dt)
     speed = own.airspeed
-    slowest = least_airspeed(wanted_bank(own.side_acceleration, state.pitch, parameters), parameters) * factor
+    slowest = min_airspeed(wanted_bank(own.side_acceleration, state.pitch, parameters), parameters) * factor
     # What it cannot climb now, full throttle does not give.
-    most = GRAVITY * parameters.tecs_climb_max * own.climb_share
-    least = -GRAVITY * parameters.tecs_sink_min
+    max_rate = GRAVITY * parameters.tecs_climb_max * own.climb_share
+    min_rate = -GRAVITY * parameters.tecs_sink_min
     full = own.throttle_demand >= _ALL_BUT_FULL * parameters.throttle_max
     under = speed < _UNDERSPEED * slowest and full
     wanted = slowest if under else max(slowest, airspeed)
     change = wanted - own.airspeed_demand
-    most_change = _SPEED_CHANGE_SHARE * most / speed * dt
-    least_change = _SPEED_CHANGE_SHARE * least / speed * dt
-    own.airspeed_demand = max(slowest, own.airspeed_demand + min(most_change, max(least_change, change)))
+    max_change = _SPEED_CHANGE_SHARE * max_rate / speed * dt
+    min_change = _SPEED_CHANGE_SHARE * min_rate / speed * dt
+    own.airspeed_demand = max(slowest, own.airspeed_demand + min(max_change, max(min_change, change)))
     high = GRAVITY * (own.height_demand - estimated.up)
     fast = 0.5 * (own.airspeed_demand * own.airspeed_demand - speed * speed)
     slack = max(0.0, 0.5 * (speed * speed - slowest * slowest))
     fastest = parameters.airspeed_max * factor
-    room = min(0.0, 0.5 * (speed * speed - fastest * fastest))
+    margin = min(0.0, 0.5 * (speed * speed - fastest * fastest))
     climbing, gaining = GRAVITY * estimated.velocity_up, speed * own.acceleration
-    limited = min(slack, max(room, high))
-    _set_throttle(state, parameters, own, high, limited + fast, climbing + gaining, most, least, dt)
+    limited = min(slack, max(margin, high))
+    _set_throttle(state, parameters, own, high, limited + fast, climbing + gaining, max_rate, min_rate, dt)
     if under:
         own.throttle_demand = parameters.throttle_max
     _set_pitch(state, parameters, own, high, fast, climbing, gaining, under, dt)
@@ -395,16 +392,16 @@ def update_tecs(
 
 @compiled
 def _set_throttle(
-    state: Record, parameters: Record, own: Record, high: float, missing: float, rate: float, most: float,
-    least: float, dt: float,
+    state: Record, parameters: Record, own: Record, high: float, missing: float, rate: float, max_rate: float,
+    min_rate: float, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Throttle for the total energy that is missing (m^2/s^2), which changes at a rate (m^2/s^3).
 
-    high: potential energy that is missing.  most, least: rates of energy at full and at least throttle.
+    high: potential energy that is missing.  max_rate, min_rate: rates of energy at full and at idle throttle.
     """
     lowest, highest = max(0.0, parameters.throttle_min), parameters.throttle_max
-    per_throttle = (most - least) / (highest - parameters.throttle_min)
-    wanted = min(most, max(least, high / parameters.tecs_time))
+    per_throttle = (max_rate - min_rate) / (highest - parameters.throttle_min)
+    wanted = min(max_rate, max(min_rate, high / parameters.tecs_time))
     own.energy_rate_error += (wanted - rate - own.energy_rate_error) * dt / (dt + _RATE_LAG)
     tilt = math.sin(state.roll) * math.cos(state.pitch)
     drag = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
@@ -450,8 +447,8 @@ def _set_pitch(
     amiss = wanted - (height_weight * climbing - speed_weight * gaining)
     total = wanted + parameters.tecs_pitch_damping * amiss
     own.speed_sum -= speed_weight * fast / parameters.tecs_time * dt
-    most = _SPEED_SHARE * (top - bottom) * per_angle
-    own.speed_sum = min(most, max(-most, own.speed_sum))
+    limit = _SPEED_SHARE * (top - bottom) * per_angle
+    own.speed_sum = min(limit, max(-limit, own.speed_sum))
     own.balance_sum += parameters.tecs_integral * amiss * dt
     highest = (top + _PITCH_SPARE) * per_angle - total - own.speed_sum
     lowest = (bottom - _PITCH_SPARE) * per_angle - total - own.speed_sum
@@ -470,8 +467,7 @@ def _set_pitch(
 # One tick of ArduPlane: ten times a second it navigates and weighs energies, and at each tick follows its attitude.
 #
 # Attitudes are followed through planfly's inner loops (`flight.guidance.inner_loops`), as late as ArduPlane's
-# controllers
-# follow them, whose gains are tuned to the aircraft and are no part of the law.
+# controllers follow them, whose gains are tuned to the aircraft and are no part of the law.
 
 # ArduPlane navigates and updates its height and speed law so often, s (its scheduler's table: 10 Hz).
 NAVIGATION_TICK = 0.1
@@ -591,8 +587,8 @@ def _follow(
     before = memory.bank_rate
     rate = (own.roll_demand - memory.bank) / (ROLL_LAG * parameters.roll_time)
     rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, rate))
-    most = gains.roll_acceleration_max * dt
-    rate = before + min(most, max(-most, rate - before))
+    limit = gains.roll_acceleration_max * dt
+    rate = before + min(limit, max(-limit, rate - before))
     follow_roll(state, gains, memory, commands, memory.bank + rate * dt, rate, (rate - before) / dt, dt)
     pitch_rate = (own.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG * parameters.pitch_time)
     pitch_rate = min(_FASTEST_PITCH, max(-_FASTEST_PITCH, pitch_rate))

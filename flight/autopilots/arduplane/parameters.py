@@ -77,8 +77,8 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
     ['WP_RADIUS', 'THR_MAX']
     """
     found: dict[str, Entry] = {}
-    for number, whole in enumerate(re.split(r"\r\n|\n|\r", text), 1):
-        line = whole.partition("#")[0].strip()
+    for number, text_line in enumerate(re.split(r"\r\n|\n|\r", text), 1):
+        line = text_line.partition("#")[0].strip()
         if not line:
             continue
         entry = _entry(line, TextLine(source, number))
@@ -208,7 +208,7 @@ class ArduPilotParameters:
     roll_limit, pitch_limit_max, pitch_limit_min, pitch_trim: rad.
     roll_time, pitch_time: s, in which an attitude is to follow its demand.
     airspeed_cruise, airspeed_min, airspeed_max: m/s, equivalent airspeeds.
-    stall_prevention: 1 where a bank is narrowed, and the least airspeed raised, for the load in it; 0 where not.
+    stall_prevention: 1 where a bank is narrowed, and the minimum airspeed raised, for the load in it; 0 where not.
     throttle_min, throttle_max, throttle_cruise: 0..1.  throttle_slew: of the throttle's range, 1/s, 0 for no limit.
     glide_slope_min: m, a leg that climbs or sinks less is flown as a step.
     glide_slope_threshold: m, so far above a climbing slope it is drawn anew, 0 for never.
@@ -379,10 +379,10 @@ def logged_parameters(logged: Mapping[str, float], source: str) -> tuple[ArduPil
             values[definition.name] = value
         else:
             notes.append(f"{definition.name} {value:g} of the log is not allowed: the default is taken")
-    for least, most in _PAIRS:
-        if least in values and most in values and values[least] >= values[most]:
-            notes.append(f"{least} {values[least]:g} and {most} {values[most]:g} of the log: the defaults are taken")
-            del values[least], values[most]
+    for low, high in _PAIRS:
+        if low in values and high in values and values[low] >= values[high]:
+            notes.append(f"{low} {values[low]:g} and {high} {values[high]:g} of the log: the defaults are taken")
+            del values[low], values[high]
     if not values:
         notes.append("the log holds no parameters: ArduPlane's defaults are taken")
     stated = tuple(ParameterValue(name, value, "file") for name, value in values.items())
@@ -410,13 +410,13 @@ def _parameters(
 
 
 def _check_order(made: ArduPilotParameters, source: str) -> None:
-    """Refuse a least that is not below its most."""
+    """Refuse a minimum that is not below its maximum."""
     values = {name: value for name, value, _ in made.values}
-    for least, most in _PAIRS:
-        if values[least] >= values[most]:
-            value, allowed = values[least], f"must be below {most} {values[most]:g}"
-            message = f"{source}: {least} {value:g}: {allowed}"
-            raise ParameterError(message, file=source, field=least, value=value, allowed=allowed)
+    for low, high in _PAIRS:
+        if values[low] >= values[high]:
+            value, allowed = values[low], f"must be below {high} {values[high]:g}"
+            message = f"{source}: {low} {value:g}: {allowed}"
+            raise ParameterError(message, file=source, field=low, value=value, allowed=allowed)
 
 
 # Definition and factor to its unit, by each name that a file may have.

@@ -124,14 +124,14 @@ def _fill(
                 corner.acceptance = MIN_ACCEPTANCE
                 continue
             low, high = MIN_ACCEPTANCE, MAX_ACCEPTANCE
-            best, least = low, math.inf
+            best, nearest = low, math.inf
             for _ in range(1 if fly_over else _ROUNDS):
                 step = (high - low) / (_TRIED - 1)
                 for k in range(1 if fly_over else _TRIED):
                     acceptance = math.floor(low + k * step)
                     flown = _fly_corner(parameters, airspeed, turns[i], speeds[j], acceptance, fly_over, waypoints)
-                    if flown[0] < least:
-                        best, least = acceptance, flown[0]
+                    if flown[0] < nearest:
+                        best, nearest = acceptance, flown[0]
                         corner.excursion, corner.after = flown
                 low, high = max(MIN_ACCEPTANCE, best - step), min(MAX_ACCEPTANCE, best + step)
             corner.acceptance = best

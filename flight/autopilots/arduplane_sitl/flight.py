@@ -89,13 +89,13 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
-    k, least, distance, aside = memory.piece, math.inf, 0.0, 0.0
+    k, nearest, distance, aside = memory.piece, math.inf, 0.0, 0.0
     for i in range(memory.piece, min(memory.piece + _AHEAD, pieces.shape[0])):
         piece = pieces[i]
         along, cross, _ = project(piece, true.east, true.north)
         outside = max(0.0, -along, along - piece.length)
-        if math.hypot(cross, outside) < least:
-            k, least = i, math.hypot(cross, outside)
+        if math.hypot(cross, outside) < nearest:
+            k, nearest = i, math.hypot(cross, outside)
             distance, aside = piece.start + along, cross
     memory.piece = k
     memory.distance = distance
@@ -303,7 +303,7 @@ def fly_autopilot(
     progress: Progress | None = None,
     log: Path | None = None,
 ) -> tuple[SimulatedFlight, FlightSetup]:
-    """Fly a setup with a real autopilot, from its boot to its end; arguments as of `AutopilotFlight` and `simulate`.
+    """Fly a setup with ArduPlane SITL, from its boot to its end; arguments as of `AutopilotFlight` and `simulate`.
 
     log: where the autopilot's own log (.BIN) is kept.
 

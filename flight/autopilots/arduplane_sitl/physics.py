@@ -352,10 +352,9 @@ def _is_number(value: object) -> bool:
 # ----------------------------------------------------------------------
 # The rail in the air that an autopilot's flight starts on, before the aircraft flies by itself.
 #
-# The autopilot's estimator has to settle with the aircraft at rest, and no aircraft rests in the air.  So it stands
-# on a
-# rail, level, at the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along the rail to
-# the speed of that flight, and let go.
+# The autopilot's estimator has to settle with the aircraft at rest, and no aircraft rests in the air.  So it stands on
+# a rail, level, at the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along the rail
+# to the speed of that flight, and let go.
 
 # Along the rail, m/s^2.
 PUSH = 5.0

@@ -30,10 +30,8 @@ Floats = NDArray[np.float64]
 # The mission that an autopilot is given to fly: the items that the route is made of, and one place more.
 #
 # What a flight from air to air cannot hold is made a waypoint where the route has it: a take-off, a landing, a return
-# to
-# launch.  A place more, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it
-# takes a
-# waypoint as reached a radius early, and returns to launch after the last.
+# to launch.  A place more, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it
+# takes a waypoint as reached a radius early, and returns to launch after the last.
 
 
 # From the end of the route to the place more, m.

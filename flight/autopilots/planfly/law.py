@@ -23,7 +23,7 @@ from flight.guidance.lateral_reference_laws import (
     l1_length,
     l1_reached,
 )
-from flight.guidance.path import find_on_path, mean_curvature, most_curvature, profile
+from flight.guidance.path import find_on_path, max_curvature, mean_curvature, profile
 from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled
@@ -128,13 +128,12 @@ def _along_path(
     lift = GRAVITY + memory.bend_acceleration
     wanted = math.atan((turn + push) / (lift * crab))
     bank: float = min(memory.max_bank, max(-memory.max_bank, wanted))
-    sharpest = most_curvature(pieces, k, s, s + speed * gains.arc_slowing_time)
+    sharpest = max_curvature(pieces, k, s, s + speed * gains.arc_slowing_time)
     memory.arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, sharpest))
     # What the bank limit leaves, within limits, a skid: its side force points where the turn goes.
     left = lift * (math.tan(wanted) - math.tan(bank))
     slip = left / max(1.0, gains.side_per_sideslip * _pressure(state, gains))
-    most = gains.sideslip_max
-    memory.sideslip = -min(most, max(-most, slip))
+    memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, slip))
     if bank == wanted and abs(memory.cross_track) < 20.0:
         memory.cross_track_sum = min(40.0, max(-40.0, memory.cross_track_sum + memory.cross_track * dt))
     return bank
@@ -174,8 +173,8 @@ def _correction(
     """Acceleration to the right that corrects the cross-track error and what pushes the aircraft aside, m/s^2."""
     frequency = gains.cross_track_frequency
     rate_gain = 2.0 * gains.cross_track_damping * frequency
-    most = speed * math.sin(gains.intercept)
-    wanted_rate = min(most, max(-most, -(memory.cross_track - memory.aside) * frequency * frequency / rate_gain))
+    limit = speed * math.sin(gains.intercept)
+    wanted_rate = min(limit, max(-limit, -(memory.cross_track - memory.aside) * frequency * frequency / rate_gain))
     # Flying away from the course counts as flying square to it: the sine would fall again.
     away = abs(off_course) > 0.5 * math.pi
     rate = math.copysign(speed, off_course) if away else speed * math.sin(off_course)

@@ -116,13 +116,13 @@ def test_a_start_in_the_ground_is_refused() -> None:
 def test_a_flight_may_take_its_length_at_its_slowest_ground_speed_and_more() -> None:
     flight = airborne([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]], wind=(5.0, 0.0))
     seconds = PATIENCE * 3000.0 / 20.0 + PATIENCE_SECONDS
-    assert flight.most_ticks == pytest.approx(seconds / flight.dt, abs=60)
+    assert flight.max_ticks == pytest.approx(seconds / flight.dt, abs=60)
 
 
 def test_a_block_ends_with_the_time() -> None:
     flight = airborne([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])
     flight._disturb(MAKE(np.array([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])))
-    flight.most_ticks = 0
+    flight.max_ticks = 0
     rows, ended = flight.block(10)
     assert len(rows) == 0
     assert ended == "time limit: not finished after 0 s"

@@ -16,7 +16,7 @@ import pytest
 from logs.recording.example_log import example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.crash_safe_log import WholeLog
+from planfly.crash_safe_log import CrashSafeLog
 from tests.planfly.conftest import FIELD
 from tests.soak.test_hostile_files import WPL
 from world.errors import PlanflyError
@@ -223,11 +223,11 @@ def test_two_runs_into_one_folder(folder: Path, capsys: pytest.CaptureFixture[st
 def test_two_flights_into_one_log(folder: Path) -> None:
     """The second does not touch the first's log."""
     path, setup = folder / "f.mcap", example_log().setup
-    with WholeLog(path, setup) as first:
+    with CrashSafeLog(path, setup) as first:
         size = path.stat().st_size
         with pytest.raises(PlanflyError, match=r"f\.mcap: another planfly is writing there"):
-            WholeLog(path, setup)
+            CrashSafeLog(path, setup)
         assert path.stat().st_size == size
         del first
-    with WholeLog(path, setup):
+    with CrashSafeLog(path, setup):
         pass
