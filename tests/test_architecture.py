@@ -184,6 +184,21 @@ def resolves(reference: str) -> bool:
     return ROOT.joinpath(*parts).is_dir()
 
 
+def test_benchmarks_and_examples_import_what_there_is() -> None:
+    """No test runs them all: a name that has gone would show when somebody does."""
+    lost = [
+        f"{name_of(file)}:{node.lineno}: {node.module}.{alias.name}"
+        for file in CODE
+        if file.relative_to(ROOT).parts[0] in ("benchmarks", "examples")
+        for node in ast.walk(parsed(file))
+        if isinstance(node, ast.ImportFrom) and node.module
+        if node.module.partition(".")[0] in (*PACKAGES, "benchmarks", "tests") and node.module != "planfly"
+        for alias in node.names
+        if not resolves(f"{node.module}.{alias.name}")
+    ]
+    assert lost == []
+
+
 def test_names_in_backquotes_lead_to_what_they_name() -> None:
     """A reference such as `world.raster.read_terrain`, in a docstring, a comment or a page, leads somewhere."""
     # The changelog tells of names that have gone.

@@ -1,4 +1,8 @@
-"""Elevation files (GeoTIFF, .hgt, .npz): opened, checked, and read as a window at source resolution."""
+"""Elevation files: opened and checked by `FORMATS`, and read as a window at source resolution.
+
+A format is chosen by the file's first bytes or by its suffix, and its driver is explicit, so that nothing that merely
+names another file (VRT, a URL, a `/vsi` path) is ever opened.  Heights are above mean sea level as the file has them.
+"""
 
 import hashlib
 import math
@@ -20,18 +24,14 @@ from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, t
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
-
-
-# ----------------------------------------------------------------------
-# An elevation file that was opened and understood: what `world.raster` reads windows from; and the .npz form.
-
 ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 # A window, or an .npz file, with more pixels than this is refused before it is allocated.
 MAX_PIXELS = 120_000_000
-# Rows of the tile that we ship (matplotlib does, too), and what it states as xmin, xmax, ymin and ymax, deg; a copy of
-# it under another name is known by them, to a hundredth of a pixel.
-_TILE_ROWS, _TILE_EDGES, _SAME_EDGE = 344, (-84.41375, -84.07791667, 36.73291667, 36.44625), 1e-5
+# Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
+EMBEDDED = {"jacksboro": "jacksboro.npz"}
+_OWN_FILES = Path(__file__).parent / "elevation"
+EARTH_DATUM = "mean sea level, as the file's heights are taken"
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +84,14 @@ def file_sha256(path: Path) -> str:
 def one_line(error: BaseException) -> str:
     """First line of an error's text, or its type where it has none."""
     return str(error).splitlines()[0] if str(error) else type(error).__name__
+
+
+# ----------------------------------------------------------------------
+# The .npz form.
+
+# Rows of the tile that we ship (matplotlib does, too), and what it states as xmin, xmax, ymin and ymax, deg; a copy of
+# it under another name is known by them, to a hundredth of a pixel.
+_TILE_ROWS, _TILE_EDGES, _SAME_EDGE = 344, (-84.41375, -84.07791667, 36.73291667, 36.44625), 1e-5
 
 
 def open_npz(file: Path, name: str) -> RasterFile:
@@ -162,36 +170,127 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
 
 
 # ----------------------------------------------------------------------
-# Elevation files: GeoTIFF, .hgt and .npz, read as a window at source resolution.
-#
-# The driver is explicit and chosen by the file's first bytes, so that nothing that merely names another file (VRT, a
-# URL, a `/vsi` path) is ever opened.  Heights are taken as above mean sea level and never converted.
+# What rasterio reads.
 
-__all__ = ["EMBEDDED", "MAX_PIXELS", "RasterFile", "open_raster", "read_terrain", "tile_bounds"]
-
-
-# Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
-EMBEDDED = {"jacksboro": "jacksboro.npz"}
-# Data that is missing without a stated nodata value: these, and what is lower or higher than any ground, m.
-UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
-LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
-# Worst error allowed for the polynomial from map to pixels, in pixels.
-PIXEL_TOLERANCE = 1e-3
 METRES = ("m", "metre", "metres", "meter", "meters")
 # A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
 MAX_BLOCK = 32 * 2**20
 # Pixels of a window that are read before the next ones: numbers and masks take several times the heights' own memory.
 _PIXELS_AT_ONCE = 2**22
-# Pixels without data that are looked at before the next ones: one inside the area is enough.
-_HOLES_AT_ONCE = 2**16
-_OWN_FILES = Path(__file__).parent / "elevation"
-EARTH_DATUM = "mean sea level, as the file's heights are taken"
+
+
+def _applied(transform: Any, x: Any, y: Any) -> tuple[Any, Any]:
+    """Apply an affine transform to numbers or arrays; its own operator for that is `*` or `@`, by its version."""
+    return transform.a * x + transform.b * y + transform.c, transform.d * x + transform.e * y + transform.f
+
+
+def _read_strips(opened: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
+    """Heights of a window (top, bottom, left, right) of an open file, some rows at a time; NaN where it has no data."""
+    top, bottom, left, right = window
+    heights = np.empty((bottom - top, right - left), dtype=np.float32)
+    at_once = max(1, _PIXELS_AT_ONCE // (right - left))
+    for row in range(top, bottom, at_once):
+        rows = min(at_once, bottom - row)
+        # Numbers that a file stores scaled are rare, and silently wrong if read as they stand.
+        strip = opened.read(1, window=((row, row + rows), (left, right)), masked=True)
+        whole = np.ma.filled(strip.astype(np.float64), np.nan) * scale + offset
+        heights[row - top : row - top + rows] = whole
+    return heights
+
+
+def _open_rasterio(file: Path, driver: str) -> RasterFile:
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
+
+    guard: dict[str, Any] = {
+        "GDAL_PAM_ENABLED": "NO",
+        "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
+        "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
+        # The vertical part of the reference system too, for its unit.
+        "GTIFF_REPORT_COMPD_CS": "YES",
+        # Of blocks once unpacked, bytes; the default is a share of the machine's memory.
+        "GDAL_CACHEMAX": 64 * 2**20,
+    }
+    try:
+        with warnings.catch_warnings(), rasterio.Env(**guard):
+            # Without georeferencing there is no reference system either, and that is refused in one line.
+            warnings.simplefilter("ignore", NotGeoreferencedWarning)
+            with rasterio.open(os.fspath(file.resolve()), driver=driver) as source:
+                crs, forward, kind = source.crs, source.transform, np.dtype(source.dtypes[0]).kind
+                rows, cols, bands = source.height, source.width, source.count
+                scale, offset = float(source.scales[0]), float(source.offsets[0])
+                block, unit = math.prod(source.block_shapes[0]), source.units[0]
+        transformer = None if crs is None else crs_transformer(crs.to_wkt())
+        stated, metres = height_unit(crs.to_wkt()) if crs is not None else ("metre", 1.0)
+    except (RasterioError, RasterioIOError, ValueError, TypeError, OSError) as error:
+        raise TerrainError(f"{file}: not a readable {driver} file: {one_line(error)}", file=file) from error
+    if bands != 1 or kind not in "iuf":
+        allowed = "an elevation file has 1 band of numbers"
+        raise TerrainError.at(file, "bands", bands, allowed, shown=f"{bands} of kind {kind!r}")
+    if transformer is None or forward.determinant == 0.0:
+        raise TerrainError(f"{file}: no coordinate reference system and position are stated", file=file)
+    if (unit or "m").lower() not in METRES or metres != 1.0:
+        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "metres are expected")
+    if block > MAX_BLOCK:
+        allowed = f"at most {MAX_BLOCK:,} are; tile the file"
+        raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
+    if min(rows, cols) < 2:
+        raise TerrainError.at(file, "rows, columns", (rows, cols), "at least 2 x 2 pixels are expected")
+
+    inverse = ~forward
+    middle = _applied(forward, cols / 2, rows / 2)[0] if crs.is_geographic else math.nan
+
+    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+        x, y = transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
+        if not math.isnan(middle):
+            x = longitude_near(np.asarray(x), middle)
+        col, row = _applied(inverse, np.asarray(x), np.asarray(y))
+        return np.asarray(col) - 0.5, np.asarray(row) - 0.5
+
+    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
+        try:
+            with rasterio.Env(**guard), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
+                return _read_strips(opened, (top, bottom, left, right), scale, offset)
+        except (RasterioError, RasterioIOError, OSError) as error:
+            raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
+
+    col, row = outline(cols, rows)
+    x, y = _applied(forward, col + 0.5, row + 0.5)
+    lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
+    return RasterFile(str(file), (rows, cols), to_source, np.stack([lon, lat], axis=1), file_sha256(file), read)
+
+
+# ----------------------------------------------------------------------
+# The formats, and which of them a file is in.
+
+
+@dataclass(frozen=True, slots=True)
+class ElevationFormat:
+    """A kind of elevation file.
+
+    name: in messages.  begins: what its files begin with, one of these; none for a kind known by its suffix alone.
+    open: opens a file by its path; the second argument is the path as it was given.  Raises TerrainError.
+    """
+
+    name: str
+    suffix: str
+    begins: tuple[bytes, ...]
+    open: Callable[[Path, str], RasterFile]
+
+
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+# All that are read: by what a file begins with, else by its suffix.
+FORMATS = (
+    ElevationFormat("a GeoTIFF", ".tif", _TIFF, lambda file, _: _open_rasterio(file, "GTiff")),
+    ElevationFormat("an SRTM .hgt", ".hgt", (), lambda file, _: _open_rasterio(file, "SRTMHGT")),
+    ElevationFormat("an .npz with `elevation`", ".npz", (b"PK",), open_npz),
+)
 
 
 def open_raster(path: str, base: Path | None = None) -> RasterFile:
     """Open an elevation file or an embedded name.  Relative paths count from ``base``.
 
-    Raises TerrainError for anything that is not a single-band .tif, .hgt or .npz elevation file.
+    Raises TerrainError for anything that is not a file of one band in one of `FORMATS`.
 
     >>> open_raster("jacksboro").shape
     (344, 403)
@@ -203,26 +302,37 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
         raise TerrainError(f"{path}: terrain path: {allowed}", file=path, allowed=allowed)
     file = Path(path) if base is None else base / path
     if not file.is_file():
-        known = ", ".join(sorted(EMBEDDED))
+        suffixes, known = _listed([one.suffix for one in FORMATS]), ", ".join(sorted(EMBEDDED))
         raise TerrainError(
-            f"{file}: terrain path: no such file (a .tif, .hgt or .npz file, or one of: {known})"
-            f"{did_you_mean(path, EMBEDDED)}",
+            f"{file}: terrain path: no such file (a {suffixes} file, or one of: {known}){did_you_mean(path, EMBEDDED)}",
             file=file,
         )
     try:
         with file.open("rb") as handle:
-            head = handle.read(4)
+            head = handle.read(16)
     except OSError as error:
         raise TerrainError(f"{file}: cannot be read: {error.strerror}", file=file) from error
-    if head[:2] == b"PK":
-        return open_npz(file, str(path))
-    if head in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
-        return _open_rasterio(file, "GTiff")
-    if file.suffix.lower() == ".hgt":
-        return _open_rasterio(file, "SRTMHGT")
-    raise TerrainError(
-        f"{file}: not an elevation file: a GeoTIFF, an SRTM .hgt or an .npz with `elevation` is expected", file=file
-    )
+    by_suffix = [one for one in FORMATS if not one.begins and one.suffix == file.suffix.lower()]
+    for one in (*(one for one in FORMATS if head.startswith(one.begins)), *by_suffix):
+        return one.open(file, path)
+    expected = _listed([one.name for one in FORMATS])
+    raise TerrainError(f"{file}: not an elevation file: {expected} is expected", file=file)
+
+
+def _listed(words: list[str]) -> str:
+    return f"{', '.join(words[:-1])} or {words[-1]}"
+
+
+# ----------------------------------------------------------------------
+# Windows of a raster as terrain.
+
+# Data that is missing without a stated nodata value: these, and what is lower or higher than any ground, m.
+UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
+LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
+# Worst error allowed for the polynomial from map to pixels, in pixels.
+PIXEL_TOLERANCE = 1e-3
+# Pixels without data that are looked at before the next ones: one inside the area is enough.
+_HOLES_AT_ONCE = 2**16
 
 
 def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffer: float) -> Terrain:
@@ -355,84 +465,3 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
 def _tile_cover(raster: RasterFile, origin: GeoOrigin) -> str:
     east, north = to_map(origin, raster.corners[:, 1], raster.corners[:, 0])
     return f"east {east.min():.0f}..{east.max():.0f} m, north {north.min():.0f}..{north.max():.0f} m"
-
-
-def _applied(transform: Any, x: Any, y: Any) -> tuple[Any, Any]:
-    """Apply an affine transform to numbers or arrays; its own operator for that is `*` or `@`, by its version."""
-    return transform.a * x + transform.b * y + transform.c, transform.d * x + transform.e * y + transform.f
-
-
-def _read_strips(opened: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
-    """Heights of a window (top, bottom, left, right) of an open file, some rows at a time; NaN where it has no data."""
-    top, bottom, left, right = window
-    heights = np.empty((bottom - top, right - left), dtype=np.float32)
-    at_once = max(1, _PIXELS_AT_ONCE // (right - left))
-    for row in range(top, bottom, at_once):
-        rows = min(at_once, bottom - row)
-        # Numbers that a file stores scaled are rare, and silently wrong if read as they stand.
-        strip = opened.read(1, window=((row, row + rows), (left, right)), masked=True)
-        whole = np.ma.filled(strip.astype(np.float64), np.nan) * scale + offset
-        heights[row - top : row - top + rows] = whole
-    return heights
-
-
-def _open_rasterio(file: Path, driver: str) -> RasterFile:
-    import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
-
-    guard: dict[str, Any] = {
-        "GDAL_PAM_ENABLED": "NO",
-        "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
-        "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
-        # The vertical part of the reference system too, for its unit.
-        "GTIFF_REPORT_COMPD_CS": "YES",
-        # Of blocks once unpacked, bytes; the default is a share of the machine's memory.
-        "GDAL_CACHEMAX": 64 * 2**20,
-    }
-    try:
-        with warnings.catch_warnings(), rasterio.Env(**guard):
-            # Without georeferencing there is no reference system either, and that is refused in one line.
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(os.fspath(file.resolve()), driver=driver) as source:
-                crs, forward, kind = source.crs, source.transform, np.dtype(source.dtypes[0]).kind
-                rows, cols, bands = source.height, source.width, source.count
-                scale, offset = float(source.scales[0]), float(source.offsets[0])
-                block, unit = math.prod(source.block_shapes[0]), source.units[0]
-        transformer = None if crs is None else crs_transformer(crs.to_wkt())
-        stated, metres = height_unit(crs.to_wkt()) if crs is not None else ("metre", 1.0)
-    except (RasterioError, RasterioIOError, ValueError, TypeError, OSError) as error:
-        raise TerrainError(f"{file}: not a readable {driver} file: {one_line(error)}", file=file) from error
-    if bands != 1 or kind not in "iuf":
-        allowed = "an elevation file has 1 band of numbers"
-        raise TerrainError.at(file, "bands", bands, allowed, shown=f"{bands} of kind {kind!r}")
-    if transformer is None or forward.determinant == 0.0:
-        raise TerrainError(f"{file}: no coordinate reference system and position are stated", file=file)
-    if (unit or "m").lower() not in METRES or metres != 1.0:
-        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "metres are expected")
-    if block > MAX_BLOCK:
-        allowed = f"at most {MAX_BLOCK:,} are; tile the file"
-        raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
-    if min(rows, cols) < 2:
-        raise TerrainError.at(file, "rows, columns", (rows, cols), "at least 2 x 2 pixels are expected")
-
-    inverse = ~forward
-    middle = _applied(forward, cols / 2, rows / 2)[0] if crs.is_geographic else math.nan
-
-    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
-        x, y = transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
-        if not math.isnan(middle):
-            x = longitude_near(np.asarray(x), middle)
-        col, row = _applied(inverse, np.asarray(x), np.asarray(y))
-        return np.asarray(col) - 0.5, np.asarray(row) - 0.5
-
-    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
-        try:
-            with rasterio.Env(**guard), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
-                return _read_strips(opened, (top, bottom, left, right), scale, offset)
-        except (RasterioError, RasterioIOError, OSError) as error:
-            raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
-
-    col, row = outline(cols, rows)
-    x, y = _applied(forward, col + 0.5, row + 0.5)
-    lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
-    return RasterFile(str(file), (rows, cols), to_source, np.stack([lon, lat], axis=1), file_sha256(file), read)

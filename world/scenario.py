@@ -40,7 +40,6 @@ from world.wind import Wind
 
 Floats = NDArray[np.float64]
 
-
 # ----------------------------------------------------------------------
 # Positions of a scenario file on the map: its ends, and its threats on their ground.
 
@@ -106,6 +105,9 @@ def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, grou
         detection_scale=np.array([table.detection_scale_m or 0.0 for table in tables]),
     )
 
+
+# ----------------------------------------------------------------------
+# The scenario itself, from an embedded name, a file, a plan or a log.
 
 # Ground beyond the area that is kept, m: a flight may overshoot a corner at the map's edge.
 GROUND_BUFFER = 1000.0
@@ -402,7 +404,6 @@ def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
     Its ends keep their heights above sea level; threats that stand on the ground stand on the new one.
     Raises TerrainError for a file that cannot be read or does not cover the area.
 
-    >>> from world.scenario import load_scenario
     >>> over_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
     'jacksboro'
     """
@@ -433,7 +434,6 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
     speed: m/s, with from_course: rad, where it comes from.  turbulence: "none", "light" or "moderate".
     Raises ScenarioError for a wind that a scenario file may not have either.
 
-    >>> from world.scenario import load_scenario
     >>> with_wind(load_scenario("tight"), 5.0, math.radians(270.0), "light").wind.at(75.0)
     (5.0, ...)
     """
@@ -460,7 +460,6 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     A law of guidance takes the place of an autopilot and its parameters, and they take that of a law.
     Raises ScenarioError for a value that a scenario file may not have either.
 
-    >>> from world.scenario import load_scenario
     >>> with_flight(load_scenario("tight"), airspeed_mps=28.0, nav=None).flight.airspeed_mps
     28.0
     """
@@ -478,7 +477,6 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str) -> 
     Raises ScenarioError for a shape that is none, for a level above ground where there is no terrain, and for more
     zones than a scenario may have; and, but in a scenario made around a mission, for a zone that an end violates.
 
-    >>> from world.scenario import load_scenario
     >>> mast = ZoneTable(name="mast", kind="exclusion", east_m=1300.0, north_m=400.0, radius_m=200.0)
     >>> [zone.name for zone in with_zones(load_scenario("tight"), [mast], "masts.geojson").zones]
     ['mast']
@@ -505,7 +503,6 @@ def with_threats(
     source: names them in messages.  kept: tables that come before them.
     Raises ScenarioError for a threat that a scenario file may not have either.
 
-    >>> from world.scenario import load_scenario
     >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
     >>> more.threats.names[-1], float(more.threats.kill_radius[-1])
     ('pop-up 1', 20.0)
@@ -535,7 +532,6 @@ def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
 
     Raises ScenarioError for a value that a scenario file may not have either.
 
-    >>> from world.scenario import load_scenario
     >>> with_planner(load_scenario("tight"), "--seed", seed=7).planner.seed
     7
     """

@@ -2,14 +2,12 @@
 
 import math
 import shutil
-from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import pytest
 
 from aircraft.catalog import (
     Aircraft,
-    aircraft_names,
     find_aircraft,
     load_aircraft,
     make_own_folder,
@@ -42,11 +40,6 @@ def test_aerosonde_comes_in_si_and_radians() -> None:
     assert aircraft.model_file.is_file()
 
 
-def test_aircraft_is_frozen() -> None:
-    with pytest.raises(FrozenInstanceError):
-        load_aircraft("aerosonde").mass = 1.0  # type: ignore[misc]  # frozen: that is the test
-
-
 def test_limits_of_the_metadata_are_those_of_the_model() -> None:
     aircraft = load_aircraft("aerosonde")
     text = aircraft.model_file.read_text()
@@ -61,10 +54,6 @@ def test_limits_of_the_metadata_are_those_of_the_model() -> None:
 def test_unknown_name_lists_the_known_ones(name: str) -> None:
     with pytest.raises(FlightError, match=r"no aircraft called .*known are aerosonde"):
         load_aircraft(name)
-
-
-def test_names() -> None:
-    assert aircraft_names() == ("aerosonde", "c172x")
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ TESTS = (
     "planner/search/test_embedded_scenarios.py::test_tight_has_corners_that_the_aircraft_cannot_turn",
     "planner/seeding/test_grids.py",
     "planner/search/test_replan.py::test_a_zone_that_comes_up_is_kept_out_of_and_a_leg_that_begins_in_it_is_refused",
-    "planner/optimisers/test_markov_chain.py::test_finds_the_bottom_of_a_turned_valley",
+    "planner/optimisers/test_optimisers.py::test_finds_the_bottom_of_a_turned_valley",
     "flight/simulation/test_same_bytes_in_any_process.py",
     "logs/verdict/measures/test_zone_visits.py::test_a_way_through_a_box",
     "planner/optimisers/test_niche_sampling.py::test_at_most_half_of_the_rows_are_kept",

@@ -1,8 +1,8 @@
-"""Files of zones, GeoJSON and KML, as the tables that a scenario file would have them in."""
+"""Files of zones: read by `FORMATS` into the [[zones]] tables that a scenario file would have them in."""
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -313,8 +313,13 @@ def _extended(placemark: _Element, source: str) -> dict[str, Any]:
     return found
 
 
-_READERS = {".geojson": geojson_zones, ".json": geojson_zones, ".kml": kml_zones}
-SUFFIXES = tuple(_READERS)
+# ----------------------------------------------------------------------
+# The formats by suffix, and files read in them.
+
+# Of a text, and of its name in messages: where each zone stands, and its entries.
+Reader = Callable[[str, str], Iterator[tuple[str, dict[str, Any]]]]
+FORMATS: dict[str, Reader] = {".geojson": geojson_zones, ".json": geojson_zones, ".kml": kml_zones}
+SUFFIXES = tuple(FORMATS)
 # Bytes of a file at most.
 MAX_BYTES = 16 * 2**20
 
@@ -338,7 +343,7 @@ def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) 
 
 
 def read_zone_file(path: Path, source: str) -> list[ZoneTable]:
-    """Read the zones of a file, GeoJSON or KML by its suffix.
+    """Read the zones of a file, in the format of its suffix.
 
     source: names it in messages.  Raises ScenarioError for a file that cannot be read, and for a zone that is none.
 
@@ -351,9 +356,9 @@ def read_zone_file(path: Path, source: str) -> list[ZoneTable]:
     ...     [(zone.name, zone.kind) for zone in read_zone_file(path, "a file")]
     [('zone 1', 'exclusion')]
     """
-    reader = _READERS.get(path.suffix.lower())
+    reader = FORMATS.get(path.suffix.lower())
     if reader is None:
-        allowed = "a file of zones is .geojson, .json or .kml"
+        allowed = f"a file of zones is {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         message = f"{source}: suffix {path.suffix!r}: {allowed}"
         raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
     tables = []

@@ -1,4 +1,4 @@
-"""The zones of a scenario on its map: shapes checked, and its ends on their right sides."""
+"""The zones of a scenario on its map: shapes checked, ends on their right sides, and outlines to be drawn."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,6 @@ from world.scenario_tables import ZoneTable
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
-
 
 # ----------------------------------------------------------------------
 # Rings of latitudes and longitudes on a map: their edges, straight in degrees, with more corners where they bend.

@@ -1,0 +1,103 @@
+"""Every optimiser: samples in its box, the bottom of a turned valley, the same samples from the same seed."""
+
+import numpy as np
+import pytest
+
+from planner.optimisers.differential_evolution import DifferentialEvolution
+from planner.optimisers.emna import Emna
+from planner.optimisers.markov_chain import MarkovChain, draw_chain, fit_chain
+from planner.optimisers.preference import Level, ranks
+from planner.optimisers.umda import Umda
+
+BY_VALUE = (Level((0,), (-np.inf,)),)
+LOWER, UPPER = np.array([-1.0, 10.0]), np.array([1.0, 40.0])
+Optimiser = type[Umda] | type[DifferentialEvolution]
+# UMDA knows no two variables together: a turned valley is not for it.
+OPTIMISERS = (DifferentialEvolution, Emna, MarkovChain)
+
+
+def rank(scores: np.ndarray) -> np.ndarray:
+    """Ranks (n,) by the only score."""
+    return ranks(scores, BY_VALUE)
+
+
+def least_after(search: Umda | DifferentialEvolution, target: np.ndarray, generations: int) -> float:
+    """Least value of a narrow, turned valley after some generations; every sample is in the box."""
+    for _ in range(generations):
+        asked = search.ask()
+        assert (asked >= search.lower).all()
+        assert (asked <= search.upper).all()
+        off = asked - target
+        steps = np.diff(off, axis=1)
+        search.tell(((off**2).sum(axis=1) + 50.0 * (steps**2).sum(axis=1))[:, None])
+    assert len(search.scores)
+    return float(search.scores[:, 0].min())
+
+
+@pytest.mark.parametrize("kind", OPTIMISERS)
+def test_finds_the_bottom_of_a_turned_valley(kind: Optimiser) -> None:
+    """Within 150 generations of 120 samples, where samples at random lie some hundred above it."""
+    lower, upper = np.full(6, -3.0), np.full(6, 5.0)
+    search = kind(lower, upper, rank, 120, np.random.default_rng(4))
+    assert least_after(search, np.linspace(-1.0, 2.0, 6), 150) < 0.05
+
+
+@pytest.mark.parametrize("kind", [Umda, *OPTIMISERS])
+def test_same_seed_same_samples(kind: Optimiser) -> None:
+    """The samples after five generations, bit by bit."""
+    ends = []
+    for _ in range(2):
+        search = kind(np.zeros(6), np.ones(6), rank, 20, np.random.default_rng(5))
+        least_after(search, np.full(6, 0.3), 5)
+        ends.append(search.samples)
+    np.testing.assert_array_equal(*ends)
+
+
+@pytest.mark.parametrize("kind", [Umda, DifferentialEvolution])
+def test_the_first_samples_fill_the_box_evenly(kind: Optimiser) -> None:
+    search = kind(LOWER, UPPER, rank, 400, np.random.default_rng(3))
+    asked = search.ask()
+    assert asked.shape == (400, 2)
+    assert len(search.samples) == len(search.scores) == 0
+    shares = (asked - LOWER) / (UPPER - LOWER)
+    assert (shares >= 0.0).all()
+    assert (shares <= 1.0).all()
+    # A uniform share has mean 1/2 and standard deviation 0.289; of 400, within four standard errors.
+    assert shares.mean(axis=0) == pytest.approx([0.5, 0.5], abs=4 * 0.289 / 20)
+
+
+@pytest.mark.parametrize("kind", [Umda, DifferentialEvolution])
+def test_given_samples_are_asked_for_as_they_are_or_cut_at_the_wall(kind: Optimiser) -> None:
+    given = np.array([[0.5, 20.0], [3.0, 5.0]])
+    asked = kind(LOWER, UPPER, rank, 400, np.random.default_rng(3), initial=given).ask()
+    assert asked.tolist() == [[0.5, 20.0], [1.0, 10.0]]
+
+
+@pytest.mark.parametrize("kind", [Umda, DifferentialEvolution])
+def test_all_are_asked_for_first_and_then_half(kind: Optimiser) -> None:
+    search = kind(np.zeros(3), np.ones(3), rank, 10, np.random.default_rng(0))
+    assert search.ask().shape == (10, 3)
+    search.tell(search.ask().sum(axis=1)[:, None])
+    assert search.ask().shape == (5, 3)
+
+
+def test_differential_evolution_never_loses_its_best() -> None:
+    search = DifferentialEvolution(np.zeros(4), np.ones(4), rank, 20, np.random.default_rng(1))
+    best = np.inf
+    for _ in range(20):
+        search.tell((search.ask() ** 2).sum(axis=1)[:, None])
+        assert search.scores[:, 0].min() <= best
+        best = float(search.scores[:, 0].min())
+
+
+def test_a_chain_keeps_the_covariance_of_neighbours_but_not_of_others() -> None:
+    """A first-order chain reproduces each group's and each neighbouring pair's covariance of its own data."""
+    rng = np.random.default_rng(6)
+    rows = np.cumsum(rng.normal(size=(3000, 4, 3)), axis=1).reshape(3000, 12)
+    rows -= rows.mean(axis=0)
+    slope, spread = fit_chain(rows, 3, 0.0)
+    drawn = draw_chain(rng.normal(size=(200_000, 12)), slope, spread)
+    wanted, got = np.cov(rows.T, bias=True), np.cov(drawn.T, bias=True)
+    for g in range(3):
+        block = slice(3 * g, 3 * g + 6)
+        np.testing.assert_allclose(got[block, block], wanted[block, block], atol=0.05)
