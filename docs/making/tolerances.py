@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from logs.verdict import tolerances
+from logs.verdict.rules.registry import RULES
 
 ROOT = Path(__file__).parents[2]
 VERDICT = ROOT / "logs" / "verdict"
@@ -72,21 +73,9 @@ def _table(rows: list[Tolerance]) -> str:
     return f"| constant | value | meaning and source |\n|---|---|---|\n{body}"
 
 
-def imported_tolerances(module: str) -> set[str]:
-    """The constants that a module of the verdict, such as ``rules/turn_rule``, imports."""
-    tree = ast.parse((VERDICT / f"{module}.py").read_text(encoding="utf-8"))
-    return {
-        alias.name
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and node.module == "logs.verdict.tolerances"
-        for alias in node.names
-    }
-
-
-def rule_tolerances(*modules: str) -> str:
-    """The table of the tolerances that a rule's modules use."""
-    wanted = set().union(*(imported_tolerances(module) for module in modules))
-    return _table([one for one in tolerance_list() if one.name in wanted])
+def rule_tolerances(rule: str) -> str:
+    """The table of the tolerances that a rule and its measures judge with."""
+    return _table([one for one in tolerance_list() if one.name in RULES[rule].tolerances])
 
 
 def all_tolerances() -> str:

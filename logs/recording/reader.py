@@ -46,8 +46,8 @@ from logs.recording.state_channel import (
     parse_row,
     state_class,
 )
-from logs.verdict.findings import parse_reference_flights
 from logs.verdict.places import ReferenceFlights
+from logs.verdict.reference_flights import parse_reference_flights
 from world.errors import LogError
 from world.html_table import html_table
 

@@ -51,9 +51,10 @@ from logs.recording.state_channel import (
     state_schema,
     times_ns,
 )
-from logs.verdict.findings import Verdict, reference_flights_json, verdict_json
+from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.places import ReferenceFlights
+from logs.verdict.reference_flights import reference_flights_json
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"

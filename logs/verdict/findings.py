@@ -4,47 +4,13 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Annotated, Any
-
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from typing import Any
 
 from flight.autopilots.autopilot import AutopilotProgram, Parameters
-from logs.verdict.places import (
-    AirframeAnswer,
-    DecidingParameter,
-    LevelAnswer,
-    Place,
-    PlaceKind,
-    ReferenceFlights,
-    Suggestion,
-)
+from logs.verdict.places import DecidingParameter, LevelAnswer, Place, Suggestion
 from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
-from world.errors import LogError
-from world.scenario_file import first_fault
 
 SCHEMA = "planfly.verdict/3"
-
-# Each rule and its title, in the order in which a verdict lists them.
-RULES = {
-    "mission": "mission",
-    "turn": "turns",
-    "loiter": "loiters",
-    "slope": "slopes",
-    "clearance": "clearance",
-    "height": "heights",
-    "fence": "zones",
-    "threat": "threats",
-    "bounds": "bounds",
-    "waypoint": "waypoints",
-    "corridor": "corridor",
-    "speed": "airspeed",
-    "stall": "stall",
-    "takeoff": "take-off",
-    "landing": "landing",
-    "energy": "energy",
-    "departure": "departure",
-    "completion": "completion",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +31,7 @@ class Fact:
 class Finding:
     """One rule at one place: what was planned, what was flown, what is allowed.
 
-    rule: a key of `RULES`.
+    rule: a name of `logs.verdict.rules.registry.RULES`.
     place: where.
     planned, flown, limit, tolerance, margin: in `unit`, None where there is no such number.
     margin: how far inside the limit (negative: beyond), tolerance not counted.
@@ -308,89 +274,3 @@ def _finding_data(finding: Finding) -> dict[str, Any]:
         **data,
         "suggestion": suggestions_text(finding.suggestions),
     }
-
-
-# ----------------------------------------------------------------------
-# What other flights had to say of a recorded one, as the text of an attachment of its log, and back.
-#
-# A log's verdict is worked out anew from its rows; the flights beside it are not in it, and their answers are kept.
-
-REFERENCE_SCHEMA = "planfly.beside/1"
-
-_Number = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-
-class _Place(_Table):
-    kind: PlaceKind
-    index: int | None
-    item: int | None
-    name: str
-    to_item: int | None = None
-
-    def place(self) -> Place:
-        return Place(self.kind, self.index, self.item, self.name, self.to_item)
-
-
-class _Airframe(_Table):
-    flyable: bool
-    headline: str
-    failed: list[tuple[str, _Place]]
-
-    def answer(self) -> AirframeAnswer:
-        failed = tuple((rule, place.place()) for rule, place in self.failed)
-        return AirframeAnswer(self.flyable, self.headline, failed)
-
-
-class _Deciding(_Table):
-    name: str
-    current: _Number
-    passing: _Number
-    unit: str
-    rule: str
-    place: _Place
-    off: _Number | None
-
-    def parameter(self) -> DecidingParameter:
-        place = self.place.place()
-        return DecidingParameter(self.name, self.current, self.passing, self.unit, self.rule, place, self.off)
-
-
-class _Beside(_Table):
-    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{REFERENCE_SCHEMA}$")] = REFERENCE_SCHEMA
-    airframe: _Airframe | None
-    deciding: _Deciding | None
-
-
-def reference_flights_json(reference: ReferenceFlights) -> str:
-    """Write the answers as text.
-
-    >>> reference = ReferenceFlights(AirframeAnswer(True, "flyable"))
-    >>> parse_reference_flights(reference_flights_json(reference), "a.mcap") == reference
-    True
-    """
-    return json.dumps({"schema": REFERENCE_SCHEMA, **asdict(reference)}, indent=1, allow_nan=False) + "\n"
-
-
-def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
-    """Read the answers of a text.  Raises LogError, in one line, for what does not fit; source names it.
-
-    >>> parse_reference_flights('{"schema": "planfly.beside/1", "airframe": null, "deciding": null}', "a.mcap")
-    ReferenceFlights(airframe=None, deciding=None)
-    """
-    try:
-        file = _Beside.model_validate_json(text)
-    except ValidationError as error:
-        raise LogError(**first_fault(error).at(source)) from error
-    airframe, deciding = file.airframe, file.deciding
-    rules = [rule for rule, _ in airframe.failed] if airframe is not None else []
-    unknown = [rule for rule in (*rules, *([deciding.rule] if deciding else [])) if rule not in RULES]
-    if unknown:
-        raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source, field="rule", value=unknown[0])
-    return ReferenceFlights(
-        None if airframe is None else airframe.answer(),
-        None if deciding is None else deciding.parameter(),
-    )

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.imported.judge_imported_flight import judge_field_flight
+from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
     flown_findings,
     flown_level,
@@ -18,11 +18,11 @@ from logs.verdict.judge_geometry import (
     judge_plan_only,
     judge_unflown,
     unflyable_items,
+    with_suggestions,
 )
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Disagreement, LevelAnswer, Place, ReferenceFlights
-from logs.verdict.suggestions import with_suggestions
 from logs.verdict.summary import headline, summary_lines
 
 __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
@@ -44,7 +44,7 @@ def judge_flight(
 
     ended: how the flight ended, "completed" or what stopped it.  whole: the record has its end.
     envelope: whether the aircraft's envelope counts beside what the flight showed, and not that alone.
-    reference: what other flights have to say of this one.
+    reference: the answers of reference flights of this one.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -63,12 +63,12 @@ def judge_flight(
     'flyable'
     """
     if setup.source is not None:
-        return judge_field_flight(setup, track, whole=whole)
+        return judge_imported_flight(setup, track, whole=whole)
     requirements = route_requirements(setup, envelope=envelope)
     if not len(track):
         return judge_unflown(requirements, ended, whole=whole)
     aligned = align_track(requirements, track)
-    findings = flown_findings(requirements, aligned, ended, whole, envelope)
+    findings = flown_findings(requirements, aligned, ended, whole)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
     findings = with_suggestions(requirements, aligned, findings)
@@ -93,9 +93,9 @@ def judge_flight(
 def _levels(
     requirements: RouteRequirements, flown: tuple[Finding, ...], flyable: bool, reference: ReferenceFlights | None
 ) -> tuple[LevelAnswer, ...]:
-    """What geometry says, and the airframe where it was flown beside, where each differs; and the flight's own answer.
+    """What geometry and the airframe's reference flight say, where each differs, and the flight's own answer.
 
-    Without the envelope there is nothing beside the flight.
+    Without the envelope there is the flight's own answer alone.
     """
     levels = []
     if requirements.envelope:

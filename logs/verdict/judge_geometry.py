@@ -1,52 +1,82 @@
 """Verdicts without a flight: of a route, of a flight that never began, and of a plan that was not feasible."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
-from logs.verdict.rules.bounds_rule import bounds_findings
-from logs.verdict.rules.clearance_rule import clearance_findings
-from logs.verdict.rules.completion_rule import completion_findings
-from logs.verdict.rules.corridor_rule import corridor_findings
-from logs.verdict.rules.departure_rule import departure_findings
-from logs.verdict.rules.energy_rule import energy_findings
-from logs.verdict.rules.fence_rule import fence_findings
-from logs.verdict.rules.height_rule import height_findings
-from logs.verdict.rules.loiter_rule import fold_loiters
-from logs.verdict.rules.px4_rule import mission_findings
-from logs.verdict.rules.slope_rule import slope_findings
-from logs.verdict.rules.speed_rule import speed_findings
-from logs.verdict.rules.stall_rule import stall_findings
-from logs.verdict.rules.takeoff_landing_rule import takeoff_landing_findings
-from logs.verdict.rules.threat_rule import threat_findings
-from logs.verdict.rules.turn_rule import turn_findings
-from logs.verdict.rules.waypoint_rule import waypoint_findings
-from logs.verdict.suggestions import with_suggestions
+from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines
 from planner.plan import Plan, Violation
+
+# ----------------------------------------------------------------------
+# The findings of each level, rule by rule in the order of `RULES`.
+
+
+def mission_findings(setup: FlightSetup) -> list[Finding]:
+    """Findings of the mission's items alone, whoever flies them."""
+    return [item for rule in RULES.values() if rule.judge_items is not None for item in rule.judge_items(setup)]
+
+
+def unflyable_items(setup: FlightSetup) -> list[Finding]:
+    """What fails of a person's mission by its items alone; planfly writes the items of a plan itself."""
+    return [item for item in mission_findings(setup) if item.ok is False] if setup.plan is None else []
 
 
 def geometric_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
     """Findings of a route's geometry against the aircraft's envelope."""
-    findings: tuple[Finding, ...] = (
-        *turn_findings(requirements, None, geometric=True),
-        *slope_findings(requirements, None, geometric=True),
-        *clearance_findings(requirements, None, geometric=True),
-        *height_findings(requirements, None, geometric=True),
-        *fence_findings(requirements, None, geometric=True),
-        *threat_findings(requirements, None, geometric=True),
-        *bounds_findings(requirements, None, geometric=True),
-        *waypoint_findings(requirements, None, geometric=True),
-        *corridor_findings(requirements, None, geometric=True),
-        *speed_findings(requirements, None, geometric=True),
-        *stall_findings(requirements, None, geometric=True),
-        *takeoff_landing_findings(requirements),
-        *energy_findings(requirements, None, geometric=True),
+    return _judged(requirements, None, geometric=True)
+
+
+def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
+    """Findings of a flown track against its route and the aircraft's envelope, but for how the flight ended."""
+    return (*unflyable_items(requirements.setup), *_judged(requirements, aligned, geometric=False))
+
+
+def flown_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, whole: bool
+) -> tuple[Finding, ...]:
+    """Findings of a flight: of its track, and of how it ended.
+
+    ended: "completed" or what stopped it.  whole: the record has its end.
+    """
+    ends = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
+    at_end = (item for judge in ends for item in judge(requirements, aligned, ended, whole))
+    return (*track_findings(requirements, aligned), *at_end)
+
+
+def _judged(requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool) -> tuple[Finding, ...]:
+    findings: tuple[Finding, ...] = tuple(
+        item
+        for rule in RULES.values()
+        if rule.judge is not None
+        for item in rule.judge(requirements, aligned, geometric=geometric)
     )
-    return fold_loiters(requirements, None, findings)
+    for rule in RULES.values():
+        if rule.merge is not None:
+            findings = rule.merge(requirements, aligned, findings)
+    return findings
+
+
+def with_suggestions(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
+) -> tuple[Finding, ...]:
+    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend."""
+    out = []
+    for item in findings:
+        suggest = RULES[item.rule].suggest
+        if item.ok is False and suggest is not None:
+            item = replace(item, suggestions=suggest(requirements, aligned, item))
+        out.append(item)
+    return tuple(out)
+
+
+# ----------------------------------------------------------------------
+# The verdicts.
 
 
 def judge_geometry(setup: FlightSetup) -> Verdict:
@@ -79,11 +109,6 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     levels = (LevelAnswer("geometry", flyable, headline(findings, flyable)),)
     lines = summary_lines(findings, setup, "geometric", levels)
     return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
-
-
-def unflyable_items(setup: FlightSetup) -> list[Finding]:
-    """What fails of a person's mission by its items alone, whoever flies it; a plan's own are ours."""
-    return [item for item in mission_findings(setup) if item.ok is False] if setup.plan is None else []
 
 
 def flown_level(setup: FlightSetup) -> LevelName:
@@ -177,32 +202,3 @@ def _plan_lines(findings: list[Finding], plan: Plan) -> tuple[str, ...]:
     text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
     problems = (f"Problem: {problem}" for problem in plan.certificate.problems)
     return (f"not flyable: no feasible plan was found: {text}", "Nothing was flown", *problems)
-
-
-# ----------------------------------------------------------------------
-# All findings of a flown track, rule by rule, in the verdict's order.
-
-
-def flown_findings(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
-) -> tuple[Finding, ...]:
-    """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
-    findings = (
-        *unflyable_items(requirements.setup),
-        *turn_findings(requirements, aligned),
-        *slope_findings(requirements, aligned),
-        *clearance_findings(requirements, aligned),
-        *height_findings(requirements, aligned),
-        *fence_findings(requirements, aligned),
-        *threat_findings(requirements, aligned),
-        *bounds_findings(requirements, aligned),
-        *waypoint_findings(requirements, aligned),
-        *corridor_findings(requirements, aligned),
-        *speed_findings(requirements, aligned),
-        *(stall_findings(requirements, aligned) if envelope else ()),
-        *takeoff_landing_findings(requirements),
-        *energy_findings(requirements, aligned),
-        *departure_findings(requirements, aligned),
-        *completion_findings(requirements, aligned, ended, whole),
-    )
-    return fold_loiters(requirements, aligned, findings)

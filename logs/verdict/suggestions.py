@@ -1,4 +1,8 @@
-"""The smallest change that would make a failed finding pass: a gentler slope, a longer leg, a lower speed."""
+"""The smallest change of a plan that would make a failed finding pass: a gentler slope, a longer leg, a lower speed.
+
+Each function takes the route's requirements, the aligned track (None where nothing was flown) and the failed finding;
+a rule names the one that suggests for it.  All suggestions are alternatives, the smallest relative change first.
+"""
 
 import math
 from dataclasses import replace
@@ -23,7 +27,7 @@ from logs.verdict.measures.route_requirements import (
 )
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
-from logs.verdict.places import FLIGHT, Change, Place, Quantity, Suggestion
+from logs.verdict.places import FLIGHT, Change, Quantity, Suggestion
 from logs.verdict.tolerances import (
     ABOVE_SLOWEST,
     BUFFER_ANGLE,
@@ -55,16 +59,14 @@ _LEVEL: tuple[tuple[Quantity, str, float], ...] = (
 _UPRIGHT: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
 
 
-def zone_suggestions(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding
-) -> tuple[Suggestion, ...]:
+def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
     """Pass a zone further to one side, or higher or lower; the least change first.
 
     item: the finding of the zone that is violated.  All of the legs on which it is are shifted: of the planned path
     where that violates it, and by as much more as the flight went deeper; of the flight where only that does.
     """
-    z, facts = item.place.index or 0, {fact.what: fact.value for fact in item.facts}
-    if "entry leg" not in facts:
+    z, facts = item.place.index, {fact.what: fact.value for fact in item.facts}
+    if z is None or "entry leg" not in facts:
         return ()
     first, last = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([requirements.airspace.zones[z]]), requirements.setup.scenario.terrain
@@ -112,48 +114,16 @@ def _least_shift(
 _Sized = tuple[float, Suggestion]
 
 
-def with_suggestions(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, findings: tuple[Finding, ...]
-) -> tuple[Finding, ...]:
-    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend."""
-    return tuple(
-        replace(item, suggestions=_suggest(requirements, aligned, item)) if item.ok is False else item
-        for item in findings
-    )
-
-
-def _suggest(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    match item.rule, item.place:
-        case "slope", Place("leg", int(leg)):
-            return slope_suggestions(requirements, leg, item)
-        case "turn", Place("waypoint", int(i)):
-            return turn_suggestions(requirements, i)
-        case "threat", Place("missile", int(m)):
-            return _further(requirements, aligned, item.place, m)
-        case "clearance", _:
-            return _higher(item)
-        case "height", Place("leg"):
-            return _lower(item)
-        case "fence", Place("exclusion" | "inclusion"):
-            return zone_suggestions(requirements, aligned, item)
-        case "bounds", _:
-            return _inside(item)
-        case "energy", _:
-            return _less_energy(requirements, item)
-        case "stall", _ if item.limit is not None:
-            return _faster(requirements, item.place, item.limit)
-        case "speed", Place("leg", int(leg)) if item.limit is not None and item.margin is not None:
-            return _level_speeds(requirements, item.place, leg)
-    return ()
-
-
 def _least_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
     """Alternatives by the relative size of their changes; of equal ones the one listed first."""
     return tuple(suggestion for _, suggestion in sorted(alternatives, key=lambda sized: sized[0]))
 
 
-def slope_suggestions(requirements: RouteRequirements, leg: int, item: Finding) -> tuple[Suggestion, ...]:
+def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
     """A gentler slope, a longer leg or another speed for one leg; the least relative change first."""
+    leg = item.place.index
+    if leg is None:
+        return ()
     limit, source = slope_limit(requirements, leg)
     planned = abs(float(requirements.slopes[leg]))
     rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
@@ -194,8 +164,11 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
     return (tuple(changes),) if changes else ()
 
 
-def turn_suggestions(requirements: RouteRequirements, i: int) -> tuple[Suggestion, ...]:
+def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
     """A gentler turn, longer legs or a lower speed for one waypoint; the least relative change first."""
+    i = item.place.index
+    if i is None:
+        return ()
     limit, source = turn_limit(requirements, i)
     planned = abs(float(requirements.turns[i]))
     if planned <= limit or limit <= BUFFER_ANGLE:
@@ -315,9 +288,11 @@ def _whole(metres: float) -> float:
     return float(round(metres))
 
 
-def _further(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, place: Place, m: int
-) -> tuple[Suggestion, ...]:
+def pass_threat(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+    """Pass a missile's sphere further away."""
+    m = item.place.index
+    if m is None or item.place.kind != "missile":
+        return ()
     threats = requirements.setup.scenario.threats
     one = slice(m, m + 1)
     spheres = (threats.position[one], threats.kill_radius[one], threats.kill_scale[one])
@@ -325,10 +300,13 @@ def _further(
     if aligned is not None and len(aligned.track) > 1:
         nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
     away = _whole(threats.kill_radius[m] - nearest + BUFFER_LENGTH)
-    return ((Change("distance", place, None, away, "m"),),)
+    return ((Change("distance", item.place, None, away, "m"),),)
 
 
-def _higher(item: Finding) -> tuple[Suggestion, ...]:
+def fly_higher(
+    _requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+) -> tuple[Suggestion, ...]:
+    """Fly a leg higher above the ground."""
     if item.limit is None or item.margin is None:
         return ()
     short = -item.margin + BUFFER_LENGTH
@@ -338,21 +316,28 @@ def _higher(item: Finding) -> tuple[Suggestion, ...]:
     return ((Change("height", item.place, None, _whole(short), "m"),),) if short > BUFFER_LENGTH else ()
 
 
-def _lower(item: Finding) -> tuple[Suggestion, ...]:
+def fly_lower(_requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+    """Fly a leg lower above the ground."""
     heights = [height for height in (item.planned, item.flown) if height is not None]
-    if item.limit is None or not heights or not max(heights) > item.limit:
+    if item.place.kind != "leg" or item.limit is None or not heights or not max(heights) > item.limit:
         return ()
     high = _whole(max(heights) - item.limit + BUFFER_LENGTH)
     return ((Change("descent", item.place, None, high, "m"),),)
 
 
-def _inside(item: Finding) -> tuple[Suggestion, ...]:
+def stay_inside(
+    _requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+) -> tuple[Suggestion, ...]:
+    """Bring the path further inside the area."""
     if item.margin is None or not item.margin < 0.0:
         return ()
     return ((Change("inset", FLIGHT, None, _whole(-item.margin + BUFFER_LENGTH), "m"),),)
 
 
-def _less_energy(requirements: RouteRequirements, item: Finding) -> tuple[Suggestion, ...]:
+def use_less_energy(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+) -> tuple[Suggestion, ...]:
+    """A shorter flight, or a larger battery or tank."""
     used = item.planned if item.flown is None else item.flown
     if used is None or item.limit is None or item.margin is None or used <= item.limit:
         return ()
@@ -364,14 +349,23 @@ def _less_energy(requirements: RouteRequirements, item: Finding) -> tuple[Sugges
     return (shorter,), (larger,)
 
 
-def _faster(requirements: RouteRequirements, place: Place, stall: float) -> tuple[Suggestion, ...]:
+def fly_faster(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+    """A higher airspeed, above the stall."""
+    if item.limit is None:
+        return ()
     leg = int(np.argmin(requirements.route.airspeed))
     now = float(requirements.setup.route.airspeed[leg])
-    wanted = math.ceil(10.0 * stall * (1.0 + BUFFER_SPEED) / _true(requirements, leg)) / 10.0
-    return ((Change("airspeed", place, now, wanted, "m/s"),),) if wanted > now else ()
+    wanted = math.ceil(10.0 * item.limit * (1.0 + BUFFER_SPEED) / _true(requirements, leg)) / 10.0
+    return ((Change("airspeed", item.place, now, wanted, "m/s"),),) if wanted > now else ()
 
 
-def _level_speeds(requirements: RouteRequirements, place: Place, leg: int) -> tuple[Suggestion, ...]:
+def fly_level_speed(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
+) -> tuple[Suggestion, ...]:
+    """An airspeed of level flight at the leg's height."""
+    leg = item.place.index
+    if leg is None or item.limit is None or item.margin is None:
+        return ()
     commanded = float(requirements.setup.route.airspeed[leg])
     up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     low, high = (speed / _true(requirements, leg) for speed in requirements.setup.envelope.level_speeds(up))
@@ -379,4 +373,4 @@ def _level_speeds(requirements: RouteRequirements, place: Place, leg: int) -> tu
         return ()
     low = math.ceil(10.0 * low * (1.0 + BUFFER_SPEED)) / 10.0
     high = math.floor(10.0 * high * (1.0 - BUFFER_SPEED)) / 10.0
-    return ((Change("airspeed", place, commanded, low, "m/s", most=high),),)
+    return ((Change("airspeed", item.place, commanded, low, "m/s", most=high),),)

@@ -4,14 +4,15 @@ import math
 from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import DecidingParameter, LevelAnswer
-from logs.verdict.wording import deciding_text, disagreement_text, place_text, shortened, suggestions_text
+from logs.verdict.rule import Rule, beyond_limit
+from logs.verdict.rules.registry import RULES
+from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
 from world.html_table import html_table
 
 # Failed findings that the first line names.
 _NAMED = 4
-_UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
 _NAV = {
     "perfect": "exact",
     "rtk": "with RTK's error (0.05 m on each axis)",
@@ -22,29 +23,15 @@ _LEVELS = {
     "geometry": "By geometry alone",
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
-# Rules whose silence the first line tells, by what they judge.
-_UNJUDGED = {
-    "clearance": "terrain",
-    "height": "heights above ground",
-    "fence": "airspace",
-    "speed": "airspeed",
-    "takeoff": "take-off",
-    "landing": "landing",
-}
-# Rules of which the summary says why they were not judged.
-_EXPLAINED = ("clearance", "height", "fence", "threat", "bounds", "energy", "takeoff", "landing")
-# What ends a flight comes first, then what a plan may be mended by; the others follow in the verdict's order.
-_FIRST = ("departure", "completion", "mission", "slope")
-_URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
 
 
 def headline(findings: Sequence[Finding], flyable: bool) -> str:
     """First line: the answer, and what failed, or was not judged or only just passed."""
     if flyable:
-        silent = [_not_judged(findings, rule) for rule in _UNJUDGED]
+        silent = [_not_judged(findings, rule) for rule in RULES.values() if rule.unjudged]
         return "; ".join(["flyable", *filter(None, silent), *_by_luck(findings)])
-    failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
-    named = _spread(failed)
+    failed = _failed(findings)
+    named = _most_telling(failed)
     more = len(failed) - len(named)
     return "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
 
@@ -59,19 +46,24 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
     >>> first.rule
     'completion'
     """
-    failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
-    return _spread(failed)[0] if failed else None
+    failed = _failed(findings)
+    return _most_telling(failed)[0] if failed else None
 
 
-def _not_judged(findings: Sequence[Finding], rule: str) -> str:
+def _failed(findings: Sequence[Finding]) -> list[Finding]:
+    """What failed: what ends a flight first, then what a plan may be mended by, then in the verdict's order."""
+    order = {name: k for k, name in enumerate(RULES)}
+    failed = (item for item in findings if item.ok is False)
+    return sorted(failed, key=lambda item: (-RULES[item.rule].urgency, order[item.rule]))
+
+
+def _not_judged(findings: Sequence[Finding], rule: Rule) -> str:
     """What of a rule was not judged, in words; "" for nothing."""
-    mine = [item for item in findings if item.rule == rule]
+    mine = [item for item in findings if item.rule == rule.name]
     silent = sum(item.ok is None for item in mine)
     if not silent:
         return ""
-    return f"{_UNJUDGED[rule]} not judged" + (
-        "" if silent == len(mine) else f" on {silent} {'zones' if rule == 'fence' else 'legs'}"
-    )
+    return f"{rule.unjudged} not judged" + ("" if silent == len(mine) else f" on {silent} {rule.unjudged_of}")
 
 
 def _by_luck(findings: Sequence[Finding]) -> list[str]:
@@ -84,7 +76,7 @@ def _by_luck(findings: Sequence[Finding]) -> list[str]:
     return out
 
 
-def _spread(failed: list[Finding]) -> list[Finding]:
+def _most_telling(failed: list[Finding]) -> list[Finding]:
     """At most four findings: the worst of each rule before the second worst of any."""
     margins = [0.0 if item.margin is None else item.margin for item in failed]
     by_margin = sorted(range(len(failed)), key=margins.__getitem__)
@@ -98,44 +90,8 @@ def _spread(failed: list[Finding]) -> list[Finding]:
 
 def _phrase(item: Finding) -> str:
     """One failed finding in a few words."""
-    where = place_text(item.place)
-    match item.rule:
-        case "completion" | "departure":
-            return f"{item.rule} ({shortened(item.brief)})"
-        case "waypoint":
-            return f"{where} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if _over(item) else "")
-        case "threat":
-            # One without a name of its own is called "threat 3 (missile)".
-            named = f"threat {where}" if item.place.name else where
-            return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
-        case "fence" if item.place.name:
-            return f"{where} violated ({max(item.flown or 0.0, item.planned or 0.0):.1f} m beyond it)"
-    if item.place.kind == "flight":
-        return f"{item.rule} ({_numbers(item)})"
-    return f"{item.rule} {'at' if item.place.kind == 'waypoint' else 'on'} {where} ({_numbers(item)})"
-
-
-def _over(item: Finding) -> bool:
-    return item.flown is not None and item.limit is not None and item.flown > item.limit
-
-
-def _numbers(item: Finding) -> str:
-    """Worse of planned and flown against the limit, if that is what failed; else the reason in brief."""
-    if item.limit is None or item.rule == "speed":
-        return shortened(item.brief)
-    values = [value for value in (item.flown, item.planned) if value is not None]
-    unit = _UNITS.get(item.unit, "")
-    if item.rule == "loiter" and item.planned is not None and item.planned < item.limit:
-        return f"radius {item.planned:.0f}{unit} < {item.limit:.0f}{unit}"
-    if item.rule in ("clearance", "bounds"):
-        low = min(values, default=None)
-        if item.flown is not None:
-            low = item.flown
-        return shortened(item.brief) if low is None else f"{low:.1f}{unit} < {item.limit:.1f}{unit}"
-    worst = max(values, key=abs, default=None)
-    if worst is None or abs(worst) <= abs(item.limit):
-        return shortened(item.brief)
-    return f"{worst:.1f}{unit} {'>' if worst > 0.0 else '<'} {item.limit:.1f}{unit}"
+    rule = RULES[item.rule]
+    return (rule.phrase(item) if rule.phrase is not None else "") or beyond_limit(rule.noun or rule.name, item)
 
 
 def summary_lines(
@@ -154,18 +110,9 @@ def summary_lines(
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in (
-            "clearance",
-            "height",
-            "fence",
-            "threat",
-            "bounds",
-            "energy",
-            "takeoff",
-            "landing",
-        ):
+        if item.ok is None and RULES[item.rule].explained:
             silent.setdefault(item.rule, item.reason)
-    lines += [f"Not judged: {RULES[rule]} ({reason})" for rule, reason in silent.items()]
+    lines += [f"Not judged: {RULES[rule].title} ({reason})" for rule, reason in silent.items()]
     # Limits of that autopilot's own, which say nothing of the aircraft.
     lines += [
         f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None
@@ -252,10 +199,10 @@ def verdict_html(verdict: Verdict) -> str:
     '<div><strong>flyable</strong><table>...<tbody></tbody></table></div>'
     """
     rows: list[tuple[str, ...]] = []
-    for rule, title in RULES.items():
-        mine = [finding for finding in verdict.findings if finding.rule == rule]
+    for rule in RULES.values():
+        mine = [finding for finding in verdict.findings if finding.rule == rule.name]
         if mine:
-            rows.append((title, _count(mine), "", ""))
+            rows.append((rule.title, _count(mine), "", ""))
             rows += [
                 ("", place_text(one.place), one.reason, suggestions_text(one.suggestions))
                 for one in mine

@@ -12,8 +12,11 @@ import math
 PLAN_TOLERANCE = math.radians(0.01)
 # m.  A mission file's 1e-7 degrees move a waypoint by up to 1 cm in each direction.
 ROUNDING = 0.02
-# m.  Height on steep ground that a waypoint's centimetre, `ROUNDING`, comes to.
-HEIGHT_ROUNDING = 0.1
+# m.  How far below the required height above ground a leg may come: what `ROUNDING` of a waypoint comes to on steep
+# ground.
+CLEARANCE_TOLERANCE = 0.1
+# m.  How far above the largest height above ground, or above the ceiling, a leg may rise: the same on steep ground.
+HEIGHT_TOLERANCE = 0.1
 # m.  A loiter's radius: 1e-7 degrees at the circle's middle.
 RADIUS_TOLERANCE = 0.02
 # m.  A leg shorter than this is a climb on the spot, with no course of its own.

@@ -6,6 +6,8 @@ from logs.verdict.places import Change, DecidingParameter, Disagreement, Place, 
 from logs.verdict.tolerances import ON_THE_SPOT
 from world.threats import threat_label
 
+# How a unit stands after a number.
+UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
 # Longest statement of a headline, characters.
 _LONGEST = 80
 
@@ -162,3 +164,13 @@ def shortened(text: str) -> str:
     ('bank 80° at 3.0 s', 80)
     """
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def quantity_text(value: float, unit: str) -> str:
+    """A value with its unit, to four figures and without a power of ten: a tank of fuel holds 1140000 Wh.
+
+    >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
+    ('11.87°', '1140000 Wh')
+    """
+    figures = f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
+    return figures + UNITS.get(unit, f" {unit}" if unit else "")

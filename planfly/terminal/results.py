@@ -9,9 +9,11 @@ from flight.mission_files.formats import mission_kind, mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent
-from logs.verdict.findings import RULES, Finding, Verdict, verdict_json
+from logs.verdict.findings import Finding, Verdict, verdict_json
 from logs.verdict.judge_flight import judge_flight
-from logs.verdict.wording import place_text, suggestions_text
+from logs.verdict.rule import Rule
+from logs.verdict.rules.registry import RULES
+from logs.verdict.wording import place_text, quantity_text, suggestions_text
 from planfly.terminal.command_parser import coloured
 from world.errors import PlanflyError
 from world.files import write_whole
@@ -111,10 +113,12 @@ def named_or_default(named: str | None, default: Path, overwrite: bool, source: 
 
 # Failed findings that are listed one by one.
 _LISTED = 12
+# Width of the column of rules.
+_TITLES = 2 + max(len(rule.title) for rule in RULES.values())
 
 
 def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
-    """The verdict on the terminal: the summary first, then what fails, then the tightest finding of each rule."""
+    """The verdict on the terminal: the summary, then what fails, then what is closest to each rule's limit."""
     first, *rest = verdict.lines or ("",)
     print(coloured(first, "good" if verdict.flyable else "bad"))
     for line in rest:
@@ -126,36 +130,32 @@ def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
             print(coloured("          would pass: ", "hint") + suggestions_text(finding.suggestions))
     if len(failed) > _LISTED:
         print(coloured("  failed  ", "bad") + f"and {len(failed) - _LISTED} more")
-    for rule, title in RULES.items():
-        mine = [finding for finding in verdict.findings if finding.rule == rule]
+    for rule in RULES.values():
+        mine = [finding for finding in verdict.findings if finding.rule == rule.name]
         if mine:
-            print(f"  {title:<13}{_state(mine)}")
+            print(f"  {rule.title:<{_TITLES}}{_state(rule, mine)}")
     for note in notes:
         print(f"  note    {note}")
 
 
-def _state(findings: list[Finding]) -> str:
+def _state(rule: Rule, findings: list[Finding]) -> str:
+    """How the findings of a rule stand, and the one closest to its limit."""
     failed = sum(finding.ok is False for finding in findings)
     unknown = [finding for finding in findings if finding.ok is None]
     judged = len(findings) - len(unknown)
     if not judged:
         return f"not judged: {unknown[0].reason}"
     text = f"{judged - failed} of {judged} ok"
-    with_margin = [finding for finding in findings if finding.margin is not None and finding.ok is not None]
-    if with_margin:
-        tightest = min(with_margin, key=lambda finding: finding.margin if finding.margin is not None else 0.0)
-        value = tightest.flown if tightest.flown is not None else tightest.planned
-        if value is not None and tightest.limit is not None:
-            text += (
-                f"; tightest at {place_text(tightest.place)}: {_figures(value)} {tightest.unit}"
-                f" against {_figures(tightest.limit)} ({tightest.limit_source})"
-            )
-    return text
-
-
-def _figures(value: float) -> str:
-    # Four figures, and no power of ten: a tank of fuel holds 1140000 Wh.
-    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
+    with_margin = [(one.margin, one) for one in findings if one.margin is not None and one.ok is not None]
+    if not with_margin or rule.margin is None:
+        return text
+    closest = min(with_margin, key=lambda one: one[0])[1]
+    value = closest.planned if closest.flown is None else closest.flown
+    if value is None or closest.limit is None:
+        return text
+    where = "" if closest.place.kind == "flight" else f"closest to its limit at {place_text(closest.place)}: "
+    limit = quantity_text(closest.limit, closest.unit)
+    return f"{text}; {where}{rule.margin.of} {quantity_text(value, closest.unit)} (limit {limit})"
 
 
 def print_warnings(warnings: Iterable[str]) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.route import Route
-from flight.simulation.setup import FlightSetup, MissionStretch
+from flight.simulation.setup import FlightSetup, Gap, MissionStretch
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track, approaches
@@ -79,6 +79,21 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
         return None
     # A log or a stretch that ends a few metres before the waypoint does not show that it was passed.
     return FlownLegs(stretch, first, until, partial or not bool(laid.passed[-1]), part, laid)
+
+
+def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
+    """Pauses of the log between two times, s."""
+    source = legs.requirements.setup.source
+    return [] if source is None else [gap for gap in source.gaps if gap.start < end and gap.end > start]
+
+
+def stretch_end_text(stretch: MissionStretch) -> str:
+    """How a stretch ended, in words."""
+    if stretch.ended == "mode":
+        return f"{stretch.mode} was left for {stretch.next_mode} at {stretch.end:.1f} s"
+    if stretch.ended == "landed":
+        return f"the flight was over at {stretch.end:.1f} s"
+    return f"the log ends at {stretch.end:.1f} s"
 
 
 def _earliest_lap(

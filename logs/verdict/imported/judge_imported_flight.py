@@ -11,22 +11,20 @@ from math import isfinite
 
 import numpy as np
 
-from flight.mission.items import Command
 from flight.simulation.setup import (
     Damage,
     FlightSetup,
-    Gap,
     ImportedLog,
-    MissionStretch,
     Quantity,
     RowFaults,
     VerticalDatum,
 )
 from flight.simulation.track import Track
-from logs.verdict.findings import RULES, Finding, Verdict, make_finding, message, reason_of
-from logs.verdict.imported.flown_legs import FlownLegs, flown_legs
-from logs.verdict.judge_geometry import flown_findings
+from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between, stretch_end_text
+from logs.verdict.judge_geometry import track_findings
 from logs.verdict.places import FLIGHT, LevelAnswer, Place
+from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline
 
 # ----------------------------------------------------------------------
@@ -42,7 +40,7 @@ _DATUM_TEXTS: dict[VerticalDatum, str] = {
 _LISTED = 4
 
 
-def field_lines(
+def imported_lines(
     findings: Sequence[Finding], setup: FlightSetup, own: LevelAnswer, flown: Sequence[FlownLegs]
 ) -> tuple[str, ...]:
     """Lines of the summary, the headline first."""
@@ -88,13 +86,13 @@ def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs]) -> list[str]:
 def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
     """Which rules were not judged, and why, one line each; on which legs, where others were."""
     lines = []
-    for rule, title in RULES.items():
-        mine = [item for item in findings if item.rule == rule]
+    for rule in RULES.values():
+        mine = [item for item in findings if item.rule == rule.name]
         silent = [item for item in mine if item.ok is None]
         if not silent:
             continue
         where = "" if len(silent) == len(mine) else f" on {len(silent)} of {len(mine)}"
-        lines.append(f"Not judged: {title}{where} ({silent[0].brief})")
+        lines.append(f"Not judged: {rule.title}{where} ({silent[0].brief})")
     return lines
 
 
@@ -156,18 +154,6 @@ def _when(source: ImportedLog) -> str:
     return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
-# What each rule needs beside times and places.
-NEEDS: dict[str, tuple[Quantity, ...]] = {
-    "slope": ("heights",),
-    "clearance": ("heights",),
-    "height": ("heights",),
-    "fence": ("heights",),
-    "threat": ("heights",),
-    "bounds": ("heights",),
-    "speed": ("airspeed",),
-    "stall": ("airspeed", "attitude"),
-    "energy": ("battery",),
-}
 # What each quantity is called where a log lacks it.
 _CALLED: dict[Quantity, str] = {
     "heights": "height",
@@ -185,16 +171,10 @@ _DATUMS = {
     "pressure": "the log's heights are by pressure, above the level of 1013.25 hPa",
     "unstated": "the log does not say what its heights are above (--datum says it)",
 }
-# What the mode is called that flies a return to launch.
-_RETURN = "RTL"
-# Rules that ask for the heights of the plan.
-_OF_PLANNED_HEIGHTS = frozenset({"slope", "height"})
-# Rules that ask what the aircraft can do.
-_OF_AIRCRAFT = frozenset({"turn", "slope", "speed", "stall", "loiter", "energy"})
 _UNNAMED = "the aircraft is not named (--aircraft)"
 
 
-def judge_field_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verdict:
+def judge_imported_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verdict:
     """Judge the stretches of a flight that followed its mission: level "flown".
 
     setup: with the source of the flight.  whole: planfly's own log of it has its end.
@@ -204,12 +184,13 @@ def judge_field_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verd
         raise ValueError("a flight without a source was not imported")
     flown = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     findings = _merged([_of_stretch(setup, legs) for legs in flown])
-    findings = (*findings, _completion(setup, flown, whole=whole))
+    ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
+    findings = (*findings, *(judge(setup, flown, whole) for judge in ends))
     failed = any(item.ok is False for item in findings)
     flyable = bool(flown) and not failed
-    complete = findings[-1].ok is True
+    complete = all(item.ok is True for item in findings if item.rule == "completion")
     own = LevelAnswer(setup.autopilot.level, flyable, headline(findings, flyable))
-    lines = field_lines(findings, setup, own, flown)
+    lines = imported_lines(findings, setup, own, flown)
     return Verdict(
         findings,
         flyable,
@@ -225,21 +206,23 @@ def judge_field_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verd
 
 def _of_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Findings of one stretch, at the places of the whole route."""
-    found = flown_findings(legs.requirements, legs.aligned, "completed", True, True)
     out = []
-    for item in found:
-        if item.rule == "completion":
-            continue
+    for item in track_findings(legs.requirements, legs.aligned):
         judged = _within_gaps(_as_far_as_held(setup, legs, item), legs)
         if legs.partial:
             judged = _in_part(judged, legs)
         out.append(_shifted(judged, legs.first, setup))
-    if "stall" not in {item.rule for item in out} and setup.source is not None:
-        lacking = [quantity for quantity in NEEDS["stall"] if quantity not in setup.source.holds]
-        if lacking:
-            # The rule itself says nothing of a flight without numbers.
+    return [*out, *_lacking(setup, {item.rule for item in out})]
+
+
+def _lacking(setup: FlightSetup, found: set[str]) -> list[Finding]:
+    """Rules that found nothing because the log lacks what they need, of those that are listed all the same."""
+    out = []
+    for rule in RULES.values():
+        lacking = [one for one in rule.log.quantities if setup.source is not None and one not in setup.source.holds]
+        if rule.log.listed and rule.margin is not None and lacking and rule.name not in found:
             why = f"the log holds no {_CALLED[lacking[0]]}"
-            out.append(make_finding("stall", FLIGHT, ok=None, reason=why, source="aircraft", unit="m/s"))
+            out.append(make_finding(rule.name, FLIGHT, ok=None, reason=why, source="aircraft", unit=rule.margin.unit))
     return out
 
 
@@ -248,13 +231,13 @@ def _as_far_as_held(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Findi
     source = setup.source
     if source is None:
         return item
-    reason = ""
-    for quantity in NEEDS.get(item.rule, ()):
+    reason, needs = "", RULES[item.rule].log
+    for quantity in needs.quantities:
         if quantity not in source.holds:
             reason = f"the log holds no {_CALLED[quantity]}"
             break
         if quantity == "heights":
-            stated = source.plan_heights or item.rule not in _OF_PLANNED_HEIGHTS
+            stated = source.plan_heights or not needs.planned_heights
             reason = _DATUMS.get(source.heights.datum, "") if stated else "the plan states no heights"
         else:
             reason = _missing(legs, quantity)
@@ -262,7 +245,7 @@ def _as_far_as_held(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Findi
             break
     if reason:
         return _unjudged(item, reason)
-    if not source.aircraft_known and item.rule in _OF_AIRCRAFT and item.limit_source != "scenario":
+    if not source.aircraft_known and needs.aircraft and item.limit_source != "scenario":
         return _unjudged(item, _UNNAMED, measured=bool(item.ok))
     return item
 
@@ -293,16 +276,10 @@ def _within_gaps(item: Finding, legs: FlownLegs) -> Finding:
     last = min(len(rows) - 1, item.place.index + 1)
     start, end = float(track.time[rows[first]]), float(track.time[rows[last]])
     for gap in gaps_between(legs, start, end):
-        if item.place.kind == "leg" or item.rule == "turn":
+        if item.place.kind == "leg" or RULES[item.rule].log.no_gap:
             why = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
             return _unjudged(item, why, measured=True)
     return item
-
-
-def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
-    """Pauses of the log between two times, s."""
-    source = legs.requirements.setup.source
-    return [] if source is None else [gap for gap in source.gaps if gap.start < end and gap.end > start]
 
 
 def _in_part(item: Finding, legs: FlownLegs) -> Finding:
@@ -311,19 +288,10 @@ def _in_part(item: Finding, legs: FlownLegs) -> Finding:
     unreached = item.place.kind == "waypoint" and item.place.index == waypoint
     of_leg = item.place.kind == "leg" and item.place.index == leg
     if unreached:
-        return _unjudged(item, _left(legs.stretch))
-    if of_leg and item.rule in ("slope", "speed"):
-        return _unjudged(item, f"flown in part: {_left(legs.stretch)}") if item.ok is not False else item
+        return _unjudged(item, stretch_end_text(legs.stretch))
+    if of_leg and RULES[item.rule].log.full_leg:
+        return _unjudged(item, f"flown in part: {stretch_end_text(legs.stretch)}") if item.ok is not False else item
     return item
-
-
-def _left(stretch: MissionStretch) -> str:
-    """How a stretch ended, in words."""
-    if stretch.ended == "mode":
-        return f"{stretch.mode} was left for {stretch.next_mode} at {stretch.end:.1f} s"
-    if stretch.ended == "landed":
-        return f"the flight was over at {stretch.end:.1f} s"
-    return f"the log ends at {stretch.end:.1f} s"
 
 
 def _shifted(item: Finding, first: int, setup: FlightSetup) -> Finding:
@@ -350,69 +318,6 @@ def _merged(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
 
 def _weight(item: Finding) -> int:
     return {False: 2, True: 1, None: 0}[item.ok]
-
-
-def _completion(setup: FlightSetup, flown: Sequence[FlownLegs], *, whole: bool) -> Finding:
-    """How much of the mission the log shows; a log that ends on the way says nothing of what came after."""
-    legs, faults, unknown, known = setup.route.legs, [], [], []
-    done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
-    if not whole:
-        faults.append(message("the log is damaged or unfinished"))
-    if not flown:
-        stretches = () if setup.source is None else setup.source.stretches
-        why = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
-        faults.append(message(why))
-    elif legs - 1 in done:
-        known.append(f"{len(done)} of {legs} legs flown, the last of them to its end")
-    else:
-        last = flown[-1]
-        what = f"{len(done)} of {legs} legs flown"
-        if _returns(setup, last):
-            known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
-        elif last.stretch.ended == "log":
-            unknown.append(f"{_left(last.stretch)}, on the way to {_named(setup, last)}: {what}")
-        else:
-            faults.append(message(f"{_left(last.stretch)}, on the way to {_named(setup, last)}", f": {what}"))
-    gaps = [gap for one in flown for gap in gaps_between(one, one.stretch.start, one.stretch.end)]
-    if gaps:
-        longest = max(gaps, key=lambda gap: gap.end - gap.start)
-        seconds = sum(gap.end - gap.start for gap in gaps)
-        known.append(
-            f"{len(gaps)} gaps of {seconds:.1f} s in all, the longest from {longest.start:.1f} s to {longest.end:.1f} s"
-        )
-    return make_finding(
-        "completion",
-        FLIGHT,
-        ok=False if faults else None if unknown else True,
-        reason=reason_of(faults, [*unknown, *known]),
-        faults=faults,
-        planned=legs,
-        flown=len(done),
-        limit=legs,
-        source="route",
-        tolerance=0.0,
-        margin=len(done) - legs,
-        unit="legs",
-        method="waypoints passed in order, in the stretches that followed the mission",
-    )
-
-
-def _returns(setup: FlightSetup, legs: FlownLegs) -> bool:
-    """Whether a stretch ended with the return to launch that the mission has next: autopilots have a mode for that."""
-    item = int(setup.route.items[_ahead(setup, legs)])
-    commands = {one.seq: one.command for one in setup.mission.items}
-    return legs.stretch.next_mode == _RETURN and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
-
-
-def _ahead(setup: FlightSetup, legs: FlownLegs) -> int:
-    """The waypoint that a stretch was on the way to when it ended."""
-    return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
-
-
-def _named(setup: FlightSetup, legs: FlownLegs) -> str:
-    ahead = _ahead(setup, legs)
-    item = int(setup.route.items[ahead])
-    return f"waypoint {ahead}" + (f" (item {item})" if item >= 0 else "")
 
 
 def _leg_ends(setup: FlightSetup, flown: Sequence[FlownLegs]) -> tuple[float, ...]:

@@ -1,1 +1,1 @@
-"""The rules, one topic a file: what each asks, and the findings it makes."""
+"""The rules of the verdict, one file each, and the list of them."""

@@ -9,7 +9,9 @@ from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.tolerances import HEIGHT_ROUNDING
+from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
+from logs.verdict.suggestions import fly_higher
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE
 
 
 def clearance_findings(
@@ -41,7 +43,7 @@ def _less_error(clearance: float, limit: float, error: float | None) -> str:
     """A clearance (m) less the terrain's stated error, in words; "" where none is stated."""
     if error is None or math.isnan(clearance):
         return ""
-    short = f", less than the {limit:.0f} m required" if limit - HEIGHT_ROUNDING > clearance - error else ""
+    short = f", less than the {limit:.0f} m required" if limit - CLEARANCE_TOLERANCE > clearance - error else ""
     return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{short}"
 
 
@@ -54,14 +56,14 @@ def _planned_clearance(
     return make_finding(
         "clearance",
         requirements.leg(leg),
-        ok=None if math.isnan(planned) else planned >= limit - HEIGHT_ROUNDING,
+        ok=None if math.isnan(planned) else planned >= limit - CLEARANCE_TOLERANCE,
         reason=reason
-        + ("" if math.isnan(planned) or planned >= limit - HEIGHT_ROUNDING else f"; {limit:.0f} m are required")
+        + ("" if math.isnan(planned) or planned >= limit - CLEARANCE_TOLERANCE else f"; {limit:.0f} m are required")
         + _less_error(planned, limit, error),
         planned=planned,
         limit=limit,
         source=requirements.limits_source,
-        tolerance=HEIGHT_ROUNDING,
+        tolerance=CLEARANCE_TOLERANCE,
         margin=planned - limit,
         unit="m",
         method="exact along the fly-by path",
@@ -82,7 +84,7 @@ def _flown_clearance(
             k = first + int(np.nanargmin(span))
             least = float(aligned.low[k])
             reason = f"{least:.1f} m above ground {_when_and_where(aligned, k, float(aligned.low_at[k]))}"
-            ok = least >= limit - HEIGHT_ROUNDING
+            ok = least >= limit - CLEARANCE_TOLERANCE
         if not known.all():
             k = first + int(np.argmin(known))
             off = f"off the known terrain {_when_and_where(aligned, k, 0.0)}"
@@ -92,7 +94,7 @@ def _flown_clearance(
             reason += f"; {limit:.0f} m are required"
         ground = requirements.setup.scenario.terrain
         reason += _less_error(least, limit, None if ground is None else ground.vertical_error)
-    if planned < limit - HEIGHT_ROUNDING:
+    if planned < limit - CLEARANCE_TOLERANCE:
         reason += f"; the planned path comes down to {planned:.1f} m"
     return make_finding(
         "clearance",
@@ -103,7 +105,7 @@ def _flown_clearance(
         flown=least,
         limit=limit,
         source=requirements.limits_source,
-        tolerance=HEIGHT_ROUNDING,
+        tolerance=CLEARANCE_TOLERANCE,
         margin=least - limit,
         unit="m",
         method="exact along the flown track",
@@ -116,3 +118,18 @@ def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
     when = time[k] + fraction * (time[k + 1] - time[k])
     where = position[k] + fraction * (position[k + 1] - position[k])
     return f"at {when:.1f} s, east {where[0]:.0f} m, north {where[1]:.0f} m"
+
+
+RULE = Rule(
+    name="clearance",
+    title="clearance",
+    asks="Does each leg stay the required height above the ground?",
+    margin=Margin("height above ground", "m", 10.0),
+    tolerances=("CLEARANCE_TOLERANCE", "FAR", "TOUCH"),
+    judge=clearance_findings,
+    suggest=fly_higher,
+    log=LogNeeds(("heights",)),
+    phrase=lambda item: short_of_limit("clearance", item),
+    unjudged="terrain",
+    explained=True,
+)

@@ -1,12 +1,19 @@
-"""The completion rule: planned feasibly, flown to the last waypoint, recorded whole and without contradiction."""
+"""The completion rule: planned feasibly, flown to the last waypoint, recorded in full and without contradiction."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
+from flight.mission.items import Command
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.imported.flown_legs import FlownLegs, gaps_between, stretch_end_text
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
+from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import CONTRADICTION, GAP_STEPS, LONGEST_GAP
+from logs.verdict.wording import shortened
 
 
 def completion_findings(
@@ -66,3 +73,94 @@ def _record_faults(aligned: AlignedTrack) -> list[Message]:
         k = int(np.argmax(off))
         out.append(message(f"position and velocity contradict each other at {track.time[:-1][short][k]:.2f} s"))
     return out
+
+
+# What the mode is called that flies a return to launch.
+_RETURN = "RTL"
+
+
+def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], whole: bool) -> Finding:
+    """How much of the mission the log shows; a log that ends on the way says nothing of what came after."""
+    legs, faults, unknown, known = setup.route.legs, [], [], []
+    done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
+    if not whole:
+        faults.append(message("the log is damaged or unfinished"))
+    if not flown:
+        stretches = () if setup.source is None else setup.source.stretches
+        why = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
+        faults.append(message(why))
+    elif legs - 1 in done:
+        known.append(f"{len(done)} of {legs} legs flown, the last of them to its end")
+    else:
+        last = flown[-1]
+        what = f"{len(done)} of {legs} legs flown"
+        if _returns(setup, last):
+            known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
+        elif last.stretch.ended == "log":
+            unknown.append(f"{stretch_end_text(last.stretch)}, on the way to {_named(setup, last)}: {what}")
+        else:
+            faults.append(
+                message(f"{stretch_end_text(last.stretch)}, on the way to {_named(setup, last)}", f": {what}")
+            )
+    gaps = [gap for one in flown for gap in gaps_between(one, one.stretch.start, one.stretch.end)]
+    if gaps:
+        longest = max(gaps, key=lambda gap: gap.end - gap.start)
+        seconds = sum(gap.end - gap.start for gap in gaps)
+        known.append(
+            f"{len(gaps)} gaps of {seconds:.1f} s in all, the longest from {longest.start:.1f} s to {longest.end:.1f} s"
+        )
+    return make_finding(
+        "completion",
+        FLIGHT,
+        ok=False if faults else None if unknown else True,
+        reason=reason_of(faults, [*unknown, *known]),
+        faults=faults,
+        planned=legs,
+        flown=len(done),
+        limit=legs,
+        source="route",
+        tolerance=0.0,
+        margin=len(done) - legs,
+        unit="legs",
+        method="waypoints passed in order, in the stretches that followed the mission",
+    )
+
+
+def _returns(setup: FlightSetup, legs: FlownLegs) -> bool:
+    """Whether a stretch ended with the return to launch that the mission has next: autopilots have a mode for that."""
+    item = int(setup.route.items[_ahead(setup, legs)])
+    commands = {one.seq: one.command for one in setup.mission.items}
+    return legs.stretch.next_mode == _RETURN and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
+
+
+def _ahead(setup: FlightSetup, legs: FlownLegs) -> int:
+    """The waypoint that a stretch was on the way to when it ended."""
+    return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
+
+
+def _named(setup: FlightSetup, legs: FlownLegs) -> str:
+    ahead = _ahead(setup, legs)
+    item = int(setup.route.items[ahead])
+    return f"waypoint {ahead}" + (f" (item {item})" if item >= 0 else "")
+
+
+RULE = Rule(
+    name="completion",
+    title="completion",
+    asks="Was the plan feasible, flown to its last waypoint, and recorded in full without contradiction?",
+    margin=Margin("legs flown", "legs"),
+    tolerances=(
+        "CONTRADICTION",
+        "GAP_STEPS",
+        "LONGEST_GAP",
+        "PARTLY_FLOWN",
+        "IN_ORDER",
+        "MIN_NEAR",
+        "MAX_NEAR",
+        "ANOTHER_PLACE",
+    ),
+    judge_end=completion_findings,
+    judge_imported_end=imported_completion,
+    urgency=3,
+    phrase=lambda item: f"completion ({shortened(item.brief)})",
+)

@@ -6,6 +6,7 @@ from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import ROUNDING
 
 
@@ -56,3 +57,13 @@ def _corridor(requirements: RouteRequirements, aligned: AlignedTrack | None, leg
 def _when_and_where(aligned: AlignedTrack, row: int) -> str:
     east, north, _ = aligned.track.position[row]
     return f"at {aligned.track.time[row]:.1f} s, east {east:.0f} m, north {north:.0f} m"
+
+
+RULE = Rule(
+    name="corridor",
+    title="corridor",
+    asks="How far from the legs did the flight get, its turns included?",
+    margin=Margin("distance from the legs", "m", 10.0),
+    tolerances=("ROUNDING", "PASS"),
+    judge=corridor_findings,
+)

@@ -10,13 +10,19 @@ from logs.verdict.findings import Finding, Message, make_finding, message, reaso
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
+from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import MAX_BANK, SLOWEST, SLOWEST_SHARE
+from logs.verdict.wording import shortened
 
 Floats = NDArray[np.float64]
 
 
-def departure_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> list[Finding]:
-    """One finding: numbers that are none, extreme bank, too slow to fly, or ground contact."""
+def departure_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
+    """One finding of a flight: numbers that are none, extreme bank, too slow to fly, or ground contact."""
+    if geometric:
+        return []
     if aligned is None:
         return [make_finding("departure", FLIGHT, ok=None, reason="no usable rows", unit="deg")]
     track = aligned.track
@@ -85,3 +91,16 @@ def _slowest(requirements: RouteRequirements, up: Floats) -> Floats:
         return np.full(up.shape, SLOWEST)
     envelope = requirements.setup.envelope
     return np.asarray(SLOWEST_SHARE * np.interp(up, envelope.amsl, envelope.level_speed_min))
+
+
+RULE = Rule(
+    name="departure",
+    title="loss of control",
+    noun="loss of control",
+    asks="Are all numbers finite, bank and airspeed those of a flight, and the ground never touched?",
+    margin=Margin("largest bank", "deg", 10.0),
+    tolerances=("MAX_BANK", "SLOWEST", "SLOWEST_SHARE", "FARTHEST", "FASTEST", "MAX_PLAUSIBLE"),
+    judge=departure_findings,
+    urgency=4,
+    phrase=lambda item: f"loss of control ({shortened(item.brief)})",
+)

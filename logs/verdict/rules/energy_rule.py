@@ -10,6 +10,8 @@ from logs.verdict.findings import Finding, Message, make_finding, message, reaso
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
+from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.suggestions import use_less_energy
 from logs.verdict.tolerances import RESERVE
 
 
@@ -126,3 +128,16 @@ def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float
         along = ground_speed(speed * math.cos(angle), tail, cross)
         angle = math.asin(min(1.0, max(-1.0, rise * along / speed)))
     return angle
+
+
+RULE = Rule(
+    name="energy",
+    title="energy",
+    asks="Does the flight leave the battery's or the tank's reserve?",
+    margin=Margin("energy", "Wh", 50.0),
+    tolerances=("RESERVE",),
+    judge=energy_findings,
+    suggest=use_less_energy,
+    log=LogNeeds(("battery",), aircraft=True),
+    explained=True,
+)

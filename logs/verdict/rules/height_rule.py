@@ -14,7 +14,9 @@ from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.tolerances import HEIGHT_ROUNDING
+from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.suggestions import fly_lower
+from logs.verdict.tolerances import HEIGHT_TOLERANCE
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -121,16 +123,16 @@ def _finding(
     else:
         ceiling = requirements.setup.scenario.ceiling
         high = f"{judged.height:.1f} m above ground {judged.where}"
-        if judged.height > limit + HEIGHT_ROUNDING:
+        if judged.height > limit + HEIGHT_TOLERANCE:
             faults.append(message(high, f"; {limit:g} m are allowed"))
         elif math.isfinite(judged.height):
             facts.append(f"{high} at the highest")
-        if judged.amsl > ceiling + HEIGHT_ROUNDING:
+        if judged.amsl > ceiling + HEIGHT_TOLERANCE:
             faults.append(message(f"{judged.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m"))
         if not judged.known:
             facts.append("part of the ground below it is not known")
         ok = False if faults else True if judged.known else None
-    if planned is not None and planned is not judged and planned.height > limit + HEIGHT_ROUNDING:
+    if planned is not None and planned is not judged and planned.height > limit + HEIGHT_TOLERANCE:
         facts.append(f"the planned path comes up to {planned.height:.1f} m")
     return make_finding(
         "height",
@@ -142,8 +144,22 @@ def _finding(
         flown=None if judged is None or judged is planned else judged.height,
         limit=limit,
         source=requirements.limits_source,
-        tolerance=HEIGHT_ROUNDING,
+        tolerance=HEIGHT_TOLERANCE,
         margin=None if judged is None else limit - judged.height,
         unit="m",
         method=f"exact along the {by}",
     )
+
+
+RULE = Rule(
+    name="height",
+    title="heights",
+    asks="Does each leg stay below the largest height above ground and the ceiling?",
+    margin=Margin("height above ground", "m", 10.0),
+    tolerances=("HEIGHT_TOLERANCE",),
+    judge=height_findings,
+    suggest=fly_lower,
+    log=LogNeeds(("heights",), planned_heights=True),
+    unjudged="heights above ground",
+    explained=True,
+)

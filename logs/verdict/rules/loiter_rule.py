@@ -15,6 +15,7 @@ from logs.verdict.findings import Finding, Message, make_finding, message, reaso
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
+from logs.verdict.rule import LogNeeds, Margin, Rule, located
 from logs.verdict.tolerances import RADIUS_TOLERANCE
 from logs.verdict.wording import place_text
 from world.geometry import tangent_length
@@ -156,3 +157,22 @@ def _not_held(circle: Circle, bad: list[Finding]) -> Message:
 def _bare(corner: Place) -> str:
     """A corner as a headline names it, without the item that all of its loiter's corners share."""
     return place_text(replace(corner, item=None))
+
+
+def _numbers(item: Finding) -> str:
+    """A circle that is too small, in a headline: its radius and the least one."""
+    if item.planned is None or item.limit is None or item.planned >= item.limit:
+        return ""
+    return located("loiter", item, f"radius {item.planned:.0f} m < {item.limit:.0f} m")
+
+
+RULE = Rule(
+    name="loiter",
+    title="loiters",
+    asks="Can each circle be held at the bank limit in this wind, and was it flown to its end?",
+    margin=Margin("radius", "m", 10.0),
+    tolerances=("RADIUS_TOLERANCE",),
+    merge=fold_loiters,
+    log=LogNeeds(aircraft=True),
+    phrase=_numbers,
+)

@@ -28,6 +28,7 @@ from flight.mission.items import (
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Message, make_finding, message
 from logs.verdict.places import Place
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
     PX4_ACCEPTANCE,
     PX4_BETWEEN_WAYPOINTS,
@@ -261,3 +262,17 @@ def _fence(setup: FlightSetup) -> Iterator[_Remark]:
             broken, fence_item = problem
             why = message(f"geofence violation: {broken}", f" (fence item {fence_item})")
             yield False, int(item) if item >= 0 else None, why
+
+
+RULE = Rule(
+    name="mission",
+    title="mission",
+    asks="Would an autopilot take the mission's items, and does its route keep to its own fence?",
+    margin=None,
+    tolerances=(
+        *("PX4_ACCEPTANCE", "PX4_TAKEOFF_BUFFER", "PX4_LANDING_ANGLE_DEG", "PX4_STEEPEST_LANDING"),
+        *("PX4_FIRST_WAYPOINT", "PX4_BETWEEN_WAYPOINTS", "PX4_GATE_APART", "PX4_MAX_SERVO", "PX4_MAX_PWM"),
+    ),
+    judge_items=mission_findings,
+    urgency=2,
+)

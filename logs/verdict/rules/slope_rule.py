@@ -8,6 +8,8 @@ from logs.verdict.measures.route_requirements import RouteRequirements, slope_li
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
+from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.suggestions import ease_slope
 from logs.verdict.tolerances import (
     CALM,
     GUST_SHARE,
@@ -231,3 +233,22 @@ def _too_weak(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) 
             f"; the leg asks for {math.degrees(abs(planned)):.1f}°",
         )
     ]
+
+
+RULE = Rule(
+    name="slope",
+    title="slopes",
+    asks="Can each leg be climbed or descended at its airspeed in this wind, and was it?",
+    margin=Margin("slope", "deg", 1.0),
+    tolerances=(
+        *("PLAN_TOLERANCE", "ON_THE_SPOT", "STEP", "KINK_WAYPOINTS", "OFF_SLOPE", "OFF_HEIGHT", "OFF_HEIGHT_SHORT"),
+        *("LEVEL", "CALM", "OFF_SPEED", "GUST_SHARE", "SHOWN_TOLERANCE", "SURE", "SATURATED", "SPEED_MEMORY"),
+        *("SLOWEST_LIFTED", "THROUGHOUT", "FULL", "IDLE", "NO_CURRENT", "WHOLE_THROTTLE", "SHOWN_OVER"),
+        *("SETTLED_AFTER", "INDEPENDENT", "KNOWN_TO", "SINGULAR", "UNSURE", "ACCELERATION", "CLEAR_OF_BLEND"),
+        *("SHORTEST_SLOPE", "SHORTEST_TIME", "SLOPE_FLOOR", "MAX_UNSTEADY", "ROUGH_SLOPE"),
+    ),
+    judge=slope_findings,
+    suggest=ease_slope,
+    log=LogNeeds(("heights",), planned_heights=True, aircraft=True, full_leg=True),
+    urgency=1,
+)

@@ -9,6 +9,8 @@ from logs.verdict.findings import Fact, Finding, Message, make_finding, message,
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.rule import LogNeeds, Margin, Rule, located
+from logs.verdict.suggestions import fly_level_speed
 from logs.verdict.tolerances import (
     ACCELERATION,
     GUST_SHARE,
@@ -21,6 +23,7 @@ from logs.verdict.tolerances import (
     SLOWEST,
     TAKE_UP,
 )
+from logs.verdict.wording import shortened
 from world.wind import W20
 
 Floats = NDArray[np.float64]
@@ -162,3 +165,20 @@ def _measured(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
     spread = GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(lasts, 1e-3)))
     steepened = leg > 0 and abs(float(requirements.slopes[leg] - requirements.slopes[leg - 1])) > LEVEL
     return float(speed.mean()), spread + (TAKE_UP / lasts if steepened else 0.0), least
+
+
+RULE = Rule(
+    name="speed",
+    title="airspeed",
+    asks="Is each leg's commanded airspeed one of level flight, and does the wind leave a way along the leg?",
+    margin=Margin("airspeed", "m/s", 1.0),
+    tolerances=(
+        *("ACCELERATION", "GUST_SHARE", "GUST_SIGMAS", "GUST_TIME", "LEVEL", "MEASURED_SHARE", "OFF_MEAN"),
+        *("SATURATED", "SLOWEST", "TAKE_UP"),
+    ),
+    judge=speed_findings,
+    suggest=fly_level_speed,
+    log=LogNeeds(("airspeed",), aircraft=True, full_leg=True),
+    phrase=lambda item: located("speed", item, shortened(item.brief)),
+    unjudged="airspeed",
+)

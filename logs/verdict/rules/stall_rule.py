@@ -19,6 +19,8 @@ from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
+from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.suggestions import fly_faster
 from logs.verdict.tolerances import GUST_SHARE, STALL_MEAN, STALL_TOLERANCE
 from world.wind import W20
 
@@ -51,7 +53,8 @@ def stall_findings(
     planned = _planned(requirements)
     if geometric:
         return planned
-    if aligned is None:
+    # Without an envelope there is nothing to hold a flight against.
+    if aligned is None or not requirements.envelope:
         return []
     return [found for found in planned if found.ok is False] or _flown(requirements, aligned)
 
@@ -141,3 +144,15 @@ def _finding(found: _Margin, where: str, tolerance: float, *, geometric: bool) -
         unit="m/s",
         method="slowest level flight times the root of the load factor",
     )
+
+
+RULE = Rule(
+    name="stall",
+    title="stall",
+    asks="Is the airspeed above the stall in the bank that is flown?",
+    margin=Margin("airspeed", "m/s", 1.0),
+    tolerances=("STALL_MEAN", "STALL_TOLERANCE", "GUST_SHARE"),
+    judge=stall_findings,
+    suggest=fly_faster,
+    log=LogNeeds(("airspeed", "attitude"), aircraft=True, listed=True),
+)

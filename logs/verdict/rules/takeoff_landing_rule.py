@@ -10,6 +10,8 @@ import math
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
 from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import PLAN_TOLERANCE
 
 # How the flight does it instead.
@@ -18,13 +20,10 @@ _ENDS = {"takeoff": "begins", "landing": "ends"}
 _BEYOND = {"takeoff": None, "landing": False}
 
 
-def takeoff_landing_findings(requirements: RouteRequirements) -> list[Finding]:
-    """One finding for the take-off and one for the landing, of a mission that has them."""
-    return [*_takeoff(requirements), *_landing(requirements)]
-
-
-def _takeoff(requirements: RouteRequirements) -> list[Finding]:
-    """Climb from the ground at home to where the take-off item has its place."""
+def takeoff_findings(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
+) -> list[Finding]:
+    """One finding of a mission with a take-off: the climb from the ground at home to where the item has its place."""
     route, mission = requirements.setup.route, requirements.setup.mission
     items = [item for item in mission.items if item.command in TAKEOFFS]
     at = _waypoint_of(requirements, items[0].seq) if items else -1
@@ -40,8 +39,10 @@ def _takeoff(requirements: RouteRequirements) -> list[Finding]:
     return [_slope(requirements, "takeoff", 0, at, route.takeoff_ground, up)]
 
 
-def _landing(requirements: RouteRequirements) -> list[Finding]:
-    """Descent from the last place before the landing to where it is."""
+def landing_findings(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
+) -> list[Finding]:
+    """One finding of a mission with a landing: the descent from the last place before it to where it is."""
     items = [item for item in requirements.setup.mission.items if item.command in LANDINGS]
     found = [at for item in items if (at := _waypoint_of(requirements, item.seq)) > 0]
     if not found:
@@ -98,3 +99,26 @@ def _limit(requirements: RouteRequirements, leg: int, low: float, high: float, s
     if by_scenario is not None and by_scenario < by_aircraft:
         return by_scenario, "scenario"
     return by_aircraft, "aircraft"
+
+
+TAKEOFF = Rule(
+    name="takeoff",
+    title="take-off",
+    noun="take-off",
+    asks="Can the aircraft climb from the ground at home to the take-off item's place?",
+    margin=Margin("slope", "deg"),
+    tolerances=("PLAN_TOLERANCE",),
+    judge=takeoff_findings,
+    unjudged="take-off",
+    explained=True,
+)
+LANDING = Rule(
+    name="landing",
+    title="landing",
+    asks="Can the aircraft descend from the last waypoint to the landing place?",
+    margin=Margin("slope", "deg"),
+    tolerances=("PLAN_TOLERANCE",),
+    judge=landing_findings,
+    unjudged="landing",
+    explained=True,
+)

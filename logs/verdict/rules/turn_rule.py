@@ -9,6 +9,8 @@ from logs.verdict.measures.acceptance import negligible_kink
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
+from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.suggestions import ease_turn
 from logs.verdict.tolerances import (
     BANK_TOLERANCE,
     CLOSER,
@@ -211,3 +213,19 @@ def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) ->
             f" {least:.1f} m from it",
         )
     ]
+
+
+RULE = Rule(
+    name="turn",
+    title="turns",
+    asks="Can each corner be turned, and was it?",
+    margin=Margin("course change", "deg"),
+    tolerances=(
+        *("PLAN_TOLERANCE", "ON_THE_SPOT", "U_TURN", "LARGEST_OFFSET", "BANK_TOLERANCE", "OVERSHOOT", "SETTLED"),
+        *("GUST_OFFSET", "CLOSER_SHARE", "CLOSER", "NAVIGATION_SIGMAS", "WATCHED", "STRAIGHT", "KINK_SHARE"),
+        *("KINK_WAYPOINTS", "CLEAR_OF_TURN", "SHORTEST_COURSE", "COURSE_FLOOR", "MAX_UNSTEADY", "ROUGH_COURSE"),
+    ),
+    judge=turn_findings,
+    suggest=ease_turn,
+    log=LogNeeds(aircraft=True, no_gap=True),
+)

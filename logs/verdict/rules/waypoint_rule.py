@@ -14,7 +14,9 @@ from logs.verdict.findings import Fact, Finding, make_finding, message, reason_o
 from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
+from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
+from logs.verdict.wording import place_text
 
 Floats = NDArray[np.float64]
 
@@ -131,3 +133,29 @@ def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, lev
     near = np.flatnonzero(distance <= distance.min() + EQUALLY_CLOSE)
     up = position[near, 2] + fraction[near] * (position[near + 1, 2] - position[near, 2]) - level
     return float(distance.min()), float(up[np.argmin(np.abs(up))])
+
+
+def _missed(item: Finding) -> str:
+    """A missed waypoint in a headline."""
+    over = item.flown is not None and item.limit is not None and item.flown > item.limit
+    return f"{place_text(item.place)} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if over else "")
+
+
+RULE = Rule(
+    name="waypoint",
+    title="waypoints",
+    asks="Was each waypoint reached, by the radius that the mission or the autopilot has for it?",
+    margin=Margin("closest approach", "m", 10.0),
+    tolerances=(
+        "ROUNDING",
+        "EQUALLY_CLOSE",
+        "PASS",
+        "NAVIGATION_SIGMAS",
+        "CLOSER",
+        "ARRIVED",
+        "CAPTURE_RADIUS",
+        "CHORD_TIME",
+    ),
+    judge=waypoint_findings,
+    phrase=_missed,
+)

@@ -15,9 +15,10 @@ from flight.simulation.airborne import control_limits, held_at_limit
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog
-from logs.verdict.findings import RULES, Verdict
+from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.path_sweeps import path_spheres, segment_clearances
+from logs.verdict.rules.registry import RULES
 from logs.views.compare_charts import NamedFlight, draw_both_on_map, draw_both_over_distance
 from logs.views.drawing import png_bytes, svg_bytes
 from logs.views.report.charts import compare_charts

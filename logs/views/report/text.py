@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from flight.simulation.setup import MissionStretch
-from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.findings import Finding, Verdict
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.places import DecidingParameter, Suggestion
+from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text, suggestions_text
 
 # ----------------------------------------------------------------------

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from flight.mission.route import Route
 from flight.simulation.track import Track
-from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.findings import Finding, Verdict
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
+from logs.verdict.rules.registry import RULES
 from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind, vary
 from planfly.campaigns.spread.draws import Draw, draw_flight
 from planfly.pipeline import fly_and_judge

@@ -8,7 +8,7 @@ import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from logs.verdict.findings import RULES
+from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text
 from logs.views.drawing import png_bytes
 from planfly.campaigns.flights.campaign_base import CampaignBase
@@ -41,14 +41,16 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
         answer=summary.estimate.answer,
         lines=lines,
         failures=[
-            (RULES[one.rule], place_text(place), number) for one in summary.by_rule for place, number in one.places
+            (RULES[one.rule].title, place_text(place), number)
+            for one in summary.by_rule
+            for place, number in one.places
         ],
         flights=summary.estimate.tally.flown,
         worst=[
             (
                 row.draw.index,
                 row.outcome,
-                "; ".join(f"{RULES[rule]} at {place_text(place)}" for rule, place in row.failed[:4]) or row.ended,
+                "; ".join(f"{RULES[rule].title} at {place_text(place)}" for rule, place in row.failed[:4]) or row.ended,
                 closest_text(row),
                 log_name(row) if row.duration > 0.0 else "",
             )
@@ -97,13 +99,13 @@ def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> lis
     flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
     speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
     bins = speed_bins(speed, flyable, summary.goal.confidence)
-    counts = [(RULES[one.rule], place_text(place), n) for one in summary.by_rule for place, n in one.places]
+    counts = [(RULES[one.rule].title, place_text(place), n) for one in summary.by_rule for place, n in one.places]
     out = [
         (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
     ]
     if summary.deciding:
         bars = [Bar(BY_NAME[one.quantity].title, one.index, one.slope) for one in summary.sensitivities]
-        out.append((draw_tornado(bars, RULES[summary.deciding]), "What the deciding margin depends on"))
+        out.append((draw_tornado(bars, RULES[summary.deciding].title), "What the deciding margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
         out.append((failures, "In how many flights each rule failed, and where"))

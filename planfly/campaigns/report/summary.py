@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from logs.verdict.findings import RULES
 from logs.verdict.places import Place
+from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import SCALES, FlightRow
@@ -198,7 +198,7 @@ def closest_text(row: FlightRow) -> str:
     if not known:
         return ""
     _, rule, margin = min(known, key=lambda one: one[0])
-    return f"{RULES[rule]} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
+    return f"{RULES[rule].title} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
 
 
 def log_name(row: FlightRow) -> str:
@@ -217,13 +217,13 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     ]
     for one in summary.by_rule:
         where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])
-        lines.append(f"  failed  {RULES[one.rule]} in {one.flights}: {where}")
+        lines.append(f"  failed  {RULES[one.rule].title} in {one.flights}: {where}")
     if summary.lost:
         named = ", ".join(map(str, summary.lost[:10]))
         lines.append(f"  lost    {len(summary.lost)} could not be flown, their workers died: {named}")
     if summary.deciding and summary.low_margin is not None:
         lines.append(
-            f"  decides {RULES[summary.deciding]}: one flight in twenty has a margin below"
+            f"  decides {RULES[summary.deciding].title}: one flight in twenty has a margin below"
             f" {summary.low_margin:.1f} {summary.unit}; {_drivers_text(summary)}"
         )
     return lines

@@ -11,8 +11,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from logs.verdict.findings import RULES
 from logs.verdict.places import Place
+from logs.verdict.rules.registry import RULES
 from planfly.campaigns.flights.flight_row import FlightRow, LeastMargin
 from planfly.campaigns.spread.draws import Draw
 from planfly.campaigns.spread.spread_file import NAMES

@@ -15,16 +15,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import (
-    RULES,
-    SCHEMA,
-    Finding,
-    Verdict,
-    make_finding,
-    parse_reference_flights,
-    reference_flights_json,
-    verdict_json,
-)
+from logs.verdict.findings import SCHEMA, Finding, Verdict, make_finding, verdict_json
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.places import (
     FLIGHT,
@@ -36,6 +27,8 @@ from logs.verdict.places import (
     Place,
     ReferenceFlights,
 )
+from logs.verdict.reference_flights import parse_reference_flights, reference_flights_json
+from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text, suggestions_text
 from tests.logs.verdict.judging import ROUTE, bad_plan, judge, leg, of, suggested, waypoint
 from tests.mission_lines import setup_of, wp

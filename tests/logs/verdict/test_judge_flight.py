@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import RULES, verdict_json
+from logs.verdict.findings import verdict_json
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Place
+from logs.verdict.rules.registry import RULES
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of, waypoint
 from tests.synthetic import (
     copied,

@@ -2,12 +2,13 @@
 
 from flight.simulation.setup import FlightSetup
 from logs.recording.example_log import example_log
-from logs.verdict.findings import RULES, verdict_json
+from logs.verdict.findings import verdict_json
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.judge_geometry import flown_findings
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import PLAN
+from logs.verdict.rules.registry import RULES
 from tests.logs.verdict.judging import bad_plan, failing
 
 
@@ -28,7 +29,7 @@ def test_a_plan_that_is_not_feasible(setup: FlightSetup) -> None:
 def test_rules_come_in_the_verdicts_order() -> None:
     log = example_log()
     requirements = route_requirements(log.setup)
-    findings = flown_findings(requirements, align_track(requirements, log.track), "completed", True, True)
+    findings = flown_findings(requirements, align_track(requirements, log.track), "completed", True)
     order = list(RULES)
     assert [order.index(item.rule) for item in findings] == sorted(order.index(item.rule) for item in findings)
 

@@ -12,8 +12,9 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict import findings, wording
-from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.rules.registry import RULES
 from logs.views.failures import failures
 from logs.views.report.text import badge_of, rule_rows
 from logs.views.turns import place_values

@@ -5,8 +5,9 @@ from xml.etree import ElementTree
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
-from logs.verdict.findings import RULES, Finding, Verdict, make_finding, message
+from logs.verdict.findings import Finding, Verdict, make_finding, message
 from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
+from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines, verdict_html
 from tests.logs.verdict.judging import leg, missile, waypoint
 from tests.synthetic import make_setup

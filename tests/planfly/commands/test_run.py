@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from logs.recording.reader import read_log
-from logs.verdict.findings import RULES
+from logs.verdict.rules.registry import RULES
 from planfly.cli import main
 from planfly.terminal.results import RUN_FILES
 from tests.planfly.conftest import FIELD

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from flight.simulation.track import TRACK_ROW, as_track
-from logs.verdict.findings import RULES, Finding, Verdict, make_finding
+from logs.verdict.findings import Finding, Verdict, make_finding
 from logs.verdict.places import Place
+from logs.verdict.rules.registry import RULES
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import (
     COUNTS,

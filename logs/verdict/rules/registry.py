@@ -1,0 +1,50 @@
+"""The one list of the rules of the verdict.
+
+To add a rule, write its file and its line in the list: everything that goes rule by rule follows.
+"""
+
+from logs.verdict.rule import Rule
+from logs.verdict.rules import (
+    bounds_rule,
+    clearance_rule,
+    completion_rule,
+    corridor_rule,
+    departure_rule,
+    energy_rule,
+    fence_rule,
+    height_rule,
+    loiter_rule,
+    px4_rule,
+    slope_rule,
+    speed_rule,
+    stall_rule,
+    takeoff_landing_rule,
+    threat_rule,
+    turn_rule,
+    waypoint_rule,
+)
+
+# Every rule by its name, in the order in which a verdict judges and lists them.
+RULES: dict[str, Rule] = {
+    rule.name: rule
+    for rule in (
+        px4_rule.RULE,
+        turn_rule.RULE,
+        loiter_rule.RULE,
+        slope_rule.RULE,
+        clearance_rule.RULE,
+        height_rule.RULE,
+        fence_rule.RULE,
+        threat_rule.RULE,
+        bounds_rule.RULE,
+        waypoint_rule.RULE,
+        corridor_rule.RULE,
+        speed_rule.RULE,
+        stall_rule.RULE,
+        takeoff_landing_rule.TAKEOFF,
+        takeoff_landing_rule.LANDING,
+        energy_rule.RULE,
+        departure_rule.RULE,
+        completion_rule.RULE,
+    )
+}
