@@ -54,9 +54,9 @@ if TYPE_CHECKING:
     from planfly.api.wind_limits import winds as winds
     from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
     from planfly.campaigns.campaign_result import campaign as campaign
-    from planfly.campaigns.engine.workers import SchedulerError as SchedulerError
+    from planfly.campaigns.dispersions import SpreadError as SpreadError
     from planfly.campaigns.find_winds import WindsFound as WindsFound
-    from planfly.campaigns.spread.spread_file import SpreadError as SpreadError
+    from planfly.campaigns.worker_pool import SchedulerError as SchedulerError
     from planfly.pipeline import PlanThenFly as PlanThenFly
     from planner.plan import Plan as Plan
     from world.errors import FlightError as FlightError
@@ -82,9 +82,9 @@ _HOMES = {
         "planfly.api.reporting": ("compare", "export", "figures", "report"),
         "planfly.api.wind_limits": ("winds",),
         "planfly.campaigns.campaign_result": ("CampaignResult", "campaign"),
-        "planfly.campaigns.engine.workers": ("SchedulerError",),
+        "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_winds": ("WindsFound",),
-        "planfly.campaigns.spread.spread_file": ("SpreadError",),
+        "planfly.campaigns.dispersions": ("SpreadError",),
         "planfly.pipeline": ("PlanThenFly",),
         "planner.plan": ("Plan",),
         "world.errors": (

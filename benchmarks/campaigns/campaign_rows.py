@@ -16,12 +16,10 @@ from benchmarks.campaigns.client_memory import client_memory
 from benchmarks.campaigns.compare_step_rates import compare_all
 from benchmarks.campaigns.winds_reference import winds_row
 from flight.simulation.simulate import Flight, fly_to_end
-from planfly.campaigns.engine.flight_loop import Order, hired_pilots
-from planfly.campaigns.engine.workers import Workers
-from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign, vary
-from planfly.campaigns.flights.flight_row import fly_one
-from planfly.campaigns.spread.draws import draw_flight
-from planfly.campaigns.spread.spread_file import default_spread
+from planfly.campaigns.campaign_base import CampaignBase, open_campaign, vary
+from planfly.campaigns.dispersions import default_dispersions, draw_flight
+from planfly.campaigns.flight_row import fly_one
+from planfly.campaigns.worker_pool import FlightRequest, Workers, worker_pool
 from world.scenario import Scenario, load_scenario, with_wind
 
 FLIGHTS, ROUNDS = 90, 3
@@ -40,20 +38,20 @@ def mission_13_km(folder: Path) -> CampaignBase:
     def in_its_wind(scenario: Scenario) -> Scenario:
         return with_wind(scenario, wind.speed, wind.from_course, wind.turbulence)
 
-    return open_campaign(str(path), default_spread(), terrain="jacksboro", seed=1, change=in_its_wind)
+    return open_campaign(str(path), default_dispersions(), terrain="jacksboro", seed=1, change=in_its_wind)
 
 
 def flights_a_minute(base: CampaignBase, workers: int, flights: int) -> float:
     """Flights a minute, from the first that came back of each worker on."""
     indices = iter(range(flights))
 
-    def following() -> Order | None:
+    def following() -> FlightRequest | None:
         index = next(indices, None)
-        return None if index is None else Order(index)
+        return None if index is None else FlightRequest(index)
 
     moments: list[float] = []
-    with hired_pilots(Workers(workers), base) as pilots:
-        moments += [time.perf_counter() for _ in pilots.fly(following)]
+    with worker_pool(Workers(workers), base) as pool:
+        moments += [time.perf_counter() for _ in pool.fly(following)]
     return 60.0 * (flights - workers) / (moments[-1] - moments[workers - 1])
 
 
@@ -65,7 +63,7 @@ def over_simulate(base: CampaignBase, flights: int = 20) -> float:
         started = time.process_time()
         fly_one(base, index)
         between = time.process_time()
-        varied = vary(base, draw_flight(base.spread, base.seed, index))
+        varied = vary(base, draw_flight(base.dispersions, base.seed, index))
         setup_done = time.process_time()
         how = varied.off_nominal
         fly_to_end(Flight(varied.setup, varied.airframe.aircraft, how.variation, start_offset=how.start_offset))

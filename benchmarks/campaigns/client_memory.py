@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from planfly.campaigns.engine.workers import Workers, in_own_process
-from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind, open_campaign
-from planfly.campaigns.flights.flight_row import STATIONS, FlightRow
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
+from planfly.campaigns.dispersions import default_dispersions
+from planfly.campaigns.flight_row import STATIONS, FlightRow
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.report.files import finish_campaign
-from planfly.campaigns.spread.spread_file import default_spread
+from planfly.campaigns.report import finish_campaign
 from planfly.campaigns.statistics.decision import Goal
+from planfly.campaigns.worker_pool import Workers, in_own_process
 from tests.planfly.campaigns.made_campaigns import made_flight
 
 # Waypoints whose crossings a row of the demo holds.
@@ -36,7 +36,7 @@ def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) 
 
 def lead(flights: int, folder: Path) -> None:
     """Lead a campaign of so many flights, from its first to its report."""
-    base = in_own_process(open_campaign, "jacksboro", default_spread(), seed=1)
+    base = in_own_process(open_campaign, "jacksboro", default_dispersions(), seed=1)
     goal = Goal(None, False, flights, 0.95)
     with open_store(base, goal, folder, resume=False) as store:
         estimate = fly_campaign(base, goal, Workers(1), store, fly=large_flight)

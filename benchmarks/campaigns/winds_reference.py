@@ -9,12 +9,12 @@ second below.
 The draws of a point are independent of each other, or with ``--even`` spread evenly over what may be drawn (Sobol's
 points, scrambled by Owen): each is drawn from the same distribution, and as many aircraft are slippery as are to be.
 A point of independent draws ends early where its share of flyable flights is above or below the target with 99 %
-confidence, valid at every number of flights.  One of even draws does not end early.
+confidence, valid at every number of flights.  One of Sobol samples does not end early.
 
 The reference's own boundary is that of the likeliest normal law through a direction's points, and its interval that of
-the likelihood ratio, with the law's slope free; even draws count as if they were independent, which leaves the interval
-wider than it has to be.  A boundary is right that lies within half a metre a second of it, and shown wrong if it does
-of no wind in the interval.  A direction with a single wind has its boundary above that where all fly that have to, and
+the likelihood ratio, with the law's slope free; Sobol samples count as if they were independent, which leaves the
+interval wider than it has to be.  A boundary is right that lies within half a metre a second of it, and shown wrong if
+it does of no wind in the interval.  A direction with a single wind has its boundary above that where all fly that have to, and
 below it where they do not.
 """
 
@@ -30,14 +30,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-from benchmarks.campaigns.even_draws import EVEN_FLIGHTS, fly_even
-from planfly.campaigns.engine.flight_loop import FlyOne, Order, hired_pilots
-from planfly.campaigns.engine.workers import Workers
+from benchmarks.campaigns.sobol_samples import SOBOL_FLIGHTS, fly_sobol
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
+from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
-from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind, open_campaign
-from planfly.campaigns.flights.flight_row import fly_one
-from planfly.campaigns.spread.spread_file import default_spread
+from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.statistics.decision import Estimator, Goal, Tally
+from planfly.campaigns.worker_pool import FlightRequest, FlyOne, Workers, worker_pool
 
 REFERENCE = Path(__file__).parents[1] / "authorities" / "winds_reference.json"
 GOAL = WindsGoal(0.99, 0.95, 16, 20.0, 5000)
@@ -50,7 +49,7 @@ _SEED = 77
 
 def demo(seed: int) -> CampaignBase:
     """The demo's plan of seed 1, with a spread but for the wind's mean; seed: of the draws."""
-    base = open_campaign("jacksboro", default_spread().without(ASKED), seed=1)
+    base = open_campaign("jacksboro", default_dispersions().without(ASKED), seed=1)
     return replace(base, seed=seed)
 
 
@@ -60,20 +59,20 @@ def share_at(base: CampaignBase, wind: GivenWind, most: int) -> Tally:
     return _counted(base, wind, most, decide.decides, fly_one)
 
 
-def even_share_at(base: CampaignBase, wind: GivenWind) -> Tally:
-    """Fly all of a set of even draws at one wind."""
-    return _counted(base, wind, EVEN_FLIGHTS, lambda _: False, fly_even)
+def sobol_share_at(base: CampaignBase, wind: GivenWind) -> Tally:
+    """Fly a full set of Sobol samples at one wind."""
+    return _counted(base, wind, SOBOL_FLIGHTS, lambda _: False, fly_sobol)
 
 
 def _counted(base: CampaignBase, wind: GivenWind, most: int, ends: Callable[[Tally], bool], fly: FlyOne) -> Tally:
     indices, flown = iter(range(most)), Tally(0, 0, 0)
 
-    def following() -> Order | None:
+    def following() -> FlightRequest | None:
         index = None if ends(flown) else next(indices, None)
-        return None if index is None else Order(index, wind)
+        return None if index is None else FlightRequest(index, wind)
 
-    with hired_pilots(Workers(2), base, fly) as pilots:
-        for one in pilots.fly(following):
+    with worker_pool(Workers(2), base, fly) as pool:
+        for one in pool.fly(following):
             good = one.row.outcome == "flyable"
             flown = Tally(flown.flyable + good, flown.failed + (not good), 0)
     return flown
@@ -167,7 +166,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.campaigns.winds_reference")
     parser.add_argument("--directions", type=int, nargs="*", default=list(range(GOAL.directions)))
     parser.add_argument("--flights", type=int, default=1000, help="at each point, at most")
-    parser.add_argument("--even", action="store_true", help=f"{EVEN_FLIGHTS} even draws a point")
+    parser.add_argument("--even", action="store_true", help=f"{SOBOL_FLIGHTS} low-discrepancy (Sobol) samples a point")
     parser.add_argument("--seed", type=int, default=_SEED, help=f"of the draws, another for another set ({_SEED})")
     parser.add_argument("--winds", type=Path, help="winds.json of a run of `planfly winds`; else they are found here")
     args = parser.parse_args()
@@ -186,7 +185,7 @@ def main() -> None:
             if any(asked.items() <= one.items() for one in points):
                 continue
             wind = GivenWind(speed, 360.0 * direction / GOAL.directions)
-            tally = even_share_at(base, wind) if args.even else share_at(base, wind, args.flights)
+            tally = sobol_share_at(base, wind) if args.even else share_at(base, wind, args.flights)
             points.append({**asked, "flights": tally.flown, "flyable": tally.flyable})
             points.sort(key=lambda one: (one["speed"], one["seed"]))
             print(direction, points, flush=True)

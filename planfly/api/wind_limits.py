@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from planfly.campaigns.campaign_base import open_campaign
 from planfly.campaigns.campaign_result import winds_line
-from planfly.campaigns.engine.workers import Workers, in_own_process
+from planfly.campaigns.dispersions import default_dispersions, read_dispersions
 from planfly.campaigns.find_winds import (
     ASKED,
     USUAL_WIND_FLIGHTS,
@@ -13,10 +14,9 @@ from planfly.campaigns.find_winds import (
     find_winds,
     open_winds_store,
 )
-from planfly.campaigns.flights.campaign_base import open_campaign
-from planfly.campaigns.report.files import campaign_folder, write_winds
-from planfly.campaigns.spread.spread_file import default_spread, read_spread
-from planfly.campaigns.storage.stores import WINDS_DATABASE
+from planfly.campaigns.report import campaign_folder, write_winds
+from planfly.campaigns.tables import WINDS_DATABASE
+from planfly.campaigns.worker_pool import Workers, in_own_process
 
 
 def winds(
@@ -58,7 +58,7 @@ def winds(
     ):  # fmt: skip
         if not low <= value <= high:
             raise ValueError(f"{name}: {value:g}: {low:g} to {high:g} is expected")
-    chosen = default_spread() if spread is None else read_spread(Path(spread))
+    chosen = default_dispersions() if spread is None else read_dispersions(Path(spread))
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as asked:
         folder = asked.folder
         goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.engine.workers import Workers, in_own_process
+from planfly.campaigns.campaign_base import open_campaign
+from planfly.campaigns.dispersions import default_dispersions, read_dispersions
 from planfly.campaigns.find_winds import USUAL_WIND_FLIGHTS, WindsGoal
-from planfly.campaigns.flights.campaign_base import open_campaign
 from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goal
-from planfly.campaigns.report.files import campaign_folder, finish_campaign
-from planfly.campaigns.report.summary import CampaignSummary, campaign_lines, summarise
-from planfly.campaigns.spread.spread_file import default_spread, read_spread
+from planfly.campaigns.report import campaign_folder, finish_campaign
 from planfly.campaigns.statistics.decision import USUAL_CONFIDENCE, Answer, Goal, Interval
-from planfly.campaigns.storage.stores import DATABASE, read_shapes, read_table
+from planfly.campaigns.summary import CampaignSummary, campaign_lines, summarise
+from planfly.campaigns.tables import DATABASE, read_shapes, read_table
+from planfly.campaigns.worker_pool import Workers, in_own_process
 from world.html_table import html_table
 
 # ----------------------------------------------------------------------
@@ -180,7 +180,7 @@ def campaign(
     ValueError: prove: 1.5: at least 0.5 and below 1 is expected
     """
     goal = make_goal(flights, prove, at_least, confidence)
-    chosen = default_spread() if spread is None else read_spread(Path(spread))
+    chosen = default_dispersions() if spread is None else read_dispersions(Path(spread))
     with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as asked:
         folder = asked.folder
         if resume:

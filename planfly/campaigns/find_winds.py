@@ -8,15 +8,12 @@ from functools import partial
 from pathlib import Path
 
 from logs.verdict.places import Place
-from planfly.campaigns.engine.flight_loop import FlightRate, FlyOne, Order, Pilots, code_hash, hired_pilots
-from planfly.campaigns.engine.workers import Workers
-from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind
-from planfly.campaigns.flights.flight_row import FlightRow, fly_one
-from planfly.campaigns.spread.draws import standard_draws, standard_population
-from planfly.campaigns.statistics.flight_choice import next_flights
-from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more
-from planfly.campaigns.storage.stores import WINDS_DATABASE, AskedFlight, FlownFlight, WindsStore
-from planfly.campaigns.storage.table import StoreError, kept_settings
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind
+from planfly.campaigns.dispersions import standard_draws, standard_population
+from planfly.campaigns.flight_row import FlightRow, fly_one
+from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more, next_flights
+from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError, WindsStore, kept_settings
+from planfly.campaigns.worker_pool import FlightRate, FlightRequest, FlyOne, WorkerPool, Workers, code_hash, worker_pool
 
 # Half of the interval's width that is flown for, m/s, and the fewest flights of a direction: where none of so many
 # fails, one in fifty does at most (95 %); and with fewer a fit is surer of itself than it may be.
@@ -28,7 +25,7 @@ _POPULATION = 4096
 _ROUND, _FEWEST_EACH, _MAX_EACH = 48, 3, 6
 # A direction that is not settled is looked at again with so many times as many flights: a posterior takes a while.
 _LOOK_AGAIN = 1.04
-# Of a spread, what the wind that is asked about takes the place of.
+# Of the dispersions, what the wind that is asked about takes the place of.
 ASKED = ("wind_speed", "wind_from")
 
 Advance = Callable[[float, float, str], None]
@@ -82,11 +79,11 @@ class WindsFound:
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
     """The search's table in a folder, new or to go on with.
 
-    base: of a spread without the quantities of `ASKED`.
+    base: of dispersions without the quantities of `ASKED`.
     Raises StoreError, also for one that was asked for something else; more flights may be asked for, or fewer, of which
     the others then stay in the table.
     """
-    settings = {"name": base.name, "seed": base.seed, "spread": base.spread.to_json(), **asdict(goal)}
+    settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
     return WindsStore(folder / WINDS_DATABASE, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
 
 
@@ -102,16 +99,16 @@ def find_winds(
 
     A round's winds follow from the rounds before it alone, so that the result is the same for any number of workers
     and however often it was stopped.  What was flown before an error or Ctrl-C stays in the table.
-    base: of a spread without the quantities of `ASKED`.
+    base: of dispersions without the quantities of `ASKED`.
     """
     search, known = _Search(goal, base), _Known(store)
     pace = _Pace(search, len(known.flown), advance)
     with ExitStack() as stack:
-        pilots: Pilots | None = None
+        pool: WorkerPool | None = None
         while asked := search.next_round():
             if missing := known.missing(asked):
-                pilots = pilots or stack.enter_context(hired_pilots(workers, base, fly))
-                _fly_round(pilots, search, missing, known, pace)
+                pool = pool or stack.enter_context(worker_pool(workers, base, fly))
+                _fly_round(pool, search, missing, known, pace)
             for one in asked:
                 search.take(one, known.flown[one.number])
     pace.tell(len(search.flown), last=True)
@@ -124,7 +121,7 @@ class _Search:
     def __init__(self, goal: WindsGoal, base: CampaignBase) -> None:
         self.goal = goal
         numbers = DrawnNumbers(
-            standard_population(base.spread, _POPULATION), partial(standard_draws, base.spread, base.seed)
+            standard_population(base.dispersions, _POPULATION), partial(standard_draws, base.dispersions, base.seed)
         )
         self.directions = [Direction(goal.most, goal.target, numbers, goal.confidence) for _ in range(goal.directions)]
         self.open = list(range(goal.directions))
@@ -152,7 +149,7 @@ class _Search:
         return needs_more(direction.boundary(), count, ACCURACY, FEWEST)
 
     def take(self, asked: AskedFlight, flown: FlownFlight) -> None:
-        """Take a flight in, in the order in which they were asked for."""
+        """Take a flight in, in the request in which they were asked for."""
         flyable = flown.outcome == "flyable"
         ways: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
         failed = frozenset() if flyable else frozenset(ways)
@@ -165,9 +162,9 @@ class _Search:
         if flown.outcome == "lost":
             self.lost.append(asked.number)
 
-    def order(self, asked: AskedFlight) -> Order:
+    def request(self, asked: AskedFlight) -> FlightRequest:
         """As it is flown."""
-        return Order(asked.draw, GivenWind(asked.speed, 360.0 * asked.direction / self.goal.directions))
+        return FlightRequest(asked.draw, GivenWind(asked.speed, 360.0 * asked.direction / self.goal.directions))
 
     def at_least(self) -> int:
         """Flights that are to come before any direction that is open can be known, of all of them."""
@@ -208,20 +205,20 @@ class _Known:
         self.flown[asked.number] = FlownFlight(row.outcome, row.failed, row.narrow)
 
 
-def _fly_round(pilots: Pilots, search: _Search, missing: list[AskedFlight], known: _Known, pace: "_Pace") -> None:
+def _fly_round(pool: WorkerPool, search: _Search, missing: list[AskedFlight], known: _Known, pace: "_Pace") -> None:
     left = iter(missing)
-    asked: dict[Order, AskedFlight] = {}
+    asked: dict[FlightRequest, AskedFlight] = {}
 
-    def following() -> Order | None:
+    def following() -> FlightRequest | None:
         one = next(left, None)
         if one is None:
             return None
-        order = search.order(one)
-        asked[order] = one
-        return order
+        request = search.request(one)
+        asked[request] = one
+        return request
 
-    for order, row in pilots.fly(following):
-        known.add(asked[order], row)
+    for request, row in pool.fly(following):
+        known.add(asked[request], row)
         pace.tell(len(known.flown))
 
 

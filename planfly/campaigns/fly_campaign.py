@@ -4,13 +4,11 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
-from planfly.campaigns.engine.flight_loop import FlightRate, FlyOne, Order, Pilots, code_hash, hired_pilots
-from planfly.campaigns.engine.workers import Workers
-from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.flight_row import FlightRow, fly_one
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
-from planfly.campaigns.storage.stores import DATABASE, Store
-from planfly.campaigns.storage.table import StoreError, kept_settings
+from planfly.campaigns.tables import DATABASE, Store, StoreError, kept_settings
+from planfly.campaigns.worker_pool import FlightRate, FlightRequest, FlyOne, WorkerPool, Workers, code_hash, worker_pool
 
 Advance = Callable[[float, float, str], None]
 
@@ -36,7 +34,7 @@ class _Book:
             self.tally = _with_outcome(self.tally, known)
             self.decided = self.goal.stops and self.estimator.decides(self.tally)
 
-    def following(self) -> Order | None:
+    def following(self) -> FlightRequest | None:
         """The next flight to send."""
         self.sent = max(self.sent, self.tally.flown)
         while self.sent in self.beyond:
@@ -44,7 +42,7 @@ class _Book:
         if self.decided or self.sent >= self.goal.flights:
             return None
         self.sent += 1
-        return Order(self.sent - 1)
+        return FlightRequest(self.sent - 1)
 
 
 def _with_outcome(tally: Tally, outcome: str) -> Tally:
@@ -73,7 +71,7 @@ def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) ->
 
     Raises StoreError, also where more flights than the goal's are there.
     """
-    settings = {"name": base.name, "seed": base.seed, "spread": base.spread.to_json(), **asdict(goal)}
+    settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
     path = folder / DATABASE
     store = Store(path, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
     if (flown := store.tally().flown) > goal.flights:
@@ -101,14 +99,14 @@ def fly_campaign(
         if index < goal.flights:
             book.add(index, outcome)
     if not book.decided and book.tally.flown < goal.flights:
-        with hired_pilots(workers, base, fly) as pilots:
-            _fly_rest(pilots, book, store, _Pace(goal, estimator, book.tally, advance))
+        with worker_pool(workers, base, fly) as pool:
+            _fly_rest(pool, book, store, _Pace(goal, estimator, book.tally, advance))
     store.drop_from(book.tally.flown)
     return estimator.estimate(store.tally())
 
 
-def _fly_rest(pilots: Pilots, book: _Book, store: Store, pace: "_Pace") -> None:
-    for _, row in pilots.fly(book.following):
+def _fly_rest(pool: WorkerPool, book: _Book, store: Store, pace: "_Pace") -> None:
+    for _, row in pool.fly(book.following):
         _take(row, book, store)
         pace.tell(book.tally)
         if book.decided:

@@ -4,22 +4,22 @@ import argparse
 from pathlib import Path
 
 from logs.verdict.wording import place_text
-from planfly.campaigns.asked_campaign import (
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.campaign_result import campaign_line
+from planfly.campaigns.command_line import (
+    campaign_dispersions,
     campaign_goal,
-    campaign_spread,
     default_campaign_folder,
     open_base,
     repeated_options,
     tell_interrupted,
 )
-from planfly.campaigns.campaign_result import campaign_line
-from planfly.campaigns.engine.workers import Workers
-from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.report.files import finish_campaign, fly_row_again
-from planfly.campaigns.report.summary import campaign_lines
+from planfly.campaigns.report import finish_campaign, fly_row_again
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.stores import DATABASE
+from planfly.campaigns.summary import campaign_lines
+from planfly.campaigns.tables import DATABASE
+from planfly.campaigns.worker_pool import Workers
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.output import progress
@@ -33,7 +33,7 @@ def campaign(args: argparse.Namespace) -> int:
     folder = Path(args.out) if args.out else default_campaign_folder(args.target, "campaign")
     goal = campaign_goal(args, folder)
     again = args.resume or args.refly is not None
-    base = open_base(args, campaign_spread(args), folder, DATABASE, again=again)
+    base = open_base(args, campaign_dispersions(args), folder, DATABASE, again=again)
     if args.refly is not None:
         if args.json:
             raise PlanflyError("--json: goes with a campaign, not with --refly", field="--json", value=args.json)

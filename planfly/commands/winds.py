@@ -3,18 +3,18 @@
 import argparse
 from pathlib import Path
 
-from planfly.campaigns.asked_campaign import (
-    campaign_spread,
+from planfly.campaigns.campaign_result import winds_line
+from planfly.campaigns.command_line import (
+    campaign_dispersions,
     default_campaign_folder,
     open_base,
     repeated_options,
     tell_interrupted,
 )
-from planfly.campaigns.campaign_result import winds_line
-from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.find_winds import ASKED, WindsGoal, asked_flights, find_winds, open_winds_store
-from planfly.campaigns.report.files import wind_lines, write_winds
-from planfly.campaigns.storage.stores import WINDS_DATABASE
+from planfly.campaigns.report import wind_lines, write_winds
+from planfly.campaigns.tables import WINDS_DATABASE
+from planfly.campaigns.worker_pool import Workers
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.output import progress
@@ -25,7 +25,7 @@ def winds(args: argparse.Namespace) -> int:
     folder = Path(args.out) if args.out else default_campaign_folder(args.target, "winds")
     flights = asked_flights(args.flights, folder, resume=args.resume)
     goal = WindsGoal(args.prove, args.confidence, args.directions, args.most, flights)
-    base = open_base(args, campaign_spread(args).without(ASKED), folder, WINDS_DATABASE, again=args.resume)
+    base = open_base(args, campaign_dispersions(args).without(ASKED), folder, WINDS_DATABASE, again=args.resume)
     with open_winds_store(base, goal, folder, resume=args.resume) as store:
         try:
             with progress("flying") as advance:

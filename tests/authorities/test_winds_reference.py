@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from benchmarks.campaigns.even_draws import EVEN_FLIGHTS, even_draw
+from benchmarks.campaigns.sobol_samples import SOBOL_FLIGHTS, sobol_draw
 from benchmarks.campaigns.winds_reference import agreement, is_within, reference_interval
-from planfly.campaigns.spread.spread_file import default_spread
+from planfly.campaigns.dispersions import default_dispersions
 
 
 def point(speed: float, flights: int, flyable: int) -> dict[str, Any]:
@@ -46,18 +46,18 @@ def test_a_single_wind_tells_on_which_side_the_boundary_is(flyable: int, low: fl
     assert reference_interval([point(19.5, 400, 400), point(19.5, 600, flyable - 400)], 0.95) == (low, high)
 
 
-def test_even_draws_have_as_many_of_each_kind_as_there_are_to_be() -> None:
-    spread = default_spread()
-    draws = [even_draw(spread, 5, index) for index in range(EVEN_FLIGHTS)]
-    assert len({draw.seed for draw in draws}) == EVEN_FLIGHTS
-    assert draws[7] == even_draw(spread, 5, 7) != even_draw(spread, 6, 7)
+def test_sobol_samples_have_as_many_of_each_kind_as_there_are_to_be() -> None:
+    spread = default_dispersions()
+    draws = [sobol_draw(spread, 5, index) for index in range(SOBOL_FLIGHTS)]
+    assert len({draw.seed for draw in draws}) == SOBOL_FLIGHTS
+    assert draws[7] == sobol_draw(spread, 5, 7) != sobol_draw(spread, 6, 7)
     for one in spread.varying:
         values = np.array([draw.values[one.quantity.name] for draw in draws])
         if len(set(values)) < 10:
             continue
         for share in (0.01, 0.25, 0.5):
             # One of each cell of a thousand: a share of them to within the cell that it cuts.
-            assert (values < one.value(share)).sum() == pytest.approx(share * EVEN_FLIGHTS, abs=1.0)
+            assert (values < one.value(share)).sum() == pytest.approx(share * SOBOL_FLIGHTS, abs=1.0)
     still = {one.quantity.name for one in spread.varying}
     nominal = {name: value for name, value in draws[0].values.items() if name not in still}
     assert all(value in (0.0, 1.0) for value in nominal.values())

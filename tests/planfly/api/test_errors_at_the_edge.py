@@ -10,7 +10,7 @@ import pytest
 
 import planfly
 from aircraft.catalog import load_aircraft
-from planfly.campaigns.storage.stores import DATABASE
+from planfly.campaigns.tables import DATABASE
 from tests.world.made.made_scenario import SMALL
 
 _ITEM = "{}\t0\t3\t16\t0\t0\t0\t0\t{}\t8.0\t500\t1\n"

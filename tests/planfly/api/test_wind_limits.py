@@ -7,12 +7,12 @@ import pytest
 
 import planfly
 from planfly.api import wind_limits
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.dispersions import draw_flight
 from planfly.campaigns.find_winds import WindsFound, WindsGoal
-from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.flight_row import FlightRow
-from planfly.campaigns.spread.draws import draw_flight
+from planfly.campaigns.flight_row import FlightRow
 from planfly.campaigns.statistics.wind_boundary import Direction
-from planfly.campaigns.storage.stores import AskedFlight, WindsStore
+from planfly.campaigns.tables import AskedFlight, WindsStore
 from tests.planfly.campaigns.made_campaigns import table
 from tests.planfly.campaigns.statistics.made_directions import no_numbers
 

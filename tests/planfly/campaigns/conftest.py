@@ -2,7 +2,7 @@
 
 import pytest
 
-from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.campaign_base import CampaignBase
 from tests.planfly.campaigns.made_campaigns import short_base
 
 

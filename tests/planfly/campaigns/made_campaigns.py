@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from logs.verdict.places import Place
-from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind, open_campaign
-from planfly.campaigns.flights.flight_row import FlightRow, LeastMargin
-from planfly.campaigns.spread.draws import draw_flight
-from planfly.campaigns.spread.spread_file import FlightSpread, default_spread
-from planfly.campaigns.storage.table import NOT_THE_SAME
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
+from planfly.campaigns.dispersions import Dispersions, default_dispersions, draw_flight
+from planfly.campaigns.flight_row import FlightRow, LeastMargin
+from planfly.campaigns.tables import NOT_THE_SAME
 
 SCENARIO = """\
 name = "short"
@@ -60,9 +59,9 @@ def write_short(folder: Path) -> tuple[Path, Path]:
     return mission, scenario
 
 
-def short_base(folder: Path, spread: FlightSpread | None = None, seed: int = 1) -> CampaignBase:
+def short_base(folder: Path, dispersions: Dispersions | None = None, seed: int = 1) -> CampaignBase:
     mission, scenario = write_short(folder)
-    return open_campaign(str(mission), spread or default_spread(), scenario_name=str(scenario), seed=seed)
+    return open_campaign(str(mission), dispersions or default_dispersions(), scenario_name=str(scenario), seed=seed)
 
 
 def table(path: Path) -> list[tuple[Any, ...]]:
@@ -79,7 +78,7 @@ def table(path: Path) -> list[tuple[Any, ...]]:
 
 def made_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """A flight whose outcome follows from its draw: nine of ten fly; in a wind from W at most 12 m/s, else 8."""
-    draw = draw_flight(base.spread, base.seed, index)
+    draw = draw_flight(base.dispersions, base.seed, index)
     luck = draw.seed % 1000 / 1000.0
     strong = 12.0 if wind is not None and wind.from_deg == 270.0 else 8.0
     good = luck < 0.9 if wind is None else wind.speed < strong + luck - 0.5
@@ -93,7 +92,7 @@ def made_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -
 
 def all_fly(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """A made flight that always flies."""
-    draw = draw_flight(base.spread, base.seed, index)
+    draw = draw_flight(base.dispersions, base.seed, index)
     return FlightRow(draw, "flyable", "completed", (), (), 50.0, 60.0)
 
 

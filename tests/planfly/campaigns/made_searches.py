@@ -8,24 +8,22 @@ from pathlib import Path
 import pytest
 
 from planfly.campaigns import find_winds as find_winds_module
-from planfly.campaigns.engine.flight_loop import Flown, FlyOne, Order
-from planfly.campaigns.engine.workers import Workers
+from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open_winds_store
-from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.storage.stores import WINDS_DATABASE, WINDS_KIND, AskedFlight, narrow_passes_of
-from planfly.campaigns.storage.table import row_of
+from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, AskedFlight, narrow_passes_of, row_of
+from planfly.campaigns.worker_pool import FlightRequest, Flown, FlyOne, Workers
 from tests.planfly.campaigns.made_campaigns import made_flight, table
 
 GOAL = WindsGoal(0.9, 0.95, 4, 20.0, 400)
 
 
 class HerePilots:
-    """Pilots in this process: three at a time, the last to be sent the first to be back."""
+    """WorkerPool in this process: three at a time, the last to be sent the first to be back."""
 
     def __init__(self, base: CampaignBase, fly: FlyOne) -> None:
         self._base, self._fly = base, fly
 
-    def fly(self, following: Callable[[], Order | None]) -> Iterator[Flown]:
+    def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[Flown]:
         while orders := [one for one in (following() for _ in range(3)) if one is not None]:
             for order in reversed(orders):
                 yield Flown(order, self._fly(self._base, order.index, order.wind))
@@ -40,7 +38,7 @@ def flying_here() -> Iterator[None]:
         yield HerePilots(base, fly)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(find_winds_module, "hired_pilots", hired)
+        patch.setattr(find_winds_module, "worker_pool", hired)
         yield
 
 

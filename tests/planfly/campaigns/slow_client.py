@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from planfly.campaigns.engine.workers import Workers
+from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.find_winds import ASKED, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.table import HeldTable
+from planfly.campaigns.tables import LockedTable
+from planfly.campaigns.worker_pool import Workers
 from tests.planfly.campaigns.made_campaigns import short_base, slow_flight
 
 
@@ -22,7 +22,7 @@ def winds_goal(flights: int) -> WindsGoal:
     return WindsGoal(0.9999, 0.95, 4, 20.0, flights)
 
 
-def say_what_is_written(table: HeldTable) -> None:
+def say_what_is_written(table: LockedTable) -> None:
     """Print each flight's number once it is in the table."""
     insert = table.insert
 
@@ -41,7 +41,7 @@ def lead(kind: str, folder: Path, flights: int) -> None:
             say_what_is_written(store)
             fly_campaign(base, goal, Workers(2), store, fly=slow_flight)
     else:
-        base, asked = short_base(folder, default_spread().without(ASKED)), winds_goal(flights)
+        base, asked = short_base(folder, default_dispersions().without(ASKED)), winds_goal(flights)
         with open_winds_store(base, asked, folder, resume=(folder / "winds.sqlite").exists()) as table:
             say_what_is_written(table)
             find_winds(base, asked, Workers(2), table, fly=slow_flight)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import planfly
-from planfly.campaigns.asked_campaign import campaign_spread, repeated_options
+from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.campaign_result import (
     MAX_FLIGHTS,
     USUAL_FLIGHTS,
@@ -15,12 +15,12 @@ from planfly.campaigns.campaign_result import (
     make_goal,
     winds_line,
 )
+from planfly.campaigns.command_line import campaign_dispersions, repeated_options
 from planfly.campaigns.find_winds import WindsGoal
-from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.flight_row import STATIONS
-from planfly.campaigns.storage.stores import DATABASE, read_table
+from planfly.campaigns.flight_row import STATIONS
+from planfly.campaigns.tables import DATABASE, read_table
 from planfly.terminal.parser import build_parser
-from tests.planfly.campaigns.report.made_report import made_report
+from tests.planfly.campaigns.made_report import made_report
 
 FLOWN_BY = (
     "--wind 8.25,270 --turbulence light --nav rtk --aircraft aerosonde --airspeed 21.5 --fence a.fence --fence b.kml"
@@ -80,7 +80,7 @@ def test_every_option_that_decides_what_is_flown_is_repeated() -> None:
     }
     others |= {"refly", "out", "overwrite", "json", "quiet"}
     assert set(asked) - others == set(repeated_options(build_parser().parse_args(["campaign", "jacksboro"])))
-    assert campaign_spread(build_parser().parse_args(["campaign", "jacksboro"])).varying
+    assert campaign_dispersions(build_parser().parse_args(["campaign", "jacksboro"])).varying
 
 
 # ----------------------------------------------------------------------

@@ -13,8 +13,8 @@ import pytest
 
 from logs.verdict.places import Place
 from planfly.campaigns import find_winds as find_winds_module
-from planfly.campaigns.engine.flight_loop import FlyOne
-from planfly.campaigns.engine.workers import Workers
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind
+from planfly.campaigns.dispersions import default_dispersions
 from planfly.campaigns.find_winds import (
     ASKED,
     WindsFound,
@@ -24,11 +24,9 @@ from planfly.campaigns.find_winds import (
     find_winds,
     open_winds_store,
 )
-from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind
-from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
-from planfly.campaigns.spread.spread_file import default_spread
-from planfly.campaigns.storage.stores import WINDS_DATABASE, AskedFlight, FlownFlight
-from planfly.campaigns.storage.table import StoreError
+from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError
+from planfly.campaigns.worker_pool import FlyOne, Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     deadly_in_the_east,
@@ -48,7 +46,7 @@ FEWER = WindsGoal(0.9, 0.95, 4, 20.0, 200)
 
 @pytest.fixture(scope="module")
 def wind_base(tmp_path_factory: pytest.TempPathFactory) -> CampaignBase:
-    return short_base(tmp_path_factory.mktemp("winds"), default_spread().without(ASKED))
+    return short_base(tmp_path_factory.mktemp("winds"), default_dispersions().without(ASKED))
 
 
 @pytest.fixture
@@ -187,7 +185,7 @@ def surer_but_in_the_west(base: CampaignBase, index: int, wind: GivenWind | None
 
 @pytest.mark.usefixtures("here")
 def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planfly.campaigns.engine.flight_loop.TOLD_EVERY", 0.0)
+    monkeypatch.setattr("planfly.campaigns.worker_pool.TOLD_EVERY", 0.0)
     monkeypatch.setattr(find_winds_module, "FEWEST", 30)
     monkeypatch.setattr(find_winds_module, "ACCURACY", 0.8)
     goal = replace(GOAL, flights=600)
@@ -252,7 +250,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
         written |= said
         assert written <= {row[0] for row in table(folder / WINDS_DATABASE)}
     assert not finish_client("winds", folder, count) & written
-    base, goal = short_base(folder, default_spread().without(ASKED)), winds_goal(count)
+    base, goal = short_base(folder, default_dispersions().without(ASKED)), winds_goal(count)
     want = searched(base, tmp_path / "one", goal)
     assert same((searched(base, folder, goal), folder), (want, tmp_path / "one"))
     note("winds: kill -9 of its client", kills=kills, flights=count, lost=0)
@@ -274,5 +272,5 @@ def test_a_killed_worker_loses_no_flight(wind_base: CampaignBase, tmp_path: Path
 
 
 def test_the_wind_that_is_asked_about_does_not_vary() -> None:
-    names = {one.quantity.name for one in default_spread().without(ASKED).varying}
+    names = {one.quantity.name for one in default_dispersions().without(ASKED).varying}
     assert not names & {"wind_speed", "wind_from"}

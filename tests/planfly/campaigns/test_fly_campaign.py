@@ -14,15 +14,13 @@ from typing import Any, cast
 
 import pytest
 
-from planfly.campaigns.engine.flight_loop import FlyOne, Order, Pilots
-from planfly.campaigns.engine.workers import Workers
-from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
-from planfly.campaigns.report.summary import summarise
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
-from planfly.campaigns.storage.stores import DATABASE, read_table
-from planfly.campaigns.storage.table import StoreError
+from planfly.campaigns.summary import summarise
+from planfly.campaigns.tables import DATABASE, StoreError, read_table
+from planfly.campaigns.worker_pool import FlightRequest, FlyOne, WorkerPool, Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     all_fly,
@@ -86,7 +84,7 @@ def test_what_is_known_is_not_sent_again() -> None:
 
 def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_path: Path) -> None:
     class AtOnce:
-        def fly(self, following: Callable[[], Order | None]) -> Iterator[tuple[Order, FlightRow]]:
+        def fly(self, following: Callable[[], FlightRequest | None]) -> Iterator[tuple[FlightRequest, FlightRow]]:
             while (order := following()) is not None:
                 yield order, made_flight(base, order.index, None)
 
@@ -95,7 +93,7 @@ def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_p
     book = _Book(estimator, goal)
     pace = _Pace(goal, estimator, book.tally, lambda *said: told.append(said))
     with open_store(base, goal, tmp_path, resume=False) as store:
-        _fly_rest(cast("Pilots", AtOnce()), book, store, pace)
+        _fly_rest(cast("WorkerPool", AtOnce()), book, store, pace)
     # They were quicker than a line is due.
     assert [said[:2] for said in told] == [(6.0, 6.0)]
     assert told[0][2].startswith("6 flights, P ")
@@ -168,7 +166,7 @@ def test_a_deadly_flight_is_named_and_counts_against(
 ) -> None:
     if not SOAK:
         # Given up with the second worker, not with the third: workers take their time to start.
-        monkeypatch.setattr("planfly.campaigns.engine.workers.ALLOWED_FAILURES", 1)
+        monkeypatch.setattr("planfly.campaigns.worker_pool.ALLOWED_FAILURES", 1)
     goal, count = Goal(None, False, 12), 12
     found = flown(base, goal, tmp_path, Workers(2), deadly_flight)
     others = [row for row in expected(base, tmp_path / "one", count) if row[0] != 5]

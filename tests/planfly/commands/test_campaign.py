@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from planfly.campaigns.flights.campaign_base import open_campaign
-from planfly.campaigns.flights.flight_row import fly_one
+from planfly.campaigns.campaign_base import open_campaign
+from planfly.campaigns.dispersions import default_dispersions
+from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
-from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.table import same_flight
+from planfly.campaigns.tables import same_flight
 from planfly.cli import main
 from tests.planfly.campaigns.made_campaigns import write_short
 from tests.planfly.terminal.answers.checked_answers import validate
@@ -87,7 +87,7 @@ def test_a_planned_scenario_goes_on_with_its_plan(tmp_path: Path, scheduler: str
     plan = (out / "plan.json").read_bytes()
     main([*line, "--flights", "2", "--resume"])
     assert (out / "plan.json").read_bytes() == plan
-    base = open_campaign(str(scenario), default_spread(), planned=out / "plan.json")
+    base = open_campaign(str(scenario), default_dispersions(), planned=out / "plan.json")
     with open_store(base, Goal(0.5, False, 2), out, resume=True) as store:
         assert [row.draw.index for row in store.rows()] == [0, 1]
         assert all(same_flight(row, fly_one(base, row.draw.index)) for row in store.rows())

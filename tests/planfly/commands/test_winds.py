@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsGoal
-from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.storage.stores import WINDS_DATABASE, AskedFlight, WindsStore
+from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, WindsStore
 from planfly.cli import main
 from planfly.commands import winds as command
 from tests.planfly.campaigns.made_campaigns import made_flight, table, write_short

@@ -5,8 +5,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.statistics.flight_choice import next_flights
-from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers
+from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, next_flights
 
 Floats = NDArray[np.float64]
 # The ways in which a flight of this wind, m/s, and these numbers (d,) fails.

@@ -10,7 +10,6 @@ from scipy.stats import gumbel_l, norm
 
 from planfly.campaigns.statistics.censored_regression import CLOGLOG, LINKS, PROBIT, BinaryLink
 from planfly.campaigns.statistics.failure_modes import FailureMode
-from planfly.campaigns.statistics.flight_choice import next_flights
 from planfly.campaigns.statistics.wind_boundary import (
     Direction,
     DrawnNumbers,
@@ -18,6 +17,7 @@ from planfly.campaigns.statistics.wind_boundary import (
     WindBoundary,
     boundary_quantiles,
     needs_more,
+    next_flights,
 )
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
 from tests.soak import scaled

@@ -1,0 +1,43 @@
+"""Flights of a campaign by low-discrepancy (Sobol) samples.
+
+Each draw is of the dispersions' own distributions, but together they cover what may be drawn evenly: Sobol's points,
+scrambled (Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", in Monte Carlo and Quasi-Monte Carlo Methods,
+1995).  The error of a share that the draws decide falls faster than with random samples.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary
+from planfly.campaigns.dispersions import QUANTITIES, Dispersions, Draw
+from planfly.campaigns.flight_row import FlightRow
+from planfly.pipeline import fly_and_judge
+
+# Flights of a set: a power of two, for which Sobol's points are balanced.
+SOBOL_FLIGHTS = 1024
+
+
+@lru_cache
+def _shares(quantities: int, seed: int) -> NDArray[np.float64]:
+    """(SOBOL_FLIGHTS, quantities) of each quantity's distribution, 0 to 1."""
+    out: NDArray[np.float64] = qmc.Sobol(quantities, scramble=True, seed=seed).random(SOBOL_FLIGHTS)
+    return out
+
+
+def sobol_draw(dispersions: Dispersions, seed: int, index: int) -> Draw:
+    """A flight's draw; index: from 0 to before SOBOL_FLIGHTS."""
+    shares = dict(zip(dispersions.varying, _shares(len(dispersions.varying), seed)[index].tolist(), strict=True))
+    drawn = {one.quantity: one.value(share) for one, share in shares.items()}
+    gusts = int(np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,))).integers(2**63))
+    return Draw(index, gusts, {one.name: drawn.get(one, one.nominal) for one in QUANTITIES})
+
+
+def fly_sobol(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
+    """Fly one of them by its index; wind: mean wind in the scenario's place."""
+    draw = sobol_draw(base.dispersions, base.seed, index)
+    varied = vary(base, draw, wind)
+    flown = fly_and_judge(varied.setup, varied.airframe, None, off_nominal=varied.off_nominal, reference=False)
+    return FlightRow(draw, "flyable" if flown.verdict.flyable else "not flyable", flown.ended)

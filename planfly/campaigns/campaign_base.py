@@ -1,0 +1,226 @@
+"""What all flights of a campaign share (mission, world, aircraft, dispersions), and how one is varied by its draw."""
+
+import hashlib
+import json
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from aircraft.catalog import model_hash
+from aircraft.path_limits import Limits
+from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.trim import straight
+from flight.mission.from_plan import plan_mission
+from flight.mission.items import Mission
+from flight.mission.placing import PlacedMission, place_stops
+from flight.mission_files.formats import mission_text
+from flight.simulation.setup import FlightSetup, make_limits
+from planfly.airframe import Airframe, choose_seed, load_airframe, with_tracking
+from planfly.campaigns.dispersions import Dispersions, Draw, SpreadError
+from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission
+from planfly.pipeline import Advance, OffNominal, make_plan, make_setup
+from planner.plan import Plan, plan_json, read_plan
+from world.errors import MissionError
+from world.files import write_whole
+from world.scenario import Scenario, load_scenario
+from world.scenario_tables import WindTable
+from world.terrain import Terrain
+from world.wind import Wind
+
+_NO_FENCES = NamedFences()
+
+
+@dataclass(frozen=True)
+class CampaignBase:
+    """One mission, and what varies about it.
+
+    scenario: as planned in; `mission` is flown in it by every flight, in the flight's own wind.
+    airframe: of that scenario.
+    placed: the mission on the terrain that its planner knows, whatever the terrain of a flight is.
+    plan: the mission's; None for one that a person brought.
+    seed: of the draws.
+    name: a stem for file names.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    mission: Mission
+    placed: PlacedMission
+    plan: Plan | None
+    dispersions: Dispersions
+    seed: int
+    name: str
+
+    def world_hash(self) -> str:
+        """Hash of what decides flight k beside the code: scenario, mission, model, dispersions and seed."""
+        model = self.airframe.aircraft
+        terrain = self.scenario.terrain
+        parts = (
+            json.dumps(self.scenario.to_json(), sort_keys=True),
+            "" if terrain is None else hashlib.sha256(terrain.heights.tobytes()).hexdigest(),
+            mission_text(self.mission, "waypoints"),
+            repr(self.mission.fences),
+            model_hash(model),
+            repr(self.airframe.autopilot.parameters),
+            json.dumps(self.dispersions.to_json(), sort_keys=True),
+            str(self.seed),
+        )
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def open_campaign(
+    target: str,
+    dispersions: Dispersions,
+    *,
+    planned: Path | None = None,
+    scenario_name: str | None = None,
+    terrain: str | None = None,
+    seed: int | None = None,
+    change: ScenarioChange = lambda scenario: scenario,
+    fences: NamedFences = _NO_FENCES,
+    advance: Advance | None = None,
+) -> CampaignBase:
+    """The base of a campaign of a scenario, which is planned here, or of a plan or mission file.
+
+    target: an embedded scenario's name, a scenario's TOML file, a plan.json, .waypoints or .plan.
+    planned: where a scenario's plan is kept: it is read from there if it is there already, else written.
+    scenario_name, terrain, change, fences: as of `planfly.open_mission.open_mission`; zones are planned around.
+    seed: of plan and draws; None takes the scenario's, or 1.
+    Raises a PlanflyError for bad input, a plan that is not feasible, and dispersions whose middle is no aircraft
+    that flies.
+    """
+    path = Path(target)
+    if path.suffix.lower() not in (".json", ".waypoints", ".plan"):
+        scenario = fences.on_scenario(change(load_scenario(target, terrain)))
+        kept = planned is not None and planned.is_file()
+        plan = read_plan(planned) if kept and planned is not None else _make_plan(scenario, seed, advance)
+        if kept and plan.scenario.to_json() != scenario.to_json():
+            raise MissionError(f"{planned}: is the plan of another scenario than {target}", file=str(planned))
+        if planned is not None and not kept:
+            write_whole(planned, plan_json(plan))
+        base = _of_plan(plan, fences, dispersions, choose_seed(scenario, seed))
+    else:
+        opened = open_mission(path, scenario_name, terrain, seed=seed, change=change, fences=fences)
+        base = _of_mission(opened, dispersions, path.name)
+    check_middle(base)
+    # A mission that cannot be laid out is refused here, not by a worker.
+    make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
+    return base
+
+
+def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) -> Plan:
+    plan = make_plan(scenario, load_airframe(scenario), choose_seed(scenario, seed), advance=advance)
+    if not plan.feasible:
+        raise MissionError(
+            f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why", file=scenario.name
+        )
+    return plan
+
+
+def _of_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
+    scenario = plan.scenario
+    airframe = load_airframe(scenario)
+    tracking = airframe.limits.tracking
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="plan.json", tracking=tracking)
+    mission = fences.on_mission(mission)
+    placed = place_stops(mission, scenario.origin, scenario.terrain)
+    return CampaignBase(scenario, airframe, mission, placed, plan, dispersions, seed, scenario.name)
+
+
+def _of_mission(opened: OpenedMission, dispersions: Dispersions, source: str) -> CampaignBase:
+    setup = opened.setup
+    # By its name alone: the folder that it lies in is nothing of the flight's.
+    mission = replace(setup.mission, source=source)
+    scenario = setup.scenario
+    placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
+    return CampaignBase(scenario, opened.airframe, mission, placed, setup.plan, dispersions, setup.seed, opened.name)
+
+
+def check_middle(base: CampaignBase) -> None:
+    """Refuse dispersions with whose medians the aircraft holds no level flight.  Raises SpreadError."""
+    medians = {one.quantity.name: one.value(0.5) for one in base.dispersions.varying}
+    variation = Variation(
+        mass=medians.get("mass", 1.0), drag=medians.get("drag", 1.0), control=medians.get("control_power", 1.0)
+    )
+    aircraft = base.airframe.aircraft
+    model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
+    amsl = float(base.scenario.start[2])
+    if straight(model, base.airframe.airspeed, amsl) is None:
+        factors = ", ".join(
+            f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
+        )
+        raise SpreadError(
+            f"{base.dispersions.name}: {factors}: at the middle of these {aircraft.name} holds no level flight at"
+            f" {base.airframe.airspeed:g} m/s",
+            file=base.dispersions.name, value=factors,
+        )  # fmt: skip
+
+
+# ----------------------------------------------------------------------
+# A flight of a campaign, varied by its draw: the setup that is flown, and how it differs from what guidance knows.
+
+# In the order in which turbulence grows.
+LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "moderate")
+MAX_WIND, MAX_GRADIENT = 40.0, 0.05
+
+
+class GivenWind(NamedTuple):
+    """A mean wind that takes the place of a scenario's: speed in m/s, and where it comes from, degrees."""
+
+    speed: float
+    from_deg: float
+
+
+@dataclass(frozen=True)
+class VariedFlight:
+    """A setup in its own wind, over its own terrain, and the rest of its draw."""
+
+    setup: FlightSetup
+    airframe: Airframe
+    off_nominal: OffNominal
+
+
+def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
+    """The flight of a draw; wind: about which it varies, None for the scenario's.
+
+    Scenario and limits are in the flight's wind, as `planfly fly --wind` has them; mass, drag, control power and the
+    start's place are known to nobody who steers.
+    """
+    values = draw.values
+    scenario = _in_wind(base.scenario, values, wind)
+    if values["terrain_height"] and scenario.terrain is not None:
+        scenario = replace(scenario, terrain=_raised(scenario.terrain, values["terrain_height"]))
+    battery = base.airframe.battery * values["battery"]
+    airframe = replace(base.airframe, limits=_limits(base.airframe, scenario), battery=battery)
+    setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed)
+    variation = Variation(mass=values["mass"], drag=values["drag"], control=values["control_power"])
+    offset = (values["start_east"], values["start_north"], values["start_up"])
+    return VariedFlight(setup, airframe, OffNominal(variation, offset))
+
+
+def _in_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | None) -> Scenario:
+    """The scenario in the wind of a draw; gusts have the flight's seed, whatever the scenario states."""
+    old = scenario.wind
+    about = mean or GivenWind(old.speed, math.degrees(old.from_course))
+    speed = min(MAX_WIND, max(0.0, about.speed + values["wind_speed"]))
+    from_deg = (about.from_deg + values["wind_from"]) % 360.0
+    gradient = min(MAX_GRADIENT, max(-MAX_GRADIENT, old.gradient + values["wind_gradient"]))
+    level = LEVELS.index(old.turbulence) + round(values["turbulence"])
+    turbulence = LEVELS[min(len(LEVELS) - 1, max(0, level))]
+    table = WindTable(speed_mps=speed, from_deg=from_deg, gradient=gradient, turbulence=turbulence)
+    wind = Wind(speed, math.radians(from_deg), gradient, turbulence, None, old.reference_amsl)
+    return replace(scenario, spec=scenario.spec.model_copy(update={"wind": table}), wind=wind)
+
+
+def _raised(terrain: Terrain, by: float) -> Terrain:
+    return replace(terrain, heights=(terrain.heights + np.float32(by)).astype(np.float32))
+
+
+def _limits(airframe: Airframe, scenario: Scenario) -> Limits:
+    """The airframe's limits in another wind."""
+    old = airframe.limits
+    limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
+    return with_tracking(limits, airframe.autopilot, scenario)

@@ -1,0 +1,346 @@
+"""The dispersions of a campaign: which quantities vary, by which distribution, and what each flight draws of them.
+
+They are read from a TOML file.
+
+A table a quantity, named as in `QUANTITIES`; `distribution` is the name of one of
+`scipy.stats`' distributions, the other keys are its parameters, and `source` says where the numbers are from:
+
+    [wind_speed]
+    distribution = "norm"
+    scale = 1.5
+    source = "two years of the airfield's records"
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.errors import PlanflyError
+from world.files import read_small_file, toml_table, utf8_text
+
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# What may vary between the flights of a campaign: each quantity's unit, how it changes the flight, and its range.
+
+
+class Quantity(NamedTuple):
+    """One number that is drawn once a flight.
+
+    name: its table in a dispersions file, and its column in the campaign's.
+    combine: "added" to what the scenario has, or "factor" on it.
+    unit: of what is added; "" for a factor.
+    low, high: the least and the largest that may be drawn; a draw beyond them is none of this aircraft or world.
+    whole: whether it counts steps, so that its distribution is a discrete one.
+    title: for a person.
+    """
+
+    name: str
+    combine: Literal["added", "factor"]
+    unit: str
+    low: float
+    high: float
+    title: str
+    whole: bool = False
+
+    @property
+    def nominal(self) -> float:
+        """The value that changes nothing."""
+        return 1.0 if self.combine == "factor" else 0.0
+
+
+# In this order a flight's numbers are drawn, whether they vary or not: what one quantity does leaves the others alone.
+QUANTITIES = (
+    Quantity("wind_speed", "added", "m/s", -40.0, 40.0, "wind speed"),
+    Quantity("wind_from", "added", "deg", -180.0, 180.0, "wind direction"),
+    Quantity("wind_gradient", "added", "1/s", -0.05, 0.05, "wind gradient"),
+    Quantity("turbulence", "added", "levels", -2.0, 2.0, "turbulence", whole=True),
+    Quantity("mass", "factor", "", 0.5, 2.0, "mass"),
+    Quantity("drag", "factor", "", 0.3, 3.0, "drag"),
+    Quantity("control_power", "factor", "", 0.25, 2.0, "control power"),
+    Quantity("battery", "factor", "", 0.05, 1.5, "battery"),
+    Quantity("terrain_height", "added", "m", -100.0, 100.0, "terrain height"),
+    Quantity("start_east", "added", "m", -200.0, 200.0, "start, east"),
+    Quantity("start_north", "added", "m", -200.0, 200.0, "start, north"),
+    Quantity("start_up", "added", "m", -100.0, 100.0, "start, height"),
+)
+BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+NAMES = tuple(BY_NAME)
+
+
+# Of a distribution at least this much has to lie within the quantity's range; the rest of it is never drawn.
+INSIDE = 0.99
+MAX_BYTES = 100_000
+DEFAULT = "planfly's default dispersions"
+
+
+class SpreadError(PlanflyError):
+    """A dispersions file cannot be used as it stands."""
+
+
+@dataclass(frozen=True)
+class Varying:
+    """One quantity and its distribution.
+
+    distribution: a name of `scipy.stats`.
+    parameters: by keyword, as `scipy.stats` takes them.
+    source: where the numbers are from.
+    """
+
+    quantity: Quantity
+    distribution: str
+    parameters: tuple[tuple[str, float], ...]
+    source: str
+
+    @cached_property
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        return getattr(stats, self.distribution)(**dict(self.parameters))
+
+    @cached_property
+    def _inside(self) -> tuple[float, float]:
+        """The distribution function below the range, and at its end."""
+        low = self.quantity.low - (0.5 if self.quantity.whole else 0.0)
+        return float(self._frozen.cdf(low)), float(self._frozen.cdf(self.quantity.high))
+
+    @property
+    def share_inside(self) -> float:
+        """How much of the distribution lies within the quantity's range, 0 to 1; NaN for parameters that it has not."""
+        low, high = self._inside
+        return high - low
+
+    def value(self, uniform: float) -> float:
+        """The quantity at this share (0 to 1) of the distribution within its range: the inverse of the distribution.
+
+        >>> mass = Varying(BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
+        >>> round(mass.value(0.25), 6)
+        0.95
+        """
+        return float(self.values(np.array([uniform]))[0])
+
+    def values(self, uniform: Floats) -> Floats:
+        """(n,) the same of many shares (n,)."""
+        low, high = self._inside
+        drawn = self._frozen.ppf(low + uniform * (high - low))
+        out: Floats = np.clip(drawn, self.quantity.low, self.quantity.high)
+        return out
+
+
+@dataclass(frozen=True)
+class Dispersions:
+    """All that varies, in the order of `QUANTITIES`; name: where it is from."""
+
+    varying: tuple[Varying, ...]
+    name: str
+
+    def without(self, names: tuple[str, ...]) -> "Dispersions":
+        """The dispersions without these quantities."""
+        return Dispersions(tuple(one for one in self.varying if one.quantity.name not in names), self.name)
+
+    def to_json(self) -> dict[str, dict[str, Any]]:
+        """As plain data, a table a quantity."""
+        return {
+            one.quantity.name: {"distribution": one.distribution, **dict(one.parameters), "source": one.source}
+            for one in self.varying
+        }
+
+
+def default_dispersions() -> Dispersions:
+    """The dispersions that campaigns have where no others are given.
+
+    >>> [one.quantity.name for one in default_dispersions().varying][:3]
+    ['wind_speed', 'wind_from', 'wind_gradient']
+    """
+    text = (resources.files("planfly.campaigns") / "default_dispersions.toml").read_text(encoding="utf-8")
+    return parse_dispersions(text, DEFAULT)
+
+
+def read_dispersions(path: Path) -> Dispersions:
+    """Read a dispersions file.  Raises SpreadError for one that cannot be read or used."""
+    return parse_dispersions(
+        utf8_text(read_small_file(path, MAX_BYTES, "dispersions", SpreadError), path, SpreadError), str(path)
+    )
+
+
+def parse_dispersions(text: str, name: str) -> Dispersions:
+    r"""The dispersions of a file's text; name: of the file in messages.
+
+    Raises SpreadError, in one line, for what is no TOML, an unknown quantity, an unknown distribution, a parameter that
+    the distribution has not or may not have, and a distribution that lies outside the quantity's range.
+
+    >>> parse_dispersions('[mass]\ndistribution = "norm"\nloc = 9.0\nscale = 0.1\nsource = "a guess"', "mine.toml")
+    Traceback (most recent call last):
+    ...
+    planfly.campaigns.dispersions.SpreadError: mine.toml: mass: norm(loc=9, scale=0.1): 0.0 % ... 0.5..2 ...
+    """
+    try:
+        tables = toml_table(text)
+    except ValueError as error:
+        raise SpreadError(f"{name}: {' '.join(str(error).split())}", file=name) from None
+    unknown = [key for key in tables if key not in BY_NAME]
+    if unknown:
+        allowed = f"unknown; it is one of {', '.join(NAMES)}"
+        raise SpreadError.at(name, unknown[0], tables[unknown[0]], allowed, shown="")
+    varying = tuple(_varying(BY_NAME[key], tables[key], name) for key in NAMES if key in tables)
+    if not varying:
+        raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}", file=name)
+    return Dispersions(varying, name)
+
+
+def _varying(quantity: Quantity, table: Any, name: str) -> Varying:
+    if not isinstance(table, dict):
+        allowed = "a table is expected, with distribution, its parameters, and source"
+        raise SpreadError.at(name, quantity.name, table, allowed, shown="")
+    entries = dict(table)
+    distribution, source = entries.pop("distribution", None), entries.pop("source", None)
+    _check_distribution(quantity, distribution, name)
+    if not isinstance(source, str) or not source.strip():
+        allowed = "missing; say where the numbers are from"
+        raise SpreadError.at(name, f"{quantity.name}.source", source, allowed, shown="")
+    _check_parameters(str(distribution), entries, name, quantity.name)
+    varying = Varying(quantity, str(distribution), tuple((key, float(value)) for key, value in entries.items()), source)
+    share = _share_inside(varying, name)
+    if not share >= INSIDE:
+        allowed = (
+            f"{100.0 * share:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
+            f" {quantity.unit or 'of the nominal'}; at least {100.0 * INSIDE:.0f} % has to"
+        )
+        raise SpreadError.at(name, quantity.name, _call(varying), allowed)
+    return varying
+
+
+def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> None:
+    from scipy import stats
+
+    kind = stats.rv_discrete if quantity.whole else stats.rv_continuous
+    field = f"{quantity.name}.distribution"
+    if not isinstance(distribution, str):
+        allowed = "missing; the name of one of scipy.stats' distributions is expected"
+        raise SpreadError.at(name, field, distribution, allowed, shown="")
+    if not isinstance(getattr(stats, distribution, None), kind):
+        sort = "a discrete one, such as randint" if quantity.whole else "a continuous one, such as norm"
+        allowed = f"no distribution of scipy.stats; {sort}, is expected"
+        raise SpreadError.at(name, field, distribution, allowed, shown=repr(distribution))
+
+
+def _check_parameters(distribution: str, entries: dict[str, Any], name: str, quantity: str) -> None:
+    from scipy import stats
+
+    frozen: Any = getattr(stats, distribution)
+    shapes = frozen.shapes.replace(",", " ").split() if frozen.shapes else []
+    allowed = [*shapes, "loc"] if isinstance(frozen, stats.rv_discrete) else [*shapes, "loc", "scale"]
+    for key, value in entries.items():
+        if key not in allowed:
+            has = f"not a parameter of {distribution}, which has {', '.join(allowed)}"
+            raise SpreadError.at(name, f"{quantity}.{key}", value, has, shown="")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise SpreadError.at(name, f"{quantity}.{key}", value, "a finite number is expected", shown=repr(value))
+    missing = [key for key in shapes if key not in entries]
+    if missing:
+        needs = f"missing; {distribution} needs {', '.join(shapes)}"
+        raise SpreadError.at(name, f"{quantity}.{missing[0]}", None, needs, shown="")
+
+
+def _share_inside(varying: Varying, name: str) -> float:
+    share = varying.share_inside
+    if math.isnan(share):
+        allowed = f"no parameters that {varying.distribution} may have"
+        raise SpreadError.at(name, varying.quantity.name, _call(varying), allowed)
+    return share
+
+
+def _call(varying: Varying) -> str:
+    return f"{varying.distribution}({', '.join(f'{key}={value:g}' for key, value in varying.parameters)})"
+
+
+# Shares of a distribution whose values give its mean and standard deviation.
+_MIDDLES = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """What flight `index` of a campaign has of its own.
+
+    seed: of what changes within the flight: turbulence, and the error of navigation.
+    values: by quantity, all of them; those that do not vary have their nominal value.
+    """
+
+    index: int
+    seed: int
+    values: dict[str, float]
+
+
+def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
+    r"""Draw a flight's numbers.
+
+    seed: the campaign's.  The stream is ``SeedSequence(seed, spawn_key=(index,))``: no flight needs another's draw, so
+    that any order, any number of workers and any part of a campaign give the same flights.
+
+    >>> from planfly.campaigns.dispersions import parse_dispersions
+    >>> one = parse_dispersions('[mass]\ndistribution = "uniform"\nloc = 0.9\nscale = 0.2\nsource = "by hand"', "x")
+    >>> first, again = draw_flight(one, 1, 7), draw_flight(one, 1, 7)
+    >>> first == again, first.values["drag"], 0.9 < first.values["mass"] < 1.1
+    (True, 1.0, True)
+    """
+    uniform, number = _drawn(seed, index)
+    varying = {one.quantity.name: one for one in dispersions.varying}
+    values = {
+        quantity.name: varying[quantity.name].value(share) if quantity.name in varying else quantity.nominal
+        for quantity, share in zip(QUANTITIES, uniform.tolist(), strict=True)
+    }
+    return Draw(index, number, values)
+
+
+def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -> Floats:
+    """(stop - start, d) what varies, as `draw_flight` draws it for these flights, in standard deviations from the mean.
+
+    d: of the varying quantities those that have more than one value.
+
+    >>> from planfly.campaigns.dispersions import default_dispersions
+    >>> standard_draws(default_dispersions(), 1, 5, 7).shape
+    (2, 11)
+    """
+    uniform = np.array([_drawn(seed, index)[0] for index in range(start, stop)]).reshape(-1, len(QUANTITIES))
+    columns = [QUANTITIES.index(one.quantity) for one in dispersions.varying]
+    return _standardised(dispersions, uniform[:, columns])
+
+
+def standard_population(dispersions: Dispersions, count: int) -> Floats:
+    """(count, d) points that cover evenly what may be drawn, as `standard_draws` has it; count: a power of two.
+
+    The points are Sobol's, each in the middle of its cell.
+
+    >>> from planfly.campaigns.dispersions import default_dispersions
+    >>> bool(abs(standard_population(default_dispersions(), 1024).mean(axis=0)).max() < 0.01)
+    True
+    """
+    from scipy.stats import qmc
+
+    quantities = len(dispersions.varying)
+    shares = qmc.Sobol(quantities, scramble=False).random(count) if quantities else np.zeros((count, 0))
+    return _standardised(dispersions, shares + 0.5 / count)
+
+
+def _drawn(seed: int, index: int) -> tuple[Floats, int]:
+    """Of each of `QUANTITIES` the share of its distribution, and the seed of what changes within the flight."""
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
+    return random.random(len(QUANTITIES)), int(random.integers(2**63))
+
+
+def _standardised(dispersions: Dispersions, shares: Floats) -> Floats:
+    """(n, d) of shares (n, v) of each varying quantity's distribution."""
+    middles = (np.arange(_MIDDLES) + 0.5) / _MIDDLES
+    columns = []
+    for k, one in enumerate(dispersions.varying):
+        values = one.values(middles)
+        if (deviation := float(values.std())) > 0.0:
+            columns.append((one.values(shares[:, k]) - values.mean()) / deviation)
+    return np.column_stack(columns) if columns else np.zeros((len(shares), 0))

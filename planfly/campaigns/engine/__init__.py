@@ -1,1 +1,0 @@
-"""Workers that fly, on this machine or on a cluster."""

@@ -1,0 +1,284 @@
+"""One flight of a campaign, flown and judged as `planfly fly` does it, and the row that tables keep of it.
+
+A column of the tables is a field of `FlightRow`; a rule's are its least margin and that margin's place.
+"""
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.route import Route
+from flight.simulation.track import Track
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.measures.path_sweeps import path_spheres
+from logs.verdict.places import Place
+from logs.verdict.rules.registry import RULES
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary
+from planfly.campaigns.dispersions import Draw, draw_flight
+from planfly.pipeline import fly_and_judge
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+
+
+# ----------------------------------------------------------------------
+# Where a flight passed narrowly, and by how much: that tells more of the risk than that it did not fail.
+#
+# A pass is narrow where less than the scale of the rule's margin (`logs.verdict.rule.Margin`) is left to where the rule
+# fails, its tolerance counted; of a missile, where the flight stayed closer than `SPHERE_SCALE` outside its sphere.
+
+# Of a missile's sphere, by the distance outside it, m.
+SPHERE_SCALE = 10.0
+
+# Rule, place, and room as a share of the rule's scale, 0 to 1.
+NarrowPass = tuple[str, Place, float]
+
+
+def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[NarrowPass, ...]:
+    """Rule, place and room of each narrow pass of a flight, the verdict's order, then missiles.
+
+    Where a rule passes what lies beyond its limit, for reasons of its own, the room is 0.
+    """
+    room: dict[tuple[str, Place], float] = {}
+    failed = {(item.rule, item.place) for item in findings if item.ok is False}
+    for item in findings:
+        at = item.rule, item.place
+        scale = RULES[item.rule].scale
+        if at in failed or not item.ok or item.margin is None or scale is None:
+            continue
+        share = max(0.0, item.margin + (item.tolerance or 0.0)) / scale
+        if share < 1.0:
+            room[at] = min(share, room.get(at, share))
+    for place, distance in _outside_spheres(scenario, track):
+        if ("threat", place) not in failed and distance < SPHERE_SCALE:
+            room["threat", place] = max(0.0, distance) / SPHERE_SCALE
+    return tuple((rule, place, share) for (rule, place), share in room.items())
+
+
+def _outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
+    """How far outside each missile's sphere the track stays, m."""
+    threats = scenario.threats
+    if scenario.external or len(track) < 2:
+        return []
+    visits = path_spheres(track.position, track.time, threats.position, threats.kill_radius, threats.kill_scale)
+    return [
+        (Place("missile", m, name=table.name or ""), float(visits.closest[m] - threats.kill_radius[m]))
+        for m, table in enumerate(scenario.spec.threats)
+        if threats.kill_radius[m] > 0.0
+    ]
+
+
+# ----------------------------------------------------------------------
+# What the pictures keep of a flight: its clearance along the way, and where it crossed each waypoint.
+
+
+# Equal pieces of the route's length, of each of which the least clearance is kept.
+STATIONS = 150
+
+
+def clearance_profile(route: Route, track: Track) -> Singles:
+    """(STATIONS,) the least height above ground on each equal piece of the route's length, m; NaN where none was flown.
+
+    The place on the route is that beside the track, on the leg that was flown then.
+    """
+    starts, ends = route.waypoints[:-1, :2], route.waypoints[1:, :2]
+    lengths = np.hypot(*(ends - starts).T)
+    before = np.concatenate([[0.0], np.cumsum(lengths)])
+    leg = np.clip(track.leg, 0, len(lengths) - 1)
+    along = (ends - starts)[leg] / np.maximum(lengths[leg], 1e-9)[:, None]
+    covered = np.einsum("ij,ij->i", track.position[:, :2] - starts[leg], along)
+    distance = before[leg] + np.clip(covered, 0.0, lengths[leg])
+    piece = np.minimum((distance / before[-1] * STATIONS).astype(int), STATIONS - 1)
+    least = np.full(STATIONS, np.inf, dtype=np.float32)
+    np.fmin.at(least, piece, track.clearance)
+    return np.where(np.isfinite(least), least, np.float32(np.nan)).astype(np.float32)
+
+
+def waypoint_crossings(route: Route, track: Track) -> Singles:
+    """(w, 2) how far right of and above each waypoint the track was at its nearest, m; NaN where it did not get there.
+
+    Right is seen along the mean of the courses in and out.
+    """
+    points = route.waypoints
+    out = np.full((len(points), 2), np.nan, dtype=np.float32)
+    steps = np.diff(points[:, :2], axis=0)
+    courses = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
+    middle = np.concatenate([courses[:1], 0.5 * (courses[:-1] + courses[1:]), courses[-1:]])
+    for k, point in enumerate(points):
+        near = np.flatnonzero((track.leg == k) | (track.leg == k - 1))
+        passed = len(track) and (track.leg.max() >= k or k == len(points) - 1)
+        if not near.size or not passed:
+            continue
+        off = track.position[near] - point
+        nearest = off[np.argmin(off[:, 0] ** 2 + off[:, 1] ** 2)]
+        out[k] = nearest[0] * np.cos(middle[k]) - nearest[1] * np.sin(middle[k]), nearest[2]
+    return out
+
+
+# ----------------------------------------------------------------------
+# The row of a flight, and with it the columns of every table of flights.
+
+# A lost flight could not be flown: its workers died on it.
+Outcome = Literal["flyable", "not flyable", "lost"]
+
+
+@dataclass(frozen=True, slots=True)
+class LeastMargin:
+    """The least margin of a rule in a flight: how much, in which unit, where; value is None where none has a number."""
+
+    value: float | None
+    unit: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """How a table keeps a field of `FlightRow`.
+
+    kind: SQLite's type and constraint.
+    write, read: the field's value to the column's, and back.
+    same: whether the same flight has the same value whoever flew it, and however long that took.
+    """
+
+    kind: str
+    write: Callable[[Any], Any] = lambda value: value
+    read: Callable[[Any], Any] = lambda value: value
+    same: bool = True
+
+
+def _failed_text(failed: Iterable[tuple[str, Place]]) -> str:
+    return json.dumps([{"rule": rule, **asdict(place)} for rule, place in failed])
+
+
+def failed_of(text: str) -> tuple[tuple[str, Place], ...]:
+    """Rule and place of each finding that failed, of the column's text.
+
+    >>> failed_of('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
+    3
+    """
+    entries = json.loads(text)
+    return tuple((entry.pop("rule"), Place(**entry)) for entry in entries)
+
+
+_TEXT, _REAL, _BLOB = Column("TEXT NOT NULL"), Column("REAL NOT NULL"), Column("BLOB NOT NULL")
+_FAILED = Column("TEXT NOT NULL", _failed_text, failed_of)
+
+
+@dataclass(frozen=True, slots=True)
+class FlightRow:
+    """A flight in the campaign's table: each field that is ``Annotated`` with a `Column` is one.
+
+    The draw, the margins and the closeness take the columns that `COLUMNS` lists for them; tables follow from it.
+
+    ended: how, "completed" or why not.
+    failed: rule and place of each finding that failed, in the verdict's order.
+    margins: by rule, of those that were judged and whose margin has a scale.
+    energy_left: Wh; None where nothing was flown.
+    duration: s.
+    made_of: hash of what the flight was flown with; "" outside of a table.
+    clearance, crossings: bytes of the arrays of `clearance_profile` and `waypoint_crossings`; empty where nothing was
+    flown.
+    seconds: that it took.  worker: who flew it.
+    narrow: where it passed narrowly, and with how much room; the table of a campaign does not keep it.
+    """
+
+    draw: Draw
+    outcome: Annotated[Outcome, _TEXT]
+    ended: Annotated[str, _TEXT]
+    failed: Annotated[tuple[tuple[str, Place], ...], _FAILED] = ()
+    margins: tuple[tuple[str, LeastMargin], ...] = ()
+    energy_left: Annotated[float | None, Column("REAL")] = None
+    duration: Annotated[float, _REAL] = 0.0
+    made_of: Annotated[str, _TEXT] = field(default="", compare=False)
+    clearance: Annotated[bytes, _BLOB] = b""
+    crossings: Annotated[bytes, _BLOB] = b""
+    seconds: Annotated[float, Column("REAL NOT NULL", same=False)] = 0.0
+    worker: Annotated[str, Column("TEXT NOT NULL", same=False)] = ""
+    narrow: tuple[NarrowPass, ...] = ()
+
+    @property
+    def closeness(self) -> float:
+        """Least of all margins in their scales: what orders the closest calls; inf where none is known."""
+        shares = (share for rule, margin in self.margins if (share := scaled(rule, margin)) is not None)
+        return min((share for share in shares if math.isfinite(share)), default=math.inf)
+
+
+def scaled(rule: str, margin: LeastMargin) -> float | None:
+    """A margin in the scale of its rule; None where either has no number."""
+    scale = RULES[rule].scale
+    return None if margin.value is None or scale is None else margin.value / scale
+
+
+def _fields() -> dict[str, Column]:
+    """The fields of `FlightRow` that are a column each, by name, in order."""
+    hints = get_type_hints(FlightRow, include_extras=True)
+    found = {name: get_args(hint) for name, hint in hints.items()}
+    return {name: args[-1] for name, args in found.items() if args and isinstance(args[-1], Column)}
+
+
+FIELDS = _fields()
+
+
+def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: Path | None = None) -> FlightRow:
+    """Fly a flight of a campaign by its index alone.
+
+    wind: mean wind in the scenario's place.  log: where to record it, None for nowhere.
+    """
+    started = time.perf_counter()
+    draw = draw_flight(base.dispersions, base.seed, index)
+    varied = vary(base, draw, wind)
+    flown = fly_and_judge(varied.setup, varied.airframe, log, off_nominal=varied.off_nominal, reference=False)
+    track, route = flown.track, varied.setup.route
+    some = len(track) > 0
+    return FlightRow(
+        draw=draw,
+        outcome="flyable" if flown.verdict.flyable else "not flyable",
+        ended=flown.ended,
+        failed=failed_findings(flown.verdict),
+        margins=least_margins(flown.verdict.findings),
+        energy_left=varied.setup.battery - float(track.energy[-1]) if some else None,
+        duration=float(track.time[-1]) if some else 0.0,
+        clearance=clearance_profile(route, track).tobytes() if some else b"",
+        crossings=waypoint_crossings(route, track).tobytes() if some else b"",
+        narrow=narrow_passes(flown.verdict.findings, varied.setup.scenario, track),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
+    """Rule and place of each finding that failed; where none did and the flight is not whole, completion's."""
+    failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
+    if failed or verdict.flyable:
+        return failed
+    return (("completion", Place("flight")),)
+
+
+def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin], ...]:
+    """Of each rule that was judged the finding with the least margin, in the verdict's order.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
+    >>> least_margins((wide, close))[0][1].value
+    4.0
+    """
+    least: dict[str, Finding] = {}
+    for item in findings:
+        if item.ok is None or item.margin is None or RULES[item.rule].scale is None:
+            continue
+        known = least.get(item.rule)
+        if known is None or known.margin is None or item.margin < known.margin:
+            least[item.rule] = item
+    return tuple((rule, LeastMargin(item.margin, item.unit, item.place)) for rule, item in least.items())
+
+
+def lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:
+    """The row of a flight that could not be flown."""
+    return FlightRow(draw_flight(base.dispersions, base.seed, index), "lost", reason)

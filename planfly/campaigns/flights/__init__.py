@@ -1,1 +1,0 @@
-"""One flight of a campaign: varied, flown, judged, and told as a row."""

@@ -1,0 +1,431 @@
+"""The files of a campaign's folder: summary, report page, worst flights' logs, and the go/no-go chart of winds."""
+
+import base64
+import json
+import math
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from logs.verdict.rules.registry import RULES
+from logs.verdict.wording import place_text
+from logs.views.drawing import png_bytes
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.dispersions import BY_NAME
+from planfly.campaigns.find_winds import ACCURACY, FEWEST, WindsFound
+from planfly.campaigns.flight_row import STATIONS, FlightRow, fly_one
+from planfly.campaigns.fly_campaign import open_store
+from planfly.campaigns.pictures import (
+    Bar,
+    Spoke,
+    draw_clearance_fan,
+    draw_crossings,
+    draw_failures,
+    draw_go_no_go,
+    draw_probability,
+    draw_tornado,
+    speed_bins,
+)
+from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound
+from planfly.campaigns.statistics.wind_boundary import needs_more
+from planfly.campaigns.summary import CampaignSummary, campaign_lines, closest_text, log_name, summarise, summary_json
+from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, Store, refuse_held, same_flight
+from planfly.campaigns.worker_pool import in_own_process
+from planfly.pipeline import Advance, make_setup
+from planner.plan import plan_json
+from world.errors import PlanflyError
+from world.files import write_whole
+
+# Flights whose way is drawn, at most: of more a picture shows no more.
+_DRAWN = 3000
+
+
+def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
+    """The page's bytes; command: the line that flies it again."""
+    pictures = [(_embedded(figure), words) for figure, words in _pictures(base, summary, store)]
+    lines = campaign_lines(summary)
+    text = _render(
+        "campaign.html",
+        name=summary.name,
+        answer=summary.estimate.answer,
+        lines=lines,
+        failures=[
+            (RULES[one.rule].title, place_text(place), number)
+            for one in summary.by_rule
+            for place, number in one.places
+        ],
+        flights=summary.estimate.tally.flown,
+        worst=[
+            (
+                row.draw.index,
+                row.outcome,
+                "; ".join(f"{RULES[rule].title} at {place_text(place)}" for rule, place in row.failed[:4]) or row.ended,
+                closest_text(row),
+                log_name(row) if row.duration > 0.0 else "",
+            )
+            for row in summary.worst
+        ],
+        dispersions=[
+            (
+                BY_NAME[name].title,
+                BY_NAME[name].combine if BY_NAME[name].combine == "factor" else BY_NAME[name].unit,
+                ", ".join(f"{key} {value:g}" for key, value in table.items() if key not in ("distribution", "source")),
+                table["distribution"],
+                table["source"],
+            )
+            for name, table in summary.dispersions.items()
+        ],
+        pictures=pictures,
+        command=command,
+        made_of=summary.made_of,
+        seed=summary.seed,
+    )
+    return text.encode("utf-8")
+
+
+def _render(template: str, **values: object) -> str:
+    folder = resources.files("planfly.campaigns") / "templates"
+    environment = Environment(
+        loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template(template).render(**values)
+
+
+def _embedded(figure: Figure) -> str:
+    return "data:image/png;base64," + base64.b64encode(png_bytes(figure)).decode("ascii")
+
+
+def winds_page(name: str, figure: Figure, lines: list[str], rows: Sequence[tuple[str, ...]], command: str) -> bytes:
+    """The page of a go/no-go chart."""
+    return _render("winds.html", name=name, picture=_embedded(figure), lines=lines, rows=rows, command=command).encode(
+        "utf-8"
+    )
+
+
+def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
+    """Figures and their captions."""
+    flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
+    speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
+    bins = speed_bins(speed, flyable, summary.goal.confidence)
+    counts = [(RULES[one.rule].title, place_text(place), n) for one in summary.by_rule for place, n in one.places]
+    out = [
+        (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
+    ]
+    if summary.deciding:
+        bars = [Bar(BY_NAME[one.quantity].title, one.index, one.slope) for one in summary.sensitivities]
+        out.append((draw_tornado(bars, RULES[summary.deciding].title), "What the deciding margin depends on"))
+    if counts:
+        failures = draw_failures(counts, summary.estimate.tally.flown)
+        out.append((failures, "In how many flights each rule failed, and where"))
+    return out + _ways(base, store)
+
+
+def _ways(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
+    """Fan and crossings of the flights that have a track."""
+    setup = make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
+    points = setup.route.waypoints
+    shapes = [np.frombuffer(data, np.float32) for data in store.blobs("clearance", _DRAWN)]
+    if not shapes:
+        return []
+    outcomes = [one != "flyable" for one, there in zip(store.texts("outcome"), store.has_track(), strict=True) if there]
+    failed = np.array(outcomes[: len(shapes)])
+    out = []
+    if base.scenario.terrain is not None:
+        lengths = np.hypot(*np.diff(points[:, :2], axis=0).T)
+        before = np.concatenate([[0.0], np.cumsum(lengths)])
+        at = (np.arange(STATIONS) + 0.5) / STATIONS * before[-1]
+        east, north = (np.interp(at, before, points[:, axis]) for axis in range(2))
+        ground = base.scenario.terrain.height(east, north)
+        least = base.scenario.limits.min_clearance_m
+        figure = draw_clearance_fan(np.array(shapes, dtype=np.float64), failed, ground, float(before[-1]), least)
+        out.append((figure, "Height above ground along the way, over all flights, and the ground itself"))
+    crossings = np.array([np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _DRAWN)])
+    out.append((draw_crossings(crossings.astype(np.float64), failed), "Where flights crossed each waypoint"))
+    return out
+
+
+# ----------------------------------------------------------------------
+# The files of a campaign's folder: what is cleared there, and summary, report, and the logs of its worst flights.
+
+# What a campaign or a search for winds writes into its folder, and clears where it is replaced.
+CAMPAIGN_FILES = (
+    *(f"{table}{ending}" for table in (DATABASE, WINDS_DATABASE) for ending in ("", "-wal", "-shm")),
+    "summary.json", "report.html", "winds.json", "winds.png", "winds.html", "plan.json",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class OutputDirectory:
+    """A campaign's folder, and what may be done with what lies in it.
+
+    table: name of the file of flights.
+    resume: go on with the campaign that is there.  overwrite: replace it.
+    asks: how either is asked for, for the lines that refuse.
+    """
+
+    folder: Path
+    table: str
+    resume: bool
+    overwrite: bool
+    asks: tuple[str, str] = ("resume=True", "overwrite=True")
+
+    def refuse(self) -> None:
+        """Refuse a folder that is a file, or has other contents than were asked for.  Raises PlanflyError."""
+        folder, (resume, overwrite) = self.folder, self.asks
+        if self.resume:
+            if not (folder / self.table).is_file():
+                raise PlanflyError(f"{folder / self.table}: no campaign there to go on with", file=folder / self.table)
+            return
+        if folder.exists() and not folder.is_dir():
+            raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
+        if self.overwrite or not folder.is_dir() or not any(folder.iterdir()):
+            return
+        if (folder / self.table).exists():
+            raise PlanflyError(
+                f"{folder}: holds a campaign; {resume} goes on with it, {overwrite} replaces it", file=folder
+            )
+        if any((folder / name).exists() for name in CAMPAIGN_FILES):
+            raise PlanflyError(f"{folder}: holds another campaign; {overwrite} replaces it", file=folder)
+        raise PlanflyError(f"{folder}: exists and is not empty; {overwrite} replaces its results", file=folder)
+
+    def open(self, opened: Callable[[Path | None], CampaignBase]) -> CampaignBase:
+        """The mission, and the folder ready for it: cleared, or with what is to be gone on with.
+
+        opened: gives the mission, with its plan from a file where it is gone on with.
+        A scenario's plan is kept in the folder, for those that go on.
+        Raises PlanflyError; a folder that was not ready is as it was then.
+        """
+        self.refuse()
+        kept = self.folder / "plan.json"
+        base = opened(kept if self.resume else None)
+        if not self.resume:
+            clear_campaign(self.folder)
+        if base.plan is not None and not kept.exists():
+            write_whole(kept, plan_json(base.plan))
+        return base
+
+
+@contextmanager
+def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwrite: bool) -> Iterator[OutputDirectory]:
+    """A campaign's folder; out: None for one that is removed at the end.
+
+    Raises ValueError for a campaign to resume without a folder.
+    """
+    if out is not None:
+        yield OutputDirectory(Path(out), table, resume, overwrite)
+        return
+    if resume:
+        raise ValueError("resume: out is missing: the folder of what is to be gone on with")
+    with tempfile.TemporaryDirectory() as name:
+        yield OutputDirectory(Path(name), table, resume=False, overwrite=False)
+
+
+def clear_campaign(folder: Path) -> None:
+    """Make a folder, and clear what an earlier campaign or search left there; anything else stays.
+
+    Raises StoreError, and clears nothing, where another process holds it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for table in (DATABASE, WINDS_DATABASE):
+        refuse_held(folder / table)
+    for path in (*(folder / name for name in CAMPAIGN_FILES), *_logs(folder)):
+        path.unlink(missing_ok=True)
+
+
+def _logs(folder: Path) -> list[Path]:
+    return sorted((folder / "worst").glob("flight-[0-9]*.mcap"))
+
+
+def write_files(
+    folder: Path,
+    base: CampaignBase,
+    summary: CampaignSummary,
+    store: Store,
+    command: str,
+    advance: Advance | None = None,
+) -> None:
+    """Write ``summary.json``, ``report.html`` and the worst flights' logs; logs of flights that are none stay not."""
+    (folder / "worst").mkdir(exist_ok=True)
+    kept = {folder / log_name(row) for row in summary.worst}
+    for path in _logs(folder):
+        if path not in kept:
+            path.unlink()
+    for count, row in enumerate(summary.worst):
+        path = folder / log_name(row)
+        if row.duration > 0.0 and not path.exists():
+            fly_row_again(base, row, path)
+        if advance is not None:
+            advance(count + 1.0, float(len(summary.worst)), f"flight {row.draw.index}")
+    write_whole(folder / "summary.json", summary_json(summary))
+    write_whole(folder / "report.html", campaign_page(base, summary, store, command))
+
+
+def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
+    """Fly a flight of the table once more, into a log.
+
+    Raises PlanflyError where it does not come out as the table has it: the machine that flew it computes otherwise.
+    """
+    again = fly_one(base, row.draw.index, log=log)
+    if not same_flight(row, again):
+        message = f"{log}: flight {row.draw.index} comes out otherwise here than where it was flown"
+        raise PlanflyError(message, file=log, field="flight", value=row.draw.index)
+    return again
+
+
+# ----------------------------------------------------------------------
+# The files of a go/no-go chart: data, picture and page.
+
+SCHEMA = "planfly.winds/1"
+
+
+def spokes(found: WindsFound) -> list[Spoke]:
+    """The chart's data."""
+    out = []
+    for number, boundary in enumerate(found.boundaries):
+        counts: dict[float, list[bool]] = {}
+        for direction, speed, flyable in found.flights:
+            if direction == number:
+                counts.setdefault(speed, []).append(flyable)
+        marks = tuple((speed, len(all_), sum(all_)) for speed, all_ in sorted(counts.items()))
+        out.append(
+            Spoke(found.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.beyond, marks)
+        )
+    return out
+
+
+def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: str) -> None:
+    """Write ``winds.json``, ``winds.png`` and ``winds.html``."""
+    goal, chart = found.goal, spokes(found)
+    wind = base.scenario.wind
+    own = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
+    figure = draw_go_no_go(chart, goal.most, goal.target, goal.confidence, base.name, own)
+    rows = [
+        (f"{one.from_deg:g}°", _speed_text(one.boundary, goal.most), _interval_text(one.low, one.high, goal.most),
+         str(sum(count for _, count, _ in one.flights)))
+        for one in chart
+    ]  # fmt: skip
+    data = {
+        "schema": SCHEMA,
+        "name": base.name,
+        "seed": base.seed,
+        "target": goal.target,
+        "confidence": goal.confidence,
+        "most": goal.most,
+        "flights": len(found.flights),
+        "lost": list(found.lost),
+        "directions": [
+            {
+                "from_deg": one.from_deg,
+                "boundary_mps": round(one.boundary, 3),
+                "interval_mps": [round(one.low, 3), round(one.high, 3)],
+                "beyond": one.reaches,
+                "flown": [
+                    {"speed_mps": round(v, 3), "flights": count, "flyable": good} for v, count, good in one.flights
+                ],
+            }
+            for one in chart
+        ],
+        "spread": base.dispersions.to_json(),
+    }
+    page = winds_page(base.name, figure, wind_lines(found), rows, command)
+    write_whole(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
+    write_whole(folder / "winds.png", png_bytes(figure))
+    write_whole(folder / "winds.html", page)
+
+
+def _speed_text(speed: float, most: float) -> str:
+    return f"over {most:g} m/s" if speed >= most - 1e-9 else f"{speed:.1f} m/s"
+
+
+def _interval_text(low: float, high: float, most: float) -> str:
+    """An interval, m/s, of which what lies beyond all that was looked at is not known."""
+    if low >= most - 1e-9:
+        return f"over {most:g}"
+    return f"{low:.1f} to {f'over {most:g}' if high >= most - 1e-9 else f'{high:.1f}'}"
+
+
+def _open_lines(found: WindsFound) -> list[str]:
+    """That the flights did not last for all directions, where they did not."""
+    counts = Counter(direction for direction, _, _ in found.flights)
+    wanting = [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
+    if not wanting:
+        return []
+    return [
+        f"not settled: {len(wanting)} of {len(found.boundaries)} directions, for want of flights: each takes"
+        f" {FEWEST} at least, and an interval of {2.0 * ACCURACY:g} m/s; with fewer the interval is mostly assumption"
+    ]
+
+
+def _lost_lines(found: WindsFound) -> list[str]:
+    """Which flights could not be flown, where some could not."""
+    if not found.lost:
+        return []
+    named = ", ".join(
+        f"{number} ({found.flights[number][1]:.1f} m/s from {found.from_deg(found.flights[number][0]):g}°)"
+        for number in found.lost[:10]
+    )
+    return [f"lost      {len(found.lost)} could not be flown, their workers died, and count as not flyable: {named}"]
+
+
+def _none_failed_lines(found: WindsFound) -> list[str]:
+    """What the flights of directions in which none failed show by themselves."""
+    most, confidence = found.goal.most, found.goal.confidence
+    at_most = Counter(direction for direction, speed, _ in found.flights if speed == most)
+    failed = {direction for direction, _, flyable in found.flights if not flyable}
+    counts = [at_most[k] for k in range(len(found.boundaries)) if k not in failed and at_most[k]]
+    if not counts:
+        return []
+    fewest, shown = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
+    return [
+        f"none failed from {len(counts)} of {len(found.boundaries)} directions: {fewest} flights in {most:g} m/s from"
+        f" each show P >= {shown} by themselves"
+    ]
+
+
+def wind_lines(found: WindsFound) -> list[str]:
+    """What was found, in a few lines."""
+    chart = spokes(found)
+    least, largest = (pick(chart, key=lambda one: one.boundary) for pick in (min, max))
+    most, percent = found.goal.most, f"{100 * found.goal.confidence:g} %"
+    return [
+        f"flies with P >= {found.goal.target:g}, by best estimate, in wind up to {_speed_text(least.boundary, most)}"
+        f" from {least.from_deg:g}° (the least; {_interval_text(least.low, least.high, most)} m/s at {percent}),"
+        f" {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
+        *_none_failed_lines(found),
+        *_open_lines(found),
+        *_lost_lines(found),
+        f"{len(found.flights)} flights; intervals at {percent}, by the flights of each direction",
+    ]
+
+
+# ----------------------------------------------------------------------
+# The end of a campaign, in a process of its own.
+
+
+def finish_campaign(
+    base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance | None = None
+) -> CampaignSummary:
+    """Sum a campaign up from the table in its folder, which nobody holds, and write its files.
+
+    command: the line that repeats it, for the report.
+    Raises what the other process raised: a `world.errors.PlanflyError`, or OSError for a full disk.
+    """
+    return in_own_process(_finish, base, goal, estimate, folder, command, advance=advance)
+
+
+def _finish(
+    base: CampaignBase, goal: Goal, estimate: Estimate, folder: Path, command: str, advance: Advance
+) -> CampaignSummary:
+    with open_store(base, goal, folder, resume=True) as store:
+        summary = summarise(base, goal, estimate, store)
+        write_files(folder, base, summary, store, command, advance)
+    return summary

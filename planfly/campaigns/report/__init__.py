@@ -1,1 +1,0 @@
-"""The summary and the page of a campaign."""

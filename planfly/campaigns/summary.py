@@ -1,0 +1,247 @@
+"""What a campaign came to, as data: its probability, what failed where, what decides it, and its worst flights."""
+
+import json
+import math
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from logs.verdict.places import Place
+from logs.verdict.rules.registry import RULES
+from logs.verdict.wording import place_text
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.dispersions import BY_NAME
+from planfly.campaigns.flight_row import FlightRow, scaled
+from planfly.campaigns.statistics.decision import Estimate, Goal, first_order, rank_slope
+from planfly.campaigns.tables import Store
+
+SCHEMA = "planfly.campaign-summary/1"
+# Of a margin's variance, the share from which on a quantity is named as explaining it.
+_NOTABLE = 0.05
+# Flights whose logs are kept.
+WORST = 10
+
+
+@dataclass(frozen=True)
+class RuleFailures:
+    """Flights that a rule failed in, and in how many at each place; a flight may fail at several."""
+
+    rule: str
+    flights: int
+    places: tuple[tuple[Place, int], ...]
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """How much of the variance of a rule's least margin a quantity explains, and which way it goes.
+
+    index: first-order, 0 to 1.  slope: rank correlation, negative where more of the quantity leaves less margin.
+    """
+
+    quantity: str
+    index: float
+    slope: float
+
+
+@dataclass(frozen=True)
+class CampaignSummary:
+    """All that summary and report tell.
+
+    deciding: the rule that fails most, or, where none does, that of the least reliability index: the mean of its
+    margins in their standard deviations (Cornell, "A probability-based structural code", ACI Journal 66, 1969); "" for
+    none.
+    low_margin: of that rule, the margin that one flight in twenty falls below, in `unit`; None where unknown.
+    """
+
+    name: str
+    seed: int
+    goal: Goal
+    estimate: Estimate
+    by_rule: tuple[RuleFailures, ...]
+    lost: tuple[int, ...]
+    deciding: str
+    low_margin: float | None
+    unit: str
+    sensitivities: tuple[Sensitivity, ...]
+    worst: tuple[FlightRow, ...]
+    dispersions: dict[str, dict[str, Any]]
+    made_of: str
+
+
+def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
+    """Read a campaign's table once through."""
+    by_rule = _failures(store)
+    worst = tuple(store.closest(WORST))
+    deciding, low = _deciding_rule(store, by_rule)
+    return CampaignSummary(
+        name=base.name,
+        seed=base.seed,
+        goal=goal,
+        estimate=estimate,
+        by_rule=by_rule,
+        lost=tuple(index for index, outcome in store.outcomes().items() if outcome == "lost"),
+        deciding=deciding,
+        low_margin=low,
+        unit=next((margin.unit for row in worst for rule, margin in row.margins if rule == deciding), ""),
+        sensitivities=_sensitivities(base, store, deciding),
+        worst=worst,
+        dispersions=base.dispersions.to_json(),
+        made_of=store.made_of,
+    )
+
+
+def _failures(store: Store) -> tuple[RuleFailures, ...]:
+    flights: Counter[str] = Counter()
+    places: dict[str, Counter[Place]] = {}
+    for text in store.texts("failed"):
+        failed = [(entry.pop("rule"), Place(**entry)) for entry in json.loads(text)]
+        flights.update({rule for rule, _ in failed})
+        for rule, place in failed:
+            places.setdefault(rule, Counter())[place] += 1
+    return tuple(
+        RuleFailures(rule, flights[rule], tuple(places[rule].most_common())) for rule in RULES if flights[rule]
+    )
+
+
+def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:
+    lows, indices = {}, {}
+    for rule in RULES:
+        margins = store.column(RULES[rule].margin_column)
+        known = margins[np.isfinite(margins)]
+        if known.size:
+            lows[rule] = float(np.quantile(known, 0.05))
+            deviation = float(known.std())
+            indices[rule] = float(known.mean()) / deviation if deviation > 0.0 else math.inf
+    if by_rule:
+        rule = max(by_rule, key=lambda one: one.flights).rule
+        return rule, lows.get(rule)
+    if not lows:
+        return "", None
+    rule = min(indices, key=lambda name: indices[name])
+    return rule, lows[rule]
+
+
+def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
+    """Of the rule's least margin to each quantity that varies, the strongest first."""
+    if not rule:
+        return ()
+    margin = store.column(RULES[rule].margin_column)
+    known = np.isfinite(margin)
+    found = []
+    for varying in base.dispersions.varying:
+        name = varying.quantity.name
+        x = store.column(name)[known]
+        found.append(Sensitivity(name, first_order(x, margin[known]), rank_slope(x, margin[known])))
+    return tuple(sorted(found, key=lambda one: -one.index))
+
+
+def summary_json(summary: CampaignSummary) -> str:
+    """The text of ``summary.json``; no time and no worker stands in it, so that it is the same for any number."""
+    found = summary.estimate
+    data = {
+        "schema": SCHEMA,
+        "name": summary.name,
+        "seed": summary.seed,
+        "target": summary.goal.target,
+        "answer": found.answer,
+        "flights": found.tally.flown,
+        "flyable": found.tally.flyable,
+        "not_flyable": found.tally.failed,
+        "lost": list(summary.lost),
+        "probability": _plain(found.tally.share),
+        "confidence": summary.goal.confidence,
+        "lower_bound": _plain(found.lower),
+        "upper_bound": _plain(found.upper),
+        "interval": [_plain(found.interval.low), _plain(found.interval.high)],
+        "method": summary.goal.method,
+        "failed_by_rule": [
+            {
+                "rule": one.rule,
+                "flights": one.flights,
+                "places": [{"where": place_text(place), "flights": n, **asdict(place)} for place, n in one.places],
+            }
+            for one in summary.by_rule
+        ],
+        "deciding_rule": summary.deciding,
+        "margin_of_one_in_twenty": _plain(summary.low_margin),
+        "margin_unit": summary.unit,
+        "sensitivities": [
+            {"quantity": one.quantity, "first_order": _plain(one.index), "rank_slope": _plain(one.slope)}
+            for one in summary.sensitivities
+        ],
+        "worst": [_flight(row) for row in summary.worst],
+        "spread": summary.dispersions,
+        "made_of": summary.made_of,
+    }
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def _flight(row: FlightRow) -> dict[str, Any]:
+    return {
+        "flight": row.draw.index,
+        "outcome": row.outcome,
+        "ended": row.ended,
+        "failed": [{"rule": rule, "where": place_text(place)} for rule, place in row.failed],
+        "closest": closest_text(row),
+        "drawn": {name: _plain(value) for name, value in row.draw.values.items() if name in BY_NAME},
+        "seed": row.draw.seed,
+        "log": log_name(row) if row.duration > 0.0 else None,
+    }
+
+
+def closest_text(row: FlightRow) -> str:
+    """The least margin of a flight in words; "" where none is known."""
+    known = [(share, rule, margin) for rule, margin in row.margins if (share := scaled(rule, margin)) is not None]
+    if not known:
+        return ""
+    _, rule, margin = min(known, key=lambda one: one[0])
+    return f"{RULES[rule].title} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
+
+
+def log_name(row: FlightRow) -> str:
+    """Name of the log of a flight, among the worst."""
+    return f"worst/flight-{row.draw.index:06d}.mcap"
+
+
+def campaign_lines(summary: CampaignSummary) -> list[str]:
+    """The summary on a terminal."""
+    found, goal = summary.estimate, summary.goal
+    tally, sure = found.tally, f"{100.0 * goal.confidence:g} %"
+    lines = [
+        f"{_answer_text(summary)}: {tally.flyable} of {tally.flown} flights are flyable, P = {tally.share:.4f}",
+        f"  at least {found.lower:.4f}, at most {found.upper:.4f} (each at {sure}; {goal.method})",
+        f"  two-sided at {sure}: {found.interval.low:.4f} to {found.interval.high:.4f}",
+    ]
+    for one in summary.by_rule:
+        where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])
+        lines.append(f"  failed  {RULES[one.rule].title} in {one.flights}: {where}")
+    if summary.lost:
+        named = ", ".join(map(str, summary.lost[:10]))
+        lines.append(f"  lost    {len(summary.lost)} could not be flown, their workers died: {named}")
+    if summary.deciding and summary.low_margin is not None:
+        lines.append(
+            f"  decides {RULES[summary.deciding].title}: one flight in twenty has a margin below"
+            f" {summary.low_margin:.1f} {summary.unit}; {_drivers_text(summary)}"
+        )
+    return lines
+
+
+def _answer_text(summary: CampaignSummary) -> str:
+    target = summary.goal.target
+    words = {"reached": f"P >= {target}", "missed": f"P < {target}", "undecided": f"P >= {target} is undecided"}
+    return words.get(summary.estimate.answer, "campaign")
+
+
+def _drivers_text(summary: CampaignSummary) -> str:
+    drivers = [one for one in summary.sensitivities if one.index >= _NOTABLE][:3]
+    if not drivers:
+        return "no single quantity explains it"
+    return "of its variance " + ", ".join(
+        f"{BY_NAME[one.quantity].title} explains {100.0 * one.index:.0f} %" for one in drivers
+    )
+
+
+def _plain(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else round(float(value), 9) + 0.0

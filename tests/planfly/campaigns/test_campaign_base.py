@@ -1,0 +1,110 @@
+"""What all flights share: opened once, and refused before anything is flown."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planfly.campaigns.campaign_base import CampaignBase, GivenWind, check_middle, open_campaign, vary
+from planfly.campaigns.dispersions import QUANTITIES, Draw, SpreadError, default_dispersions, parse_dispersions
+from planfly.open_mission import open_mission
+from tests.planfly.campaigns.made_campaigns import write_short
+from world.errors import MissionError
+
+
+def test_it_has_the_mission_as_fly_opens_it(base: CampaignBase, tmp_path: Path) -> None:
+    mission, scenario = write_short(tmp_path)
+    opened = open_mission(mission, str(scenario), None)
+    assert base.mission.items == opened.setup.mission.items
+    assert base.scenario.to_json() == opened.setup.scenario.to_json()
+    # Whatever folder it lies in.
+    assert base.mission.source == "short.waypoints"
+
+
+def test_the_hash_is_of_all_that_decides_a_flight(base: CampaignBase) -> None:
+    other = parse_dispersions('[mass]\ndistribution = "norm"\nloc = 1.0\nscale = 0.02\nsource = "x"', "x")
+    assert base.world_hash() == replace(base, name="another").world_hash()
+    fenced = replace(base.mission, fences=base.mission.items[:1])
+    for changed in (replace(base, seed=2), replace(base, spread=other), replace(base, mission=fenced)):
+        assert changed.world_hash() != base.world_hash()
+
+
+@pytest.mark.parametrize(("mass", "good"), [(1.0, True), (1.9, False)])
+def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float, good: bool) -> None:
+    text = f'[mass]\ndistribution = "uniform"\nloc = {mass - 0.05}\nscale = 0.1\nsource = "x"\n'
+    text += '[drag]\ndistribution = "uniform"\nloc = 2.8\nscale = 0.1\nsource = "x"\n' if not good else ""
+    made = replace(base, spread=parse_dispersions(text, "mine.toml"))
+    if good:
+        check_middle(made)
+        return
+    with pytest.raises(SpreadError, match=r"mine.toml: mass 1.9, drag 2.85: .* no level flight at 25 m/s"):
+        check_middle(made)
+
+
+def test_a_missing_mission_is_one_line() -> None:
+    with pytest.raises(MissionError, match="no such file"):
+        open_campaign("none.waypoints", default_dispersions())
+
+
+# ----------------------------------------------------------------------
+# A draw changes what it says, and nothing else.
+
+
+def drawn(**values: float) -> Draw:
+    return Draw(0, 99, {one.name: one.nominal for one in QUANTITIES} | values)
+
+
+def test_the_nominal_draw_is_the_setup_itself(base: CampaignBase) -> None:
+    made = vary(base, drawn())
+    wind, own = made.setup.scenario.wind, base.scenario.wind
+    assert (wind.speed, wind.turbulence) == (own.speed, own.turbulence)
+    assert wind.from_course == pytest.approx(own.from_course)
+    assert made.setup.seed == 99
+    assert made.setup.scenario.terrain is base.scenario.terrain
+    assert made.off_nominal.start_offset == (0.0, 0.0, 0.0)
+    assert made.off_nominal.variation.mass == made.off_nominal.variation.drag == made.off_nominal.variation.control == 1
+
+
+@pytest.mark.parametrize(
+    ("values", "speed", "from_deg", "turbulence"),
+    [
+        ({"wind_speed": 2.0, "wind_from": 120.0}, 7.0, 10.0, "light"),
+        ({"wind_speed": -9.0}, 0.0, 250.0, "light"),
+        ({"turbulence": 1.0}, 5.0, 250.0, "moderate"),
+        ({"turbulence": 2.0}, 5.0, 250.0, "moderate"),
+        ({"turbulence": -1.0}, 5.0, 250.0, "none"),
+    ],
+)
+def test_wind(base: CampaignBase, values: dict[str, float], speed: float, from_deg: float, turbulence: str) -> None:
+    setup = vary(base, drawn(**values)).setup
+    for wind in (setup.scenario.wind, setup.limits.wind):
+        assert (wind.speed, wind.turbulence) == (speed, turbulence)
+        assert math.degrees(wind.from_course) == pytest.approx(from_deg)
+    # The log's scenario says the same.
+    assert setup.scenario.spec.wind.speed_mps == speed
+
+
+def test_gusts_are_the_flights_own_whatever_the_scenario_states(base: CampaignBase) -> None:
+    fixed = replace(base, scenario=replace(base.scenario, wind=replace(base.scenario.wind, seed=3)))
+    assert vary(fixed, drawn()).setup.scenario.wind.seed is None
+
+
+def test_a_mean_wind_takes_the_scenarios_place(base: CampaignBase) -> None:
+    wind = vary(base, drawn(wind_gradient=0.002), GivenWind(11.0, 45.0)).setup.scenario.wind
+    assert (wind.speed, math.degrees(wind.from_course), wind.gradient) == (11.0, pytest.approx(45.0), 0.002)
+
+
+def test_aircraft_battery_terrain_and_start(base: CampaignBase) -> None:
+    values = {"mass": 1.1, "drag": 0.9, "control_power": 0.8, "battery": 0.5, "terrain_height": 7.0}
+    made = vary(base, drawn(**values, start_east=1.0, start_north=-2.0, start_up=3.0))
+    variation = made.off_nominal.variation
+    assert (variation.mass, variation.drag, variation.control) == (1.1, 0.9, 0.8)
+    assert made.setup.battery == pytest.approx(0.5 * base.airframe.battery)
+    assert made.off_nominal.start_offset == (1.0, -2.0, 3.0)
+    ground = made.setup.scenario.terrain
+    assert ground is not None
+    assert float(ground.height(500.0, 0.0)) == pytest.approx(107.0)
+    # The route stays where it was planned.
+    np.testing.assert_array_equal(made.setup.route.waypoints, vary(base, drawn()).setup.route.waypoints)

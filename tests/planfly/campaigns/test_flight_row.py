@@ -1,0 +1,199 @@
+"""Every rule has a scale, and those without a distance are rules."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flight.simulation.track import TRACK_ROW, as_track
+from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.places import Place
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.dispersions import parse_dispersions
+from planfly.campaigns.flight_row import (
+    STATIONS,
+    NarrowPass,
+    clearance_profile,
+    failed_findings,
+    fly_one,
+    least_margins,
+    lost_row,
+    narrow_passes,
+    waypoint_crossings,
+)
+from planfly.campaigns.tables import same_flight
+from planfly.open_mission import open_mission
+from planfly.pipeline import fly_and_judge
+from tests.planfly.campaigns.made_campaigns import write_short
+from tests.setups import route_along
+from tests.synthetic import fly_path, make_setup
+from world.scenario import with_wind
+
+# ----------------------------------------------------------------------
+# Narrow passes, by plain sums: a missile beside a straight track, and findings with little room.
+
+MISSILE = {"name": "Alfa", "north_m": 1000.0, "amsl_m": 300.0, "kill_radius_m": 500.0, "kill_scale_m": 200.0}
+LEG = Place("leg", 1)
+
+
+def passed_beside(away: float, *findings: Finding) -> tuple[NarrowPass, ...]:
+    """Of a straight track this far outside a missile's sphere, m."""
+    setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE | {"east_m": 500.0 + away}])
+    return narrow_passes(findings, setup.scenario, fly_path(setup))
+
+
+@pytest.mark.parametrize(("away", "room"), [(2.5, 0.25), (9.9, 0.99)])
+def test_a_missile_passed_within_ten_metres(away: float, room: float) -> None:
+    ((rule, place, share),) = passed_beside(away)
+    assert (rule, place) == ("threat", Place("missile", 0, name="Alfa"))
+    assert share == pytest.approx(room, abs=1e-4)
+
+
+def test_a_missile_further_off_or_entered_is_none() -> None:
+    assert passed_beside(10.1) == ()
+    entered = make_finding("threat", Place("missile", 0, name="Alfa"), ok=False, reason="", margin=-3.0)
+    assert passed_beside(-5.0, entered) == ()
+
+
+def finding(rule: str, margin: float | None, *, ok: bool | None = True, **other: Any) -> Finding:
+    return make_finding(rule, LEG, ok=ok, reason="", margin=margin, **other)
+
+
+@pytest.mark.parametrize(
+    ("rule", "margin", "tolerance", "room"),
+    [
+        # A degree of slope, ten metres of clearance.
+        ("slope", 0.25, 0.0, 0.25),
+        ("slope", 0.99, None, 0.99),
+        ("clearance", 2.5, None, 0.25),
+        # The tolerance is room, too.
+        ("slope", -0.25, 0.5, 0.25),
+        # What passes beyond its limit.
+        ("slope", -2.0, 0.5, 0.0),
+    ],
+)
+def test_room_is_that_to_the_limit_with_its_tolerance(
+    rule: str, margin: float, tolerance: float | None, room: float
+) -> None:
+    ((found, place, share),) = passed_beside(99.0, finding(rule, margin, tolerance=tolerance))
+    assert (found, place, share) == (rule, LEG, pytest.approx(room))
+
+
+@pytest.mark.parametrize(
+    "wide",
+    [
+        finding("slope", 1.0),
+        finding("slope", 0.9, tolerance=0.1),
+        finding("clearance", 10.0),
+        finding("slope", None),
+        finding("slope", 0.2, ok=None),
+        # A count, or a time, is no distance.
+        finding("turn", 0.2),
+    ],
+)
+def test_what_has_more_room_or_no_number_is_none(wide: Finding) -> None:
+    assert passed_beside(99.0, wide) == ()
+
+
+def test_of_several_checks_at_a_place_the_least_counts_and_one_that_fails_counts_for_all() -> None:
+    two = [finding("slope", margin, check=check) for margin, check in ((0.3, "a"), (0.1, "b"))]
+    assert passed_beside(99.0, *two) == (("slope", LEG, 0.1),)
+    assert passed_beside(99.0, *reversed(two)) == (("slope", LEG, 0.1),)
+    assert passed_beside(99.0, *two, finding("slope", -1.0, ok=False, check="c")) == ()
+
+
+# ----------------------------------------------------------------------
+# Clearance and crossings of a track, by plain sums.
+
+# North for 300 m, then east for 300 m.
+ROUTE = route_along([[0.0, 0.0, 100.0], [0.0, 300.0, 100.0], [300.0, 300.0, 100.0]], 25.0)
+
+
+def flown(points: list[tuple[float, float, float]], legs: list[int], clearance: list[float]) -> object:
+    rows = np.zeros(len(points), TRACK_ROW)
+    rows["position"], rows["leg"], rows["clearance"] = points, legs, clearance
+    return as_track(rows)
+
+
+def test_the_profile_has_the_least_of_each_piece() -> None:
+    track = flown(
+        [(0.0, 1.0, 100.0), (0.0, 1.5, 100.0), (5.0, 150.0, 100.0), (299.0, 300.0, 100.0)], [0, 0, 0, 1], [9, 8, 7, 6]
+    )
+    profile = clearance_profile(ROUTE, track)
+    # Pieces of 600 / STATIONS = 4 m.
+    assert STATIONS == 150
+    assert (profile[0], profile[37], profile[149]) == (8.0, 7.0, 6.0)
+    assert np.isnan(profile).sum() == STATIONS - 3
+
+
+def test_crossings_are_right_of_and_above() -> None:
+    track = flown([(2.0, 0.0, 101.0), (4.0, 296.0, 97.0), (300.0, 295.0, 100.0)], [0, 0, 1], [1, 1, 1])
+    crossings = waypoint_crossings(ROUTE, track)
+    # At the first, right of north is east; at the corner the mean course is north-east: (4, -4) is 4 sqrt 2 right.
+    assert crossings[0] == pytest.approx((2.0, 1.0))
+    assert crossings[1] == pytest.approx((4.0 * 2.0**0.5, -3.0), abs=1e-5)
+    # Right of east is south.
+    assert crossings[2] == pytest.approx((5.0, 0.0), abs=1e-5)
+
+
+def test_what_was_not_reached_has_no_crossing() -> None:
+    crossings = waypoint_crossings(ROUTE, flown([(0.0, 0.0, 100.0), (0.0, 100.0, 100.0)], [0, 0], [1, 1]))
+    assert np.isfinite(crossings[0]).all()
+    assert np.isnan(crossings[1]).all()
+
+
+# ----------------------------------------------------------------------
+# One flight of a campaign: the same as ``planfly fly`` in its wind, and of its index alone.
+
+
+def test_a_flight_is_that_of_fly_in_the_same_wind(base: CampaignBase, tmp_path: Path) -> None:
+    """Where wind alone varies, opening the mission in that wind with that seed flies the same."""
+    wind_only = '[wind_speed]\ndistribution = "norm"\nscale = 2.0\nsource = "x"'
+    varied = replace(base, spread=parse_dispersions(wind_only, "x"))
+    row = fly_one(varied, 3)
+    mission, scenario = write_short(tmp_path)
+    own = base.scenario.wind
+    speed = own.speed + row.draw.values["wind_speed"]
+    opened = open_mission(
+        mission, str(scenario), None, seed=row.draw.seed, change=lambda s: with_wind(s, speed, own.from_course, None)
+    )
+    flown = fly_and_judge(opened.setup, opened.airframe, None)
+    assert speed != own.speed
+    assert (row.outcome == "flyable") is flown.verdict.flyable
+    assert row.duration == float(flown.track.time[-1])
+    assert dict(row.margins) == dict(least_margins(flown.verdict.findings))
+    assert len(row.margins) > 5
+
+
+def test_the_same_index_gives_the_same_flight_and_log(base: CampaignBase, tmp_path: Path) -> None:
+    first = fly_one(base, 2, log=tmp_path / "a.mcap")
+    fly_one(base, 1)
+    again = fly_one(base, 2, log=tmp_path / "b.mcap")
+    assert same_flight(first, again)
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()
+    assert not same_flight(first, fly_one(base, 1))
+
+
+def test_the_draw_shows_in_the_flight(base: CampaignBase) -> None:
+    heavy = '[start_up]\ndistribution = "uniform"\nloc = 9.0\nscale = 0.001\nsource = "x"'
+    row = fly_one(replace(base, spread=parse_dispersions(heavy, "x")), 0)
+    margin = dict(row.margins)["clearance"].value
+    level = fly_one(replace(base, spread=parse_dispersions(heavy.replace("9.0", "-9.0"), "x")), 0)
+    # Below the mission's 80 m above ground by 9 m, where 60 are required: 11 are left, and a little for gusts.
+    low = dict(level.margins)["clearance"].value
+    assert low is not None
+    assert margin is not None
+    assert 9.0 < low < 12.0 < margin
+
+
+def test_a_flight_that_failed_nothing_but_is_not_whole_names_completion() -> None:
+    verdict = Verdict((), flyable=False, complete=False, lines=("x",), level="flown")
+    assert failed_findings(verdict) == (("completion", Place("flight")),)
+    finding = make_finding("turn", Place("waypoint", 1), ok=False, reason="x")
+    assert failed_findings(replace(verdict, findings=(finding,))) == (("turn", Place("waypoint", 1)),)
+
+
+def test_a_lost_flight_keeps_its_draw(base: CampaignBase) -> None:
+    assert lost_row(base, 4, "died").draw == fly_one(base, 4).draw

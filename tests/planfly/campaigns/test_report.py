@@ -1,0 +1,205 @@
+"""The folder of a campaign."""
+
+import json
+import multiprocessing
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.find_winds import FEWEST, WindsFound, WindsGoal
+from planfly.campaigns.flight_row import fly_one
+from planfly.campaigns.fly_campaign import open_store
+from planfly.campaigns.report import (
+    OutputDirectory,
+    clear_campaign,
+    finish_campaign,
+    fly_row_again,
+    spokes,
+    wind_lines,
+    write_files,
+    write_winds,
+)
+from planfly.campaigns.statistics.decision import Estimator, Goal
+from planfly.campaigns.statistics.wind_boundary import WindBoundary
+from planfly.campaigns.summary import campaign_lines
+from planfly.campaigns.tables import DATABASE, StoreError
+from tests.planfly.campaigns.made_campaigns import all_fly, made_flight
+from tests.planfly.campaigns.made_report import made_report
+from world.errors import MissionError, PlanflyError
+
+
+def test_files_are_written_and_cleared_and_no_others(
+    base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("planfly.campaigns.report.fly_row_again", lambda base, row, log: log.write_bytes(b""))
+    (tmp_path / "worst").mkdir()
+    (tmp_path / "worst" / "flight-000777.mcap").write_bytes(b"of before")
+    (tmp_path / "mine.txt").write_text("stays")
+    with made_report(base, tmp_path) as (store, summary):
+        write_files(tmp_path, base, summary, store, "planfly campaign x")
+        logs = {path.name for path in (tmp_path / "worst").iterdir()}
+        assert logs == {f"flight-{row.draw.index:06d}.mcap" for row in summary.worst if row.duration > 0.0}
+    assert json.loads((tmp_path / "summary.json").read_text())["flights"] == 60
+    assert (tmp_path / "report.html").read_bytes().startswith(b"<!DOCTYPE html>")
+    clear_campaign(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.txt", "worst"]
+    assert list((tmp_path / "worst").iterdir()) == []
+
+
+def test_a_flight_that_comes_out_otherwise_is_told(base: CampaignBase, tmp_path: Path) -> None:
+    row = fly_one(base, 1)
+    fly_row_again(base, row, tmp_path / "a.mcap")
+    with pytest.raises(PlanflyError, match="comes out otherwise"):
+        fly_row_again(base, made_flight(base, 1), tmp_path / "a.mcap")
+
+
+def asked(folder: Path, *, resume: bool = False, overwrite: bool = False) -> OutputDirectory:
+    return OutputDirectory(folder, DATABASE, resume, overwrite)
+
+
+@pytest.mark.parametrize(
+    ("lies_there", "words"),
+    [
+        (DATABASE, "holds a campaign; resume=True goes on with it, overwrite=True replaces it"),
+        ("winds.sqlite", "holds another campaign; overwrite=True replaces it"),
+        ("mine.txt", "exists and is not empty; overwrite=True replaces its results"),
+    ],
+)
+def test_what_lies_there_is_replaced_only_where_that_is_said(
+    base: CampaignBase, tmp_path: Path, lies_there: str, words: str
+) -> None:
+    (tmp_path / lies_there).write_bytes(b"")
+    with pytest.raises(PlanflyError, match=re.escape(f"{tmp_path}: {words}")):
+        asked(tmp_path).open(lambda _: base)
+    assert [path.name for path in tmp_path.iterdir()] == [lies_there]
+    assert asked(tmp_path, overwrite=True).open(lambda _: base) is base
+    assert [path.name for path in tmp_path.iterdir()] == (["mine.txt"] if lies_there == "mine.txt" else [])
+
+
+def test_a_mission_that_cannot_be_opened_leaves_what_lies_there(tmp_path: Path) -> None:
+    def not_opened(_planned: Path | None) -> CampaignBase:
+        raise MissionError("x")
+
+    (tmp_path / DATABASE).write_bytes(b"")
+    with pytest.raises(MissionError):
+        asked(tmp_path, overwrite=True).open(not_opened)
+    assert (tmp_path / DATABASE).exists()
+
+
+def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase, tmp_path: Path) -> None:
+    with pytest.raises(PlanflyError, match=r"campaign.sqlite: no campaign there to go on with"):
+        asked(tmp_path, resume=True).open(lambda _: base)
+    (tmp_path / DATABASE).write_bytes(b"")
+    planned: list[Path | None] = []
+
+    def noted(path: Path | None) -> CampaignBase:
+        planned.append(path)
+        return base
+
+    asked(tmp_path, resume=True).open(noted)
+    assert planned == [tmp_path / "plan.json"]
+    assert (tmp_path / DATABASE).exists()
+    with pytest.raises(PlanflyError, match="is a file; a folder is expected"):
+        asked(tmp_path / DATABASE).open(lambda _: base)
+
+
+# ----------------------------------------------------------------------
+# The go/no-go chart's files.
+
+FOUND = WindsFound(
+    WindsGoal(0.9, 0.95, 4, 20.0, 99),
+    (*(WindBoundary(7.0 + k, 6.5 + k, 7.5 + k, False) for k in range(3)), WindBoundary(20.0, 18.0, 20.0, True)),
+    ((0, 8.0, True), (0, 8.0, False), (1, 5.0, True), (2, 5.0, True), (3, 20.0, True)),
+    (1,),
+)
+
+
+def test_flights_are_counted_by_wind() -> None:
+    first = spokes(FOUND)[0]
+    assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
+    assert wind_lines(FOUND)[0] == (
+        "flies with P >= 0.9, by best estimate, in wind up to 7.0 m/s from 0° (the least; 6.5 to 7.5 m/s at 95 %),"
+        " over 20 m/s from 270°"
+    )
+
+
+def test_what_flights_show_by_themselves_where_none_failed() -> None:
+    """Of 132 in the largest wind 0.05 ** (1 / 132) at 95 %; fewer of one direction show less."""
+    flights = (*((3, 20.0, True) for _ in range(132)), (3, 10.0, True), (0, 20.0, False))
+    (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if one.startswith("none failed"))
+    assert line == "none failed from 1 of 4 directions: 132 flights in 20 m/s from each show P >= 0.978 by themselves"
+    flights += tuple((2, 20.0, True) for _ in range(58))
+    (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if one.startswith("none failed"))
+    assert "from 2 of 4 directions: 58 flights" in line
+    assert "P >= 0.95 by" in line
+    failed = replace(FOUND, flights=((3, 20.0, False), (0, 10.0, True)))
+    assert not any(one.startswith("none failed") for one in wind_lines(failed))
+
+
+def test_directions_for_which_flights_did_not_last_are_said() -> None:
+    assert any("not settled: 4 of 4 directions" in line for line in wind_lines(FOUND))
+    boundary = WindBoundary(7.0, 6.8, 7.3, False)
+    settled = WindsFound(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(FEWEST)))
+    assert not any("not settled" in line for line in wind_lines(settled))
+    fewer = WindsFound(FOUND.goal, (boundary,), settled.flights[1:])
+    assert any("not settled: 1 of 1" in line for line in wind_lines(fewer))
+
+
+def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
+    write_winds(tmp_path, base, FOUND, "planfly winds x")
+    data = json.loads((tmp_path / "winds.json").read_text())
+    assert [one["boundary_mps"] for one in data["directions"]] == [7.0, 8.0, 9.0, 20.0]
+    assert data["directions"][3]["beyond"] is True
+    assert data["lost"] == [1]
+    assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"
+    page = (tmp_path / "winds.html").read_text()
+    assert "over 20 m/s" in page
+    assert page.count("<img") == 1
+    # Of a direction that is known, and of one whose interval ends beyond.
+    assert "6.5 to 7.5" in page
+    assert "18.0 to over 20" in page
+    assert "lost      1 could not be flown" in page
+
+
+def test_flights_that_could_not_be_flown_are_named() -> None:
+    assert any(line.endswith("and count as not flyable: 1 (8.0 m/s from 0°)") for line in wind_lines(FOUND))
+    assert not any("lost" in line for line in wind_lines(replace(FOUND, lost=())))
+
+
+# ----------------------------------------------------------------------
+# The end of a campaign in a process of its own.
+
+GOAL = Goal(0.9, False, 40, 0.95)
+
+
+def test_the_summary_comes_back_and_no_process_stays(base: CampaignBase, tmp_path: Path) -> None:
+    with open_store(base, GOAL, tmp_path, resume=False) as store:
+        for index in range(40):
+            store.add(all_fly(base, index))
+        estimate = Estimator(GOAL).estimate(store.tally())
+    children = multiprocessing.active_children()
+    # The made flights come out otherwise when they are flown: the error of the other process is this one's.
+    with pytest.raises(Exception, match="flight 0 comes out otherwise"):
+        finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x")
+    assert multiprocessing.active_children() == children
+    with open_store(base, GOAL, tmp_path, resume=True) as store, pytest.raises(StoreError, match="held by another"):
+        finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x")
+
+
+def test_progress_and_files_are_the_other_processs(base: CampaignBase, tmp_path: Path) -> None:
+    from planfly.campaigns.flight_row import fly_one
+
+    with open_store(base, GOAL, tmp_path, resume=False) as store:
+        for index in range(2):
+            store.add(fly_one(base, index))
+        estimate = Estimator(GOAL).estimate(store.tally())
+    told: list[float] = []
+    summary = finish_campaign(base, GOAL, estimate, tmp_path, "planfly campaign x", lambda done, *_: told.append(done))
+    assert told == [1.0, 2.0]
+    assert "2 of 2 flights are flyable" in campaign_lines(summary)[0]
+    assert len(list((tmp_path / "worst").iterdir())) == 2
+    assert (tmp_path / "report.html").is_file()
+    assert (tmp_path / "summary.json").is_file()

@@ -1,0 +1,245 @@
+"""Workers of another version or model are refused by name."""
+
+import time
+from contextlib import nullcontext
+from itertools import pairwise
+
+import pytest
+from distributed import KilledWorker
+
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.flight_row import FlightRow, lost_row
+from planfly.campaigns.tables import same_flight
+from planfly.campaigns.worker_pool import (
+    LOST,
+    TOLD_EVERY,
+    CampaignPlugin,
+    FlightRate,
+    FlightRequest,
+    WorkerError,
+    WorkerPool,
+    Workers,
+    code_hash,
+    connected,
+    fingerprint,
+    refuse_different,
+    worker_pool,
+)
+from tests.planfly.campaigns.made_campaigns import made_flight
+from world.interruption import Interrupted
+
+
+def test_the_same_is_let_in_and_each_difference_is_named() -> None:
+    mine = fingerprint("aerosonde")
+    refuse_different(mine, dict(mine), "w")
+    for name in ("planfly", "sources", "model", "jsbsim", "numpy"):
+        with pytest.raises(WorkerError, match=f"worker tcp://w:1: {name} other, not"):
+            refuse_different(mine, mine | {name: "other"}, "tcp://w:1")
+
+
+def test_aircraft_differ_and_a_missing_one_is_no_error_here() -> None:
+    assert fingerprint("aerosonde")["model"] != fingerprint("c172x")["model"]
+    assert "none" in fingerprint("nothing")["model"]
+    assert len(code_hash()) == 16
+
+
+# ----------------------------------------------------------------------
+# Flights a second, and when to tell again.
+
+
+def test_flights_that_were_there_before_are_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    rate = FlightRate(40)
+    assert not rate.due()
+    now += 4.0
+    assert rate.a_second(60) == 5.0
+    assert rate.due()
+    assert not rate.due()
+    now += TOLD_EVERY
+    assert rate.due()
+
+
+# ----------------------------------------------------------------------
+# What a worker holds: unpacked once, and nothing of it where the worker flies otherwise.
+
+
+def test_it_is_unpacked_once_with_the_model_of_this_machine(base: CampaignBase) -> None:
+    plugin = CampaignPlugin("c", base, fingerprint("aerosonde"), made_flight)
+    ready, fly = plugin.ready("w")
+    assert ready.world_hash() == base.world_hash()
+    assert fly(ready, 3, None) == made_flight(base, 3)
+    assert plugin.ready("w")[0] is ready
+
+
+def test_another_model_is_refused_by_name(base: CampaignBase) -> None:
+    plugin = CampaignPlugin("c", base, fingerprint("aerosonde") | {"model": "other"}, made_flight)
+    with pytest.raises(WorkerError, match="worker tcp://w:9: model"):
+        plugin.ready("tcp://w:9")
+
+
+# ----------------------------------------------------------------------
+# Each flight comes back once, by a worker that flies what the client would.
+
+
+@pytest.mark.filterwarnings("default")
+def test_each_flight_comes_back_once_and_a_foreign_worker_is_refused(
+    base: CampaignBase, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with connected(Workers(2)) as client:
+        orders = iter(range(12))
+        pool = WorkerPool(client, base, made_flight)
+        flown = list(pool.fly(lambda: next((FlightRequest(k) for k in orders), None)))
+        pool.close()
+        assert sorted(one.request.index for one in flown) == list(range(12))
+        for request, row in flown:
+            assert same_flight(row, made_flight(base, request.index))
+            assert row.worker.startswith("tcp://127.0.0.1")
+
+        monkeypatch.setattr("planfly.campaigns.worker_pool.fingerprint", lambda name: {"planfly": "0.0.1"})
+        other = WorkerPool(client, base, made_flight)
+        once = iter([FlightRequest(0)])
+        with pytest.raises(WorkerError, match=r"worker tcp://127.0.0.1:\d+: planfly .* not 0.0.1 as here"):
+            list(other.fly(lambda: next(once, None)))
+        other.close()
+
+
+class GivenUp:
+    """A flight at its end: as it was flown, or as dask gave it up, at once or when its result was to be fetched."""
+
+    def __init__(self, key: object, row: FlightRow | None, status: str) -> None:
+        self.key, self._row = key, row
+        self.status = "finished" if row else status
+
+    def result(self) -> FlightRow:
+        if self._row is None:
+            raise self.exception()
+        return self._row
+
+    def exception(self) -> Exception:
+        return KilledWorker("x", None, 2)
+
+    def release(self) -> None:
+        pass
+
+
+class OneWorker:
+    """A client whose worker dies on flight 1 so many times."""
+
+    loop = None
+
+    def __init__(self, base: CampaignBase, times: int, status: str) -> None:
+        self._base, self._left, self._status = base, times, status
+        self.sent: list[int] = []
+
+    def register_plugin(self, _plugin: CampaignPlugin) -> None:
+        pass
+
+    def nthreads(self) -> dict[str, int]:
+        return {"a": 1}
+
+    def submit(self, _task: object, _name: str, index: int, _wind: object, *, key: object, pure: bool) -> GivenUp:
+        self.sent.append(index)
+        dies = index == 1 and self._left > 0
+        self._left -= dies
+        return GivenUp(key, None if dies else made_flight(self._base, index), self._status)
+
+
+class InTurn(list[GivenUp]):
+    """Futures are done in the order in which they are sent."""
+
+    def add(self, future: GivenUp) -> None:
+        self.append(future)
+
+    def __next__(self) -> GivenUp:
+        return self.pop(0)
+
+
+class LastFirst(InTurn):
+    """Of the futures that are there the last is done first: the first of all stays to the end."""
+
+    def __next__(self) -> GivenUp:
+        return self.pop()
+
+
+class TwoWorkers(OneWorker):
+    """A client of two that remembers the names of tasks."""
+
+    def __init__(self, base: CampaignBase) -> None:
+        super().__init__(base, 0, "finished")
+        self.names: list[object] = []
+
+    def nthreads(self) -> dict[str, int]:
+        return {"a": 1, "b": 1}
+
+    def submit(self, _task: object, _name: str, index: int, _wind: object, *, key: object, pure: bool) -> GivenUp:
+        self.names.append(key)
+        return super().submit(_task, _name, index, _wind, key=key, pure=pure)
+
+
+def test_names_come_again_but_for_one_that_is_flying(base: CampaignBase, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask keeps 100,000 names; and of two flights of one name it would fly one."""
+    monkeypatch.setattr("distributed.as_completed", lambda loop: LastFirst())
+    monkeypatch.setattr("planfly.campaigns.worker_pool._NAMES", 4)
+    client, orders = TwoWorkers(base), iter(range(40))
+    flown = list(WorkerPool(client, base).fly(lambda: next((FlightRequest(k) for k in orders), None)))
+    assert sorted(one.request.index for one in flown) == list(range(40))
+    assert flown[-1].request.index == 0
+    assert len(set(client.names)) == 4
+    assert client.names[0] not in client.names[1:]
+    assert all(one != other for one, other in pairwise(client.names))
+
+
+@pytest.mark.filterwarnings("default")
+def test_dask_flies_what_comes_under_a_name_that_was_flown(base: CampaignBase, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planfly.campaigns.worker_pool._NAMES", 16)
+    orders = iter(range(200))
+    with worker_pool(Workers(2), base, made_flight) as pool:
+        flown = list(pool.fly(lambda: next((FlightRequest(k) for k in orders), None)))
+    assert sorted(one.request.index for one in flown) == list(range(200))
+    assert all(same_flight(row, made_flight(base, request.index)) for request, row in flown)
+
+
+@pytest.mark.parametrize("status", ["error", "finished"])
+@pytest.mark.parametrize("times", [0, 1, 2, 3])
+def test_a_flight_is_lost_that_is_given_up_three_times(
+    base: CampaignBase, monkeypatch: pytest.MonkeyPatch, times: int, status: str
+) -> None:
+    """Before that it may be another's doing, and also of one that was flown, but whose result died with its worker."""
+    monkeypatch.setattr("distributed.as_completed", lambda loop: InTurn())
+    client, orders = OneWorker(base, times, status), iter(range(3))
+    flown = list(WorkerPool(client, base).fly(lambda: next((FlightRequest(k) for k in orders), None)))
+    assert client.sent == [0, *[1] * (1 + min(times, 2)), 2]
+    assert [one.request.index for one in flown] == [0, 1, 2]
+    assert flown[1].row == (made_flight(base, 1) if times < 3 else lost_row(base, 1, LOST))
+
+
+@pytest.mark.parametrize(
+    ("error", "scheduler", "told_twice"),
+    [
+        (ZeroDivisionError(), None, True),
+        (Interrupted(2), "tcp://127.0.0.1:8786", True),
+        # They end with this process, and are not asked to.
+        (Interrupted(2), None, False),
+    ],
+)
+def test_workers_that_live_on_forget_a_campaign(
+    base: CampaignBase,
+    monkeypatch: pytest.MonkeyPatch,
+    error: BaseException,
+    scheduler: str | None,
+    told_twice: bool,
+) -> None:
+    told: list[str] = []
+
+    class Client:
+        def register_plugin(self, plugin: CampaignPlugin) -> None:
+            told.append(plugin.name)
+
+        def unregister_worker_plugin(self, name: str) -> None:
+            told.append(name)
+
+    monkeypatch.setattr("planfly.campaigns.worker_pool.connected", lambda _: nullcontext(Client()))
+    with pytest.raises(type(error)), worker_pool(Workers(1, scheduler), base, made_flight):
+        raise error
+    assert told == told[:1] * (2 if told_twice else 1)
