@@ -12,7 +12,8 @@ test low newest: export OPENBLAS_NUM_THREADS := 1
 TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Rooms that need nothing but planfly itself; the others test with clients, which have their own lower bounds.
 LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/flight/mission_files tests/flight/dynamics \
-	tests/flight/live tests/logs/recording tests/logs/verdict tests/planfly/campaigns/statistics tests/planfly/campaigns/spread
+	tests/flight/live tests/logs/recording tests/logs/verdict tests/planfly/campaigns/statistics \
+	tests/planfly/campaigns/test_dispersions.py tests/planfly/campaigns/test_dispersions_draws.py
 # What pyproject.toml names.
 DIRECT := ^(dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
 	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]

@@ -14,7 +14,8 @@ confidence, valid at every number of flights.  One of Sobol samples does not end
 The reference's own boundary is that of the likeliest normal law through a direction's points, and its interval that of
 the likelihood ratio, with the law's slope free; Sobol samples count as if they were independent, which leaves the
 interval wider than it has to be.  A boundary is right that lies within half a metre a second of it, and shown wrong if
-it does of no wind in the interval.  A direction with a single wind has its boundary above that where all fly that have to, and
+it does of no wind in the interval.  A direction with a single wind has its boundary above that where all
+fly that have to, and
 below it where they do not.
 """
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import psutil
 import pytest
-from planfly.campaigns.engine import workers as workers_module
 
+from planfly.campaigns import worker_pool
 from planfly.campaigns.worker_pool import (
     SchedulerError,
     Workers,
@@ -122,7 +122,7 @@ def until(there: Callable[[], Any], seconds: float) -> bool:
 def test_the_missing_are_asked_for_by_their_names_then_by_new_ones(
     there: int, asked: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workers_module, "_LOOK", 0.01)
+    monkeypatch.setattr(worker_pool, "_LOOK", 0.01)
     cluster = FewWorkers(there)
     with kept_workers(cluster, 2, patience=0.05):
         assert until(lambda: len(cluster.asked) > 1, 60.0)
@@ -132,7 +132,7 @@ def test_the_missing_are_asked_for_by_their_names_then_by_new_ones(
 @pytest.mark.parametrize(("there", "started"), [(3, 3), (2, 4)])
 def test_those_that_are_too_many_end(there: int, started: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Who stayed away came back after others had been started, or may still."""
-    monkeypatch.setattr(workers_module, "_LOOK", 0.01)
+    monkeypatch.setattr(worker_pool, "_LOOK", 0.01)
     cluster = FewWorkers(there, started)
     with kept_workers(cluster, 2, patience=60.0):
         assert until(lambda: bool(cluster.asked), 60.0)
@@ -140,7 +140,7 @@ def test_those_that_are_too_many_end(there: int, started: int, monkeypatch: pyte
 
 
 def test_nothing_is_asked_while_all_are_there_or_not_long_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workers_module, "_LOOK", 0.01)
+    monkeypatch.setattr(worker_pool, "_LOOK", 0.01)
     whole, away = FewWorkers(2), FewWorkers(0)
     with kept_workers(whole, 2, patience=0.0), kept_workers(away, 2, patience=60.0):
         time.sleep(0.3)
