@@ -167,10 +167,10 @@ def shortened(text: str) -> str:
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """A value with its unit, to four figures and without a power of ten: a tank of fuel holds 1140000 Wh.
+    """A value with its unit, to three figures and without a power of ten: a tank of fuel holds 1140000 Wh.
 
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
-    ('11.87°', '1140000 Wh')
+    ('11.9°', '1140000 Wh')
     """
-    figures = f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
+    figures = f"{value:.3g}" if abs(value) < 999.5 else f"{value:.0f}"
     return figures + UNITS.get(unit, f" {unit}" if unit else "")

@@ -113,6 +113,8 @@ def named_or_default(named: str | None, default: Path, overwrite: bool, source: 
 
 # Failed findings that are listed one by one.
 _LISTED = 12
+# Sources of a limit that are named beside it; any other limit is a check of planfly's own.
+_LIMIT_SOURCES = ("scenario", "aircraft", "autopilot", "mission")
 # Width of the column of rules.
 _TITLES = 2 + max(len(rule.title) for rule in RULES.values())
 
@@ -125,7 +127,7 @@ def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
         print(line)
     failed = [finding for finding in verdict.findings if finding.ok is False]
     for finding in failed[:_LISTED]:
-        print(coloured("  failed  ", "bad") + f"{finding.rule} at {place_text(finding.place)}: {finding.reason}")
+        print(coloured("  failed  ", "bad") + f"{_noun(finding)} at {place_text(finding.place)}: {finding.reason}")
         if finding.suggestions:
             print(coloured("          would pass: ", "hint") + suggestions_text(finding.suggestions))
     if len(failed) > _LISTED:
@@ -136,6 +138,11 @@ def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
             print(f"  {rule.title:<{_TITLES}}{_state(rule, mine)}")
     for note in notes:
         print(f"  note    {note}")
+
+
+def _noun(finding: Finding) -> str:
+    rule = RULES[finding.rule]
+    return rule.noun or rule.name
 
 
 def _state(rule: Rule, findings: list[Finding]) -> str:
@@ -155,7 +162,10 @@ def _state(rule: Rule, findings: list[Finding]) -> str:
         return text
     where = "" if closest.place.kind == "flight" else f"closest to its limit at {place_text(closest.place)}: "
     limit = quantity_text(closest.limit, closest.unit)
-    return f"{text}; {where}{rule.margin.of} {quantity_text(value, closest.unit)} (limit {limit})"
+    whose = (
+        f", {closest.limit_source}" if closest.limit_source in ("scenario", "aircraft", "autopilot", "mission") else ""
+    )
+    return f"{text}; {where}{rule.margin.of} {quantity_text(value, closest.unit)} (limit {limit}{whose})"
 
 
 def print_warnings(warnings: Iterable[str]) -> None:

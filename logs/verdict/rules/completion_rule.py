@@ -148,7 +148,7 @@ RULE = Rule(
     name="completion",
     title="completion",
     asks="Was the plan feasible, flown to its last waypoint, and recorded in full without contradiction?",
-    margin=Margin("legs flown", "legs"),
+    margin=Margin("flown", "legs"),
     tolerances=(
         "CONTRADICTION",
         "GAP_STEPS",

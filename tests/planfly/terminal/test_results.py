@@ -128,7 +128,7 @@ def test_an_unfinished_log_ends_with_3_and_its_end_time(
 
 
 # ----------------------------------------------------------------------
-# What a command prints of a verdict: what fails first, then the tightest of each rule.
+# What a command prints of a verdict: what fails first, then what is closest to each rule's limit.
 
 
 def slope(leg: int, flown: float, limit: float) -> Finding:
@@ -150,7 +150,7 @@ def test_failures_stand_below_the_summary_with_what_would_pass(capsys: pytest.Ca
     assert lines[1] == "  failed  slope at leg 1: leg 1 is as it is"
     assert lines[2].endswith("would pass: make leg 1 400 m long instead of 300 m")
     # Of 5 and 7.5 and 9 against 8 the last has the least margin.
-    assert "2 of 3 ok; tightest at leg 1: 9 deg against 8 (aircraft)" in lines[3]
+    assert "2 of 3 ok; closest to its limit at leg 1: slope 9° (limit 8°, aircraft)" in lines[3]
     assert lines[-1] == "  note    gusty"
 
 
@@ -159,7 +159,7 @@ def test_large_numbers_stand_without_a_power_of_ten(
     capsys: pytest.CaptureFixture[str], flown: float, limit: float
 ) -> None:
     lines = printed(capsys, Verdict((slope(0, flown, limit),), True, True, ("flyable",), "flown"))
-    assert lines[1].endswith(f"leg 0: {round(flown)} deg against {round(limit)} (aircraft)")
+    assert lines[1].endswith(f"leg 0: slope {round(flown)}° (limit {round(limit)}°, aircraft)")
 
 
 def test_of_many_failures_twelve_are_listed_and_the_rest_counted(capsys: pytest.CaptureFixture[str]) -> None:
