@@ -37,5 +37,5 @@ def test_rules_come_in_the_verdicts_order() -> None:
 def test_without_the_envelope_nothing_is_said_of_the_stall() -> None:
     log = example_log()
     requirements = route_requirements(log.setup, envelope=False)
-    findings = flown_findings(requirements, align_track(requirements, log.track), "completed", True, False)
+    findings = flown_findings(requirements, align_track(requirements, log.track), "completed", True)
     assert not [item for item in findings if item.rule == "stall"]
