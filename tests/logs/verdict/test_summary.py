@@ -23,7 +23,9 @@ def test_what_ends_a_flight_comes_before_what_a_plan_may_be_mended_by() -> None:
         "not flyable: loss of control (why), completion (why), landing (why), energy (why)"
     )
     assert headline(found, False).endswith(", +14 more")
-    assert headline(found, False).startswith("not flyable: loss of control (why), completion (why), mission (why), slope (")
+    assert headline(found, False).startswith(
+        "not flyable: loss of control (why), completion (why), mission (why), slope ("
+    )
 
 
 def test_the_worst_of_each_rule_comes_before_the_second_worst_of_any() -> None:

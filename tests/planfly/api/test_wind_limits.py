@@ -38,7 +38,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
 
 
 def made_row(base: CampaignBase) -> FlightRow:
-    return FlightRow(draw_flight(base.spread, base.seed, 0), "flyable", "completed")
+    return FlightRow(draw_flight(base.dispersions, base.seed, 0), "flyable", "completed")
 
 
 def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoal]], tmp_path: Path) -> None:
@@ -47,7 +47,7 @@ def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoa
     ((base, goal),) = asked
     assert goal == WindsGoal(0.9, 0.95, 4, 15.0, 99)
     assert base.seed == 2
-    assert not {"wind_speed", "wind_from"} & {one.quantity.name for one in base.spread.varying}
+    assert not {"wind_speed", "wind_from"} & {one.quantity.name for one in base.dispersions.varying}
     names = ["plan.json", "winds.html", "winds.json", "winds.png", "winds.sqlite"]
     assert sorted(file.name for file in out.iterdir()) == names
     assert repr(found).startswith("<WindsFound 4 directions, ")

@@ -27,7 +27,7 @@ def test_the_hash_is_of_all_that_decides_a_flight(base: CampaignBase) -> None:
     other = parse_dispersions('[mass]\ndistribution = "norm"\nloc = 1.0\nscale = 0.02\nsource = "x"', "x")
     assert base.world_hash() == replace(base, name="another").world_hash()
     fenced = replace(base.mission, fences=base.mission.items[:1])
-    for changed in (replace(base, seed=2), replace(base, spread=other), replace(base, mission=fenced)):
+    for changed in (replace(base, seed=2), replace(base, dispersions=other), replace(base, mission=fenced)):
         assert changed.world_hash() != base.world_hash()
 
 
@@ -35,7 +35,7 @@ def test_the_hash_is_of_all_that_decides_a_flight(base: CampaignBase) -> None:
 def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float, good: bool) -> None:
     text = f'[mass]\ndistribution = "uniform"\nloc = {mass - 0.05}\nscale = 0.1\nsource = "x"\n'
     text += '[drag]\ndistribution = "uniform"\nloc = 2.8\nscale = 0.1\nsource = "x"\n' if not good else ""
-    made = replace(base, spread=parse_dispersions(text, "mine.toml"))
+    made = replace(base, dispersions=parse_dispersions(text, "mine.toml"))
     if good:
         check_middle(made)
         return

@@ -151,7 +151,7 @@ def test_what_was_not_reached_has_no_crossing() -> None:
 def test_a_flight_is_that_of_fly_in_the_same_wind(base: CampaignBase, tmp_path: Path) -> None:
     """Where wind alone varies, opening the mission in that wind with that seed flies the same."""
     wind_only = '[wind_speed]\ndistribution = "norm"\nscale = 2.0\nsource = "x"'
-    varied = replace(base, spread=parse_dispersions(wind_only, "x"))
+    varied = replace(base, dispersions=parse_dispersions(wind_only, "x"))
     row = fly_one(varied, 3)
     mission, scenario = write_short(tmp_path)
     own = base.scenario.wind
@@ -178,9 +178,9 @@ def test_the_same_index_gives_the_same_flight_and_log(base: CampaignBase, tmp_pa
 
 def test_the_draw_shows_in_the_flight(base: CampaignBase) -> None:
     heavy = '[start_up]\ndistribution = "uniform"\nloc = 9.0\nscale = 0.001\nsource = "x"'
-    row = fly_one(replace(base, spread=parse_dispersions(heavy, "x")), 0)
+    row = fly_one(replace(base, dispersions=parse_dispersions(heavy, "x")), 0)
     margin = dict(row.margins)["clearance"].value
-    level = fly_one(replace(base, spread=parse_dispersions(heavy.replace("9.0", "-9.0"), "x")), 0)
+    level = fly_one(replace(base, dispersions=parse_dispersions(heavy.replace("9.0", "-9.0"), "x")), 0)
     # Below the mission's 80 m above ground by 9 m, where 60 are required: 11 are left, and a little for gusts.
     low = dict(level.margins)["clearance"].value
     assert low is not None
