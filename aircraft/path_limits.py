@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
 from aircraft.tracking import TrackingError
+from world.by_reference import by_reference
 from world.geometry import wrap
 from world.kernels import compiled, inlined
 from world.wind import W20, Wind, mean_wind_speed
@@ -27,6 +28,7 @@ ROLL_TIME = 0.8
 BLEND_ACCELERATION = 1.0
 
 
+@by_reference
 class PerformanceTable(NamedTuple):
     """Performance of an aircraft at one airspeed, bank limit and wind, for compiled functions.
 

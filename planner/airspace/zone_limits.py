@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.airspace.zones import Zone
+from world.by_reference import by_reference
 from world.kernels import Records, compiled, inlined, record_dtype
 from world.scenario import Scenario
 from world.terrain import Terrain
@@ -29,6 +30,7 @@ Heights = NDArray[np.float32]
 KEPT = record_dtype(("number", np.int64), "beside", "beyond", "furthest_east")
 
 
+@by_reference
 class KeptZones(NamedTuple):
     """Zones in the order in which kernels visit them: the inclusions, then the exclusions from west to east.
 
@@ -117,6 +119,7 @@ def first_near(zones: KeptZones, west: float) -> int:  # pragma: no cover - comp
 # --- Zones and maximum height of a problem ---
 
 
+@by_reference
 class KeptAirspace(NamedTuple):
     """Zones and the maximum height above ground; lengths in m.
 

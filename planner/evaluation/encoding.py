@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from world.by_reference import by_reference
+
 Floats = NDArray[np.float64]
 
 
@@ -113,6 +115,7 @@ _SHORTEST = 0.05
 ASIDE = 2.0
 
 
+@by_reference
 class RotatedFrame(NamedTuple):
     """The rotated frame: `along` from start to destination on the map, `across` to its left, `up` unchanged (eq. 12).
 

@@ -18,6 +18,7 @@ from planner.airspace.zone_limits import KeptAirspace, ZoneMargins, keep_airspac
 from planner.evaluation.encoding import Space
 from planner.evaluation.threat_index import MissileIndex, ThreatCells, make_missile_index, make_threat_cells
 from planner.plan import Objective, Violation
+from world.by_reference import by_reference
 from world.errors import ScenarioError
 from world.frames import PolyMapRecord
 from world.kernels import Record, Records, compiled, inlined
@@ -53,6 +54,7 @@ VIOLATIONS = np.dtype([(item.name.lower(), np.float64) for item in Violation])
 OBJECTIVES = np.dtype([(item.name.lower(), np.float64) for item in Objective])
 
 
+@by_reference
 class SlopeBounds(NamedTuple):
     """Upper bounds on the slope of the ground, m per m.
 
@@ -65,6 +67,7 @@ class SlopeBounds(NamedTuple):
     tile_side: float
 
 
+@by_reference
 class ProblemArrays(NamedTuple):
     """Data that paths are evaluated against; lengths in m, angles in rad.
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from world.by_reference import by_reference
 from world.geometry import window_exposure
 from world.kernels import Records, compiled, inlined
 
@@ -36,6 +37,7 @@ THREAT_CELL = np.dtype(
 )
 
 
+@by_reference
 class ThreatCells(NamedTuple):
     """Lists of units by the cells that they reach, for compiled functions.
 
@@ -155,6 +157,7 @@ MISSILE_CLASS = np.dtype(
 )
 
 
+@by_reference
 class MissileIndex(NamedTuple):
     """Missiles in the order of their grid cells, so that those near a segment are adjacent in memory.
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, clearance_at, required_clearance
+from world.by_reference import by_reference
 from world.frames import polymap
 from world.kernels import Records, compiled
 from world.terrain import pixel_height
@@ -43,6 +44,7 @@ OBSTACLE = np.dtype(
 )
 
 
+@by_reference
 class Grid(NamedTuple):
     """One resolution: number of stages along, positions across (m from the line) and layers of height (m).
 

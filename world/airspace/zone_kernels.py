@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from world.airspace.zones import Cylinder, Ring, Zone, ZoneLevel
+from world.by_reference import by_reference
 from world.kernels import Record, Records, compiled, inlined, record_dtype
 
 # One zone.  round: whether it is a cylinder, of which `centre_east`, `centre_north` and `radius` say all.  first_edge,
@@ -36,6 +37,7 @@ ZONE = record_dtype(
 EDGE = record_dtype("east", "north", "to_east", "to_north")
 
 
+@by_reference
 class ZoneRecords(NamedTuple):
     """Zones for compiled code: (z,) of `ZONE` in the order they were given, and (e,) of `EDGE`, all polygons' edges."""
 
