@@ -1,11 +1,8 @@
-"""Numba kernels, compiled once per version of the sources, and the records that they work on.
+"""Numba kernels, compiled once per version of what they are made of, and the records that they work on.
 
-Numba's own cache looks at the file a kernel stands in, not at the kernels and constants that it takes from other
-files: after an edit or an upgrade of those it would go on running old code.  Here the cache lies in the user's
-cache folder under a hash of all sources that kernels are made of, so that any change compiles anew.
+Compiled code lies in the user's cache folder; `world.kernel_cache` says how long it holds.
 """
 
-import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
@@ -13,10 +10,12 @@ from typing import Any, TypeAlias, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import event
+from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 from world.compile_events import kernel_is_compiled
+from world.kernel_cache import keep_by_contents
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _Array = TypeVar("_Array", bound=NDArray[Any])
@@ -24,24 +23,11 @@ _Array = TypeVar("_Array", bound=NDArray[Any])
 Record: TypeAlias = Any
 # An array of them.
 Records: TypeAlias = NDArray[Any]
-_ROOMS = ("aircraft", "world", "planner", "flight", "logs")
-
-
-def _sources_hash() -> str:
-    root = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for room in _ROOMS:
-        for file in sorted((root / room).rglob("*.py")):
-            digest.update(str(file.relative_to(root)).encode())
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 # Numba fills its settings in when it is imported, and states no types for them.  The folder is read when a kernel is
 # decorated; one that the user has set stays.
 _settings: Any = numba.config
 if not _settings.CACHE_DIR:
-    _settings.CACHE_DIR = str(Path(user_cache_dir("planfly")) / f"kernels-{_sources_hash()}")
+    _settings.CACHE_DIR = str(Path(user_cache_dir("planfly")) / "kernels")
 
 
 class _Compiling(event.Listener):
@@ -78,21 +64,45 @@ def compiled(kernel: _Kernel) -> _Kernel:
     >>> steepest_slopes(np.array([[0.0, 3.0], [0.0, 3.0]], dtype=np.float32), 1.0).round(3)
     array([[3.]], dtype=float32)
     """
-    return cast("_Kernel", numba.njit(cache=True, error_model="numpy")(kernel))
+    return _compiled(kernel)
 
 
 def inlined(kernel: _Kernel) -> _Kernel:
-    """Compile a small function that is to be copied into the kernels that call it in their inner loops.
+    """Compile a small function once, and have LLVM copy it into the kernels that call it in their inner loops.
 
     A call hands over seven numbers an array, and counts a reference to each: more than many a kernel's own work.  The
-    planner's graded scores take a quarter longer with calls alone.  What is called once a path or corner is `compiled`:
-    copied it runs no faster, and the planner's kernels take a third longer to compile.
+    planner's graded scores take a quarter longer with calls alone.  Copied by numba (`inline="always"`) it would run no
+    faster, but each copy would be typed and translated again.
 
     >>> from world.geometry import wrap
     >>> round(wrap(4.0), 6)
     -2.283185
     """
-    return cast("_Kernel", numba.njit(cache=True, error_model="numpy", inline="always")(kernel))
+    return _compiled(kernel, forceinline=True)
+
+
+def _compiled(kernel: _Kernel, **options: bool) -> _Kernel:
+    njit: Any = numba.njit
+    # No kernel is handed to another as a value, which the wrapper for C is for.
+    made = njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
+    if isinstance(made, Dispatcher):
+        keep_by_contents(made)
+    return cast("_Kernel", made)
+
+
+@inlined
+def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:  # pragma: no cover - compiled
+    """Copy numbers (n,) into an array, or part of one, of the same length, which is not looked at.
+
+    Numba's ``out[:] = values`` looks at it, and compiles the text of its message, Unicode and all, into each kernel.
+
+    >>> out = np.zeros(2)
+    >>> copy_into(out, np.array([3.0, 4.0]))
+    >>> out
+    array([3., 4.])
+    """
+    for k in range(values.size):
+        out[k] = values[k]
 
 
 def read_only(array: _Array) -> _Array:
