@@ -31,7 +31,7 @@ from mcap.records import (
 from numpy.typing import NDArray
 
 from logs.recording.mcap_reader import FRAME, MAGIC, record_stream, records
-from world.kernels import compiled
+from world.kernels import compiled, copy_into
 
 Index = NDArray[np.uint64]
 Bytes = NDArray[np.uint8]
@@ -363,9 +363,9 @@ def _stamped(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[By
         at = _put_head(out, at, 2 + size + body_size, channel, log_time)
         out[at], out[at + 1] = tag, size
         at += 2
-        out[at : at + size] = timestamp[:size]
+        copy_into(out[at : at + size], timestamp[:size])
         at += size
-        out[at : at + body_size] = bodies[k]
+        copy_into(out[at : at + body_size], bodies[k])
         at += body_size
         offsets[k + 1] = at
     return out[:at], offsets
@@ -433,15 +433,15 @@ def _fill(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
     for k in range(len(entries)):
         total += entries[k].length
     out = np.empty(total, dtype=np.uint8)
-    out[: len(front)] = front
+    copy_into(out[: len(front)], front)
     at, row = len(front), 0
     for k in range(len(entries)):
         length, source = entries[k].length, entries[k].source
         if source == FROM_ROWS:
-            out[at : at + length] = rows[row]
+            copy_into(out[at : at + length], rows[row])
             row += 1
         else:
-            out[at : at + length] = blob[source : source + length]
+            copy_into(out[at : at + length], blob[source : source + length])
         at += length
     return out
 

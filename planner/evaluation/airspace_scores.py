@@ -17,7 +17,7 @@ from planner.evaluation.corners import ARC_STEP, blended_vertices, fly_by_radii,
 from planner.evaluation.paper_scores import POINTS
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_below
 from planner.evaluation.terrain_clearance import below_at, segment_pixels, terrain_excess
-from world.kernels import Record, Records, compiled, inlined
+from world.kernels import Record, Records, compiled, copy_into, inlined
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]
@@ -81,10 +81,12 @@ def _held_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: 
     out = np.zeros(last + last * _MOST_PIECES, dtype=STRAYED_PIECE)
     for i in range(last):
         out[i].number = i
-        out[i].begin[:], out[i].end[:] = waypoints[i], waypoints[i + 1]
+        copy_into(out[i].begin, waypoints[i])
+        copy_into(out[i].end, waypoints[i + 1])
     made = last
     mirrored = waypoints.copy()
-    mirrored[:, 2] = -waypoints[:, 2]
+    for i in range(last + 1):
+        mirrored[i, 2] = -waypoints[i, 2]
     for i in range(1, last):
         blend = half_blend_length(data.aircraft, waypoints[i, 2])
         low = blended_vertices(blend, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
@@ -93,7 +95,8 @@ def _held_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: 
         for k in range(max(1, low.shape[0] - 1)):
             after, piece = min(k + 1, low.shape[0] - 1), out[made]
             piece.of_corner, piece.number = True, i
-            piece.begin[:], piece.end[:] = low[k], low[after]
+            copy_into(piece.begin, low[k])
+            copy_into(piece.end, low[after])
             piece.above = max(0.0, -high[k, 2] - low[k, 2], -high[after, 2] - low[after, 2])
             piece.beside_begin, piece.beside_end = radii[i] * _SAGITTA, radii[i] * _SAGITTA
             made += 1

@@ -26,7 +26,7 @@ from planner.evaluation.corners import (
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import BUFFER_GROWTH, ProblemArrays
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, below_at, measure_lags
-from world.kernels import Record, Records, compiled
+from world.kernels import Record, Records, compiled, copy_into
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]
@@ -198,14 +198,16 @@ def with_courses(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cov
     """
     count = path.shape[0]
     out = np.empty((count + 2, 3))
-    out[1:-1] = path
+    for i in range(count):
+        copy_into(out[i + 1], path[i])
     for end, at, other, course, sign in (
         (0, 0, 1, data.start_course, -1.0),
         (count + 1, count - 1, count - 2, data.destination_course, 1.0),
     ):
-        out[end] = path[at]
+        copy_into(out[end], path[at])
         if math.isnan(course):
-            out[end, :2] = 2.0 * path[at, :2] - path[other, :2]
+            for axis in range(2):
+                out[end, axis] = 2.0 * path[at, axis] - path[other, axis]
         else:
             out[end, 0] += sign * 1e4 * math.sin(course)
             out[end, 1] += sign * 1e4 * math.cos(course)

@@ -23,7 +23,7 @@ from aircraft.path_limits import (
 from aircraft.tracking import corner_room, faster_by
 from planner.evaluation.problem import ProblemArrays
 from world.geometry import turning_angle
-from world.kernels import Record, Records, compiled, inlined
+from world.kernels import Record, Records, compiled, copy_into, inlined
 
 Floats = NDArray[np.float64]
 
@@ -236,7 +236,7 @@ def legs_about(
         share = min(1.0, length / max(run, 1e-6))
         for axis in range(3):
             out[row, axis] = at[axis] + share * (other[axis] - at[axis])
-    out[1] = at
+    copy_into(out[1], at)
     return out
 
 

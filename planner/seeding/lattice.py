@@ -21,7 +21,8 @@ from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_lim
 from planner.evaluation.problem import ProblemArrays
 from planner.seeding.grids import position_of
 from planner.seeding.waypoint_fitting import leg_cost
-from world.kernels import Records, compiled
+from world.by_reference import by_reference
+from world.kernels import Records, compiled, copy_into
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -44,6 +45,7 @@ _UNKNOWN, _FREE, _SHUT = range(3)
 LATTICE_CELL = np.dtype([("along", np.int64), ("across", np.int64), ("layer", np.int64)], align=True)
 
 
+@by_reference
 class Lattice(NamedTuple):
     """Points in the rotated frame and layers of height.
 
@@ -257,7 +259,7 @@ def pulled_taut(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no co
     """
     limits = precompute_limits(data)
     out = np.empty(points.shape)
-    out[0] = points[0]
+    copy_into(out[0], points[0])
     count, here, last = 1, 0, points.shape[0] - 1
     while here < last:
         to = here + 1
@@ -268,7 +270,7 @@ def pulled_taut(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no co
                 to = k
                 break
         here = to
-        out[count] = points[here]
+        copy_into(out[count], points[here])
         count += 1
     return out[:count]
 

@@ -17,7 +17,7 @@ from planner.evaluation.graded_scores import PathScratch, make_scratch, score_pa
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays
 from planner.plan import Objective
-from world.kernels import Record, Records, compiled
+from world.kernels import Record, Records, compiled, copy_into
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -165,12 +165,12 @@ def _search(
     best, fit = _merit(data, limits, frames, here, candidate)
     shortest = best if fit else math.inf
     if fit:
-        feasible[:] = here
+        copy_into(feasible, here)
     made = 1
     first = steps.copy()
     while made < most:
         alive = False
-        before[:] = here
+        copy_into(before, here)
         # The last trial of a round repeats the displacement of the whole round (pattern move).
         for k in range(moves.shape[0] + 1):
             if made >= most or (k < moves.shape[0] and abs(steps[k]) < LEAST_STEP * first[k]):
@@ -184,10 +184,10 @@ def _search(
                 made += 1
                 if fit and merit < shortest:
                     shortest = merit
-                    feasible[:] = trial
+                    copy_into(feasible, trial)
                 if merit < best:
                     best, better = merit, True
-                    here[:] = trial
+                    copy_into(here, trial)
                     break
                 if k == moves.shape[0]:
                     break

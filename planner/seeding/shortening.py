@@ -25,7 +25,7 @@ from planner.seeding.shortening_model import (
     constraints_of,
     lagrangian,
 )
-from world.kernels import compiled
+from world.kernels import compiled, copy_into
 
 Floats = NDArray[np.float64]
 
@@ -165,7 +165,8 @@ def _descend(
         if not better:
             break
         merit = found
-        here[:] = trial
+        for row in range(here.shape[0]):
+            copy_into(here[row], trial[row])
         if share * furthest < STILL:
             break
     lagrangian(data, limits, bound, here, multipliers, values, penalty, model)

@@ -30,7 +30,7 @@ from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_lim
 from planner.evaluation.problem import ProblemArrays, clearance_at
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, measure_lags
 from world.frames import polymap
-from world.kernels import Records, compiled
+from world.kernels import Records, compiled, copy_into
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
@@ -162,7 +162,7 @@ def constraints_of(bound: Bindings) -> int:  # pragma: no cover - compiled
 def carried(old: Bindings, multipliers: Floats, new: Bindings) -> Floats:  # pragma: no cover - compiled
     """Multipliers for new active constraints; those of new pairs of leg and missile start at 0."""
     out, many, before = np.zeros(constraints_of(new)), new.pairs.shape[0], old.pairs.shape[0]
-    out[many:] = multipliers[before:]
+    copy_into(out[many:], multipliers[before:])
     k = 0
     for p in range(many):
         # Both are sorted by missile and leg.

@@ -184,7 +184,9 @@ def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Reco
     """`ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
     last, wide = costs.went.shape[0] - 1, costs.went.shape[2]
     cells = np.zeros(last + 1, dtype=ROUTE_CELL)
-    cells[: stage + 1] = trace_back(costs.came[: stage + 1], layer, across)
+    before = trace_back(costs.came[: stage + 1], layer, across)
+    for here in range(stage + 1):
+        cells[here] = before[here]
     for here in range(stage, last):
         after = costs.went[here, layer, across]
         layer, across = after // wide, after % wide
