@@ -141,6 +141,7 @@ def looked_at(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> Callable[..
         looks = Looks(leaps)
         monkeypatch.setattr(physics, "SILENCE", silence)
         port.watch, port._clock = looks, link.RunningClock(lambda: looks.now)
+        looks.now += 0.1  # since the port was opened
         return looks
 
     return begin
