@@ -1,6 +1,6 @@
 """Numba kernels, compiled once per version of what they are made of, and the records that they work on.
 
-Compiled code lies in the user's cache folder; `world.kernel_cache` says how long it holds.
+Compiled code lies in the user's cache folder; `world.kernel_cache` says for which sources.
 """
 
 from collections.abc import Callable
@@ -10,12 +10,11 @@ from typing import Any, TypeAlias, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import event
-from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 from world.compile_events import kernel_is_compiled
-from world.kernel_cache import keep_by_contents
+from world.kernel_cache import sources_digest
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _Array = TypeVar("_Array", bound=NDArray[Any])
@@ -27,7 +26,7 @@ Records: TypeAlias = NDArray[Any]
 # decorated; one that the user has set stays.
 _settings: Any = numba.config
 if not _settings.CACHE_DIR:
-    _settings.CACHE_DIR = str(Path(user_cache_dir("planfly")) / "kernels")
+    _settings.CACHE_DIR = str(Path(user_cache_dir("planfly")) / f"kernels-{sources_digest(Path(__file__).parents[1])}")
 
 
 class _Compiling(event.Listener):
@@ -84,10 +83,7 @@ def inlined(kernel: _Kernel) -> _Kernel:
 def _compiled(kernel: _Kernel, **options: bool) -> _Kernel:
     njit: Any = numba.njit
     # No kernel is handed to another as a value, which the wrapper for C is for.
-    made = njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
-    if isinstance(made, Dispatcher):
-        keep_by_contents(made)
-    return cast("_Kernel", made)
+    return cast("_Kernel", njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel))
 
 
 @inlined

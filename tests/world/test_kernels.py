@@ -4,10 +4,9 @@ import ctypes
 import math
 import os
 import pickle
+import re
 import subprocess
 import sys
-import textwrap
-from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +17,7 @@ from numba.core.registry import cpu_target
 
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from world.by_reference import _layout, by_reference
-from world.kernel_cache import stamp
+from world.kernel_cache import PACKAGES, kernel_sources, sources_digest
 from world.kernels import Record, compiled, field_names, inlined, record_dtype
 
 ROOT = Path(__file__).parents[2]
@@ -80,104 +79,52 @@ def test_views_are_filled_through_a_function_that_is_copied_in() -> None:
     assert out.tolist() == [7.0, -7.0]
 
 
-# A file of constants, a kernel that another file's kernel calls, and a program that is no kernel.
+# Two kernels, a constant that reaches one of them through another file, a package's module, and what is no kernel.
 SOURCES = {
-    "numbers_.py": "FACTOR = 2.0\n",
-    "inner.py": """
-        from numbers_ import FACTOR
-        from world.kernels import compiled
-
-        @compiled
-        def scaled(a: float) -> float:
-            \"\"\"Scaled.\"\"\"
-            return a * FACTOR
-        """,
-    "outer.py": """
-        from inner import scaled
-        from world.kernels import compiled
-
-        @compiled
-        def shifted(a: float) -> float:
-            return scaled(a) + 1.0
-        """,
-    "report.py": """
-        from outer import shifted
-        from world.compile_events import tell_before_compiling
-
-        compiled_anew = []
-        with tell_before_compiling(lambda: compiled_anew.append(1)):
-            print(shifted(10.0), len(compiled_anew))
-        """,
+    "world/numbers_.py": "FACTOR = 2.0\n",
+    "world/factors.py": "from world.numbers_ import FACTOR\n\nTWICE = 2.0 * FACTOR\n",
+    "planner/inner.py": "from world.factors import (\n    TWICE,\n)\n\n\n@compiled\ndef scaled(a):\n    return TWICE\n",
+    "flight/outer.py": "from planner import inner\n\n\n@inlined\ndef shifted(a):\n    return inner.scaled(a) + 1.0\n",
+    "logs/report.py": "from flight.outer import shifted\n\nprint(shifted(10.0))\n",
 }
 
 
 @pytest.fixture
 def sources(tmp_path: Path) -> Path:
-    """A folder of small sources, run once."""
+    """A folder of small packages."""
     for name, text in SOURCES.items():
-        (tmp_path / name).write_text(textwrap.dedent(text), encoding="utf-8")
-    assert _run(tmp_path) == (21.0, 2)
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
     return tmp_path
 
 
-def _run(folder: Path) -> tuple[float, int]:
-    """What the report prints: the kernels' result, and how many were compiled anew."""
-    env = os.environ | {
-        "NUMBA_CACHE_DIR": str(folder / "cache"),
-        "PYTHONPATH": os.pathsep.join([str(ROOT), str(folder)]),
-    }
-    command = [sys.executable, "-B", str(folder / "report.py")]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
-    result, anew = done.stdout.split()
-    return float(result), int(anew)
+@pytest.mark.parametrize("name", SOURCES)
+def test_kernels_are_kept_until_a_file_that_they_are_made_of_changes(name: str, sources: Path) -> None:
+    before = sources_digest(sources)
+    assert sources_digest(sources) == before
+    with (sources / name).open("a", encoding="utf-8") as file:
+        file.write("ANOTHER = 5.0\n")
+    assert (sources_digest(sources) == before) == (name == "logs/report.py")
 
 
-def _edit(folder: Path, name: str, old: str, new: str) -> None:
-    text = (folder / name).read_text(encoding="utf-8")
-    assert old in text
-    (folder / name).write_text(text.replace(old, new), encoding="utf-8")
+def test_a_new_kernel_counts_and_another_file_does_not(sources: Path) -> None:
+    before = sources_digest(sources)
+    (sources / "logs" / "words.py").write_text("WORDS = 1\n", encoding="utf-8")
+    assert sources_digest(sources) == before
+    (sources / "logs" / "words.py").write_text("@compiled\ndef words(a):\n    return a\n", encoding="utf-8")
+    assert sources_digest(sources) != before
 
 
-def test_an_edit_that_no_kernel_is_made_of_compiles_none_anew(sources: Path) -> None:
-    assert _run(sources) == (21.0, 0)
-    _edit(sources, "report.py", "compiled_anew = []", "# Another word.\ncompiled_anew = []")
-    _edit(sources, "numbers_.py", "FACTOR", "OTHER = 5.0\nFACTOR")
-    _edit(sources, "inner.py", "Scaled.", "Scaled, in other words, which take no line more.")
-    os.utime(sources / "outer.py")
-    assert _run(sources) == (21.0, 0)
-
-
-@pytest.mark.parametrize(
-    ("name", "old", "new", "result"),
-    [
-        ("numbers_.py", "2.0", "3.0", 31.0),
-        ("inner.py", "a * FACTOR", "a + FACTOR", 13.0),
-        ("inner.py", "a * FACTOR", "a * FACTOR * 10.0", 201.0),
-        ("outer.py", "+ 1.0", "+ 2.0", 22.0),
-    ],
-)
-def test_an_edit_of_a_kernel_or_a_constant_in_it_compiles_what_is_made_of_it(
-    sources: Path, name: str, old: str, new: str, result: float
-) -> None:
-    _edit(sources, name, old, new)
-    assert _run(sources) == (result, 1 if name == "outer.py" else 2)
-    assert _run(sources) == (result, 0)
-
-
-def test_every_constant_that_a_kernel_takes_has_a_text() -> None:
-    for name in sorted({name for names in UNIT_KERNELS.values() for name in names}):
-        module, _, kernel = name.rpartition(".")
-        assert len(stamp(getattr(import_module(module), kernel))) == 64
-    with pytest.raises(TypeError, match="no text"):
-        stamp(_take_unknown)
-
-
-_UNKNOWN = object()
-
-
-@compiled
-def _take_unknown() -> object:  # pragma: no cover - never compiled
-    return _UNKNOWN
+def test_what_a_kernel_takes_from_other_files_is_found_by_its_imports() -> None:
+    """A file that kernels are made of imports ours by ``from ... import`` at its beginning, and nothing of reports."""
+    files = kernel_sources(ROOT)
+    assert not [name for name in files if name.startswith(("logs/views/report/", "logs/verdict/rules/"))]
+    ours = "|".join(PACKAGES)
+    other = re.compile(rf"^(?:import (?:{ours})\b|from \.)".encode(), re.MULTILINE)
+    assert [name for name, content in files.items() if other.search(content)] == []
+    for unit in UNIT_KERNELS.values():
+        for kernel in unit:
+            assert kernel.rpartition(".")[0].replace(".", "/") + ".py" in files
 
 
 @pytest.mark.parametrize("own", ["", "mine"])
@@ -186,7 +133,7 @@ def test_kernels_are_kept_in_the_users_cache_unless_the_user_says_where(own: str
     env |= {"XDG_CACHE_HOME": str(tmp_path)} | ({"NUMBA_CACHE_DIR": str(tmp_path / own)} if own else {})
     code = "import world.kernels, numba; print(numba.config.CACHE_DIR)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=env, capture_output=True, text=True, check=True)
-    assert Path(done.stdout.strip()).name == (own or "kernels")
+    assert Path(done.stdout.strip()).name == (own or f"kernels-{sources_digest(ROOT)}")
 
 
 class Place(NamedTuple):
