@@ -31,7 +31,7 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
 
     >>> from aircraft.catalog import load_aircraft
     >>> from world.scenario import load_scenario
-    >>> load_autopilot(load_scenario("tight"), load_aircraft("aerosonde")).title
+    >>> load_autopilot(load_scenario("paper-07"), load_aircraft("aerosonde")).title
     'ArduPlane'
     """
     name = scenario.flight.steering.autopilot
