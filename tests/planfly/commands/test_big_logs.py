@@ -28,7 +28,7 @@ print("peak", code, int(held.split()[1]) / 1024.0)
 def peak(log: Path, target: Path) -> float:
     """Most memory that importing a log takes, MB."""
     ran = subprocess.run(
-        [sys.executable, "-c", _CODE, str(log), str(target)], capture_output=True, text=True, check=True, timeout=600
+        [sys.executable, "-c", _CODE, str(log), str(target)], capture_output=True, text=True, check=True, timeout=3600
     )
     _, code, megabytes = ran.stdout.splitlines()[-1].split()
     assert code in ("0", "4"), ran.stdout
@@ -38,6 +38,8 @@ def peak(log: Path, target: Path) -> float:
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc/self/status is Linux's")
 def test_memory_grows_by_less_than_the_log(tmp_path: Path) -> None:
     few, many = (big_log(tmp_path / f"{size}.BIN", size * MEGABYTE) for size in (2, 14))
+    # Kernels may have to be compiled first, and that takes memory.
+    peak(few, tmp_path / "b.mcap")
     grown = peak(many, tmp_path / "a.mcap") - peak(few, tmp_path / "b.mcap")
     assert grown < 12.0 * (MAX_MEGABYTES - ITSELF) / WHOLE
 

@@ -74,6 +74,8 @@ def test_a_replay_goes_on_where_it_was(
 
     def sleep(seconds: float) -> None:
         nonlocal now, waited
+        # No clock of a system's tells a millionth of a microsecond.
+        seconds = max(seconds, 1e-6)
         now, waited = now + seconds + (3600.0 if waited == 0.0 else 0.0), waited + seconds
 
     monkeypatch.setattr(replay, "time", SimpleNamespace(sleep=sleep))
