@@ -332,7 +332,7 @@ def _csv(columns: Sequence[str], rows: Any) -> str:
 
 def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
     """Figures as the paper's 5-8 (paths), 9-12 (encodings) and the convergence over generations."""
-    from logs.views.figures import write_png
+    from logs.views.drawing import write_png
     from logs.views.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 
     by_problem: dict[int, dict[str, list[SeededPlan]]] = {}

@@ -26,6 +26,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import ArrayLike, NDArray
 
+from logs import theme
 from logs.recording.state_channel import length_delimited, repeated_submessages
 from world.airspace.zones_on_map import zone_walls
 from world.scenario import Scenario
@@ -48,13 +49,11 @@ _LINE_POINTS = LinePrimitive.POINTS_FIELD_NUMBER
 _MESH_POINTS = TriangleListPrimitive.POINTS_FIELD_NUMBER
 _MESH_COLOURS = TriangleListPrimitive.COLORS_FIELD_NUMBER
 
-_LOW = np.array([0.36, 0.52, 0.30])
-_HIGH = np.array([0.80, 0.74, 0.62])
-_KILL = (0.85, 0.10, 0.10, 0.35)
-_DETECTION = (0.95, 0.65, 0.10, 0.15)
-_PLAN = (0.10, 0.35, 0.90, 1.0)
-_TRACK = (0.95, 0.95, 0.95, 1.0)
-_KEEP_OUT, _STAY_IN = (0.75, 0.15, 0.15, 1.0), (0.95, 0.85, 0.30, 1.0)
+_LOW, _HIGH = (np.array(theme.rgb(text)) for text in (theme.GROUND[0], theme.GROUND[-2]))
+# Scenes stand on black: the theme's colours for dark ground.
+_KILL, _DETECTION = theme.rgba("missile", 0.35, dark=True), theme.rgba("radar", 0.15, dark=True)
+_PLAN, _TRACK = theme.rgba("planned", dark=True), theme.rgba("flown", dark=True)
+_KEEP_OUT, _STAY_IN = theme.rgba("zone", dark=True), theme.rgba("highlight", dark=True)
 # A name stands so far above the ground within this of its place, m.
 _LIFT, _NEAR = 40.0, 300.0
 # Upright lines of one outline of a zone, about.
@@ -132,7 +131,7 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
     sw, se, nw, ne = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
     corners = np.stack([sw, se, ne, sw, ne, nw], axis=-1).reshape(-1, 6)
     whole = known.ravel()[corners].all(axis=1)
-    mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=Color(r=0.5, g=0.5, b=0.4, a=1.0))
+    mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=_colour(theme.rgba("terrain")))
     mesh.indices.extend(corners[whole].ravel().tolist())
     points = ground.reshape(-1, 3)
     # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the bytes.
@@ -144,7 +143,7 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
 
 
 def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> bytes:
-    """Missile spheres in red, radar spheres in orange, and their names above the ground about them."""
+    """Spheres of missiles and radars, and their names above the ground about them."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
         centre = threats.position[k]
@@ -267,7 +266,10 @@ _LEFT = [
     [(-0.32, 0.0, 0.03), (-0.42, 0.18, 0.03), (-0.46, 0.0, 0.03)],
 ]
 _RIGHT = [[(x, -y, z) for x, y, z in reversed(triangle)] for triangle in _LEFT]
-_PARTS = ((_BODY, (0.92, 0.92, 0.88, 1.0)), (_LEFT, (0.85, 0.10, 0.10, 1.0)), (_RIGHT, (0.10, 0.60, 0.20, 1.0)))
+_PARTS = tuple(
+    (triangles, (*theme.rgb(text), 1.0))
+    for triangles, text in zip((_BODY, _LEFT, _RIGHT), theme.AIRCRAFT_PARTS, strict=True)
+)
 # Chunk types of a .glb, and glTF's numbers for float32 and for what a buffer's view is used for.
 _JSON, _BIN, _FLOAT, _VERTICES = b"JSON", b"BIN\0", 5126, 34962
 
@@ -325,7 +327,7 @@ def aircraft_scene(time_ns: int) -> bytes:
     model = ModelPrimitive(
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
         scale=Vector3(x=SPAN, y=SPAN, z=SPAN),
-        color=Color(r=1.0, g=1.0, b=1.0, a=1.0),
+        color=_colour(theme.rgba("paper")),
         media_type=MEDIA_TYPE,
         data=aircraft_glb(),
     )

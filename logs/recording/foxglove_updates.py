@@ -14,6 +14,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
+from logs import theme
 from logs.recording import foxglove_scene as scene
 from logs.recording.foxglove_scene import AIRCRAFT, MAP, log_message, model_corners, terrain_points, timestamp
 from logs.recording.mcap_writer import SECOND_NS, MessageRecords, single_record, stamped_records
@@ -161,8 +162,15 @@ _POINT = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("alpha", "u1")]
 )
 _TYPES = {"f": PackedElementField.FLOAT32, "u": PackedElementField.UINT8}
-_PLAN, _TRACK, _AIRCRAFT = (25, 90, 230, 255), (245, 245, 245, 255), (255, 200, 40, 255)
-_KILL, _DETECTION = (217, 26, 26, 255), (242, 166, 26, 255)
+
+
+def _bytes(role: str) -> Colour:
+    red, green, blue, opacity = (round(255.0 * part) for part in theme.rgba(role, dark=True))
+    return red, green, blue, opacity
+
+
+_PLAN, _TRACK, _AIRCRAFT = _bytes("planned"), _bytes("flown"), _bytes("highlight")
+_KILL, _DETECTION = _bytes("missile"), _bytes("radar")
 # m between points of a line, at most so many of them; points of a sphere; points along each side of a triangle.
 _STEP, _MAX_SAMPLES, _SPHERE, _SIDE = 30.0, 4000, 150, 7
 

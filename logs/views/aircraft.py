@@ -12,24 +12,17 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope, turn_radius
 from flight.dynamics.characteristics import TRIM_AMSL, Mode, StepResponse, TrimRow
-from logs.views import drawing
+from logs import theme
+from logs.views.drawing import clean_style, new_figure
 
 Floats = NDArray[np.float64]
 
 _BANKS_DEG = (15, 20, 30, 40)
 _WINDS = (-10.0, -5.0, 0.0, 5.0, 10.0)
-# From dark to light, low to high, slow to fast; dashes show the same a second time.
-_SHADES = ("#000000", drawing.BLUE, drawing.RADAR, drawing.LIMIT, drawing.FAIL)
+# Solid to dotted as `theme.SHADES` goes from dark to light.
 _DASHES: tuple[Any, ...] = ("-", (0, (7, 2)), (0, (4, 2)), (0, (2, 2)), (0, (1, 1.5)))
 _MARKS = {"short period": "o", "phugoid": "s", "Dutch roll": "D", "roll-spiral": "P", "roll": "^", "spiral": "v"}
-_MODE_COLORS = {
-    "short period": drawing.BLUE,
-    "phugoid": drawing.MISSILE,
-    "Dutch roll": drawing.RADAR,
-    "roll-spiral": drawing.INK,
-    "roll": drawing.FAIL,
-    "spiral": drawing.LIMIT,
-}
+_MODE_COLORS = dict(zip(_MARKS, theme.MODES, strict=True))
 _ROWS = {
     "pitch": ("pitch", "°", 180.0 / math.pi),
     "roll": ("roll", "°", 180.0 / math.pi),
@@ -53,8 +46,8 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
     ['steepest climb and descent to the air', 'level flight', 'steepest climb and dive over the ground, at 500 m',
      'turn radius']
     """
-    with drawing.clean_style():
-        figure = drawing.new_figure(8.0)
+    with clean_style():
+        figure = new_figure(8.0)
         axes = figure.subplots(2, 2)
         figure.subplots_adjust(left=0.075, right=0.975, top=0.87, bottom=0.065, wspace=0.2, hspace=0.32)
         if aircraft.battery_voltage == 0.0:
@@ -71,12 +64,12 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
 
 
 def _slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
-    heights = np.linspace(0, envelope.amsl.size - 1, len(_SHADES)).round().astype(int)
+    heights = np.linspace(0, envelope.amsl.size - 1, len(theme.SHADES)).round().astype(int)
     for k, j in enumerate(heights):
-        look = {"color": _SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
+        look = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
         axes.plot(envelope.airspeed, np.degrees(envelope.climb[:, j]), label=f"{envelope.amsl[j]:.0f} m", **look)
         axes.plot(envelope.airspeed, -np.degrees(envelope.descent[:, j]), **look)
-    axes.axhline(0.0, color="#555555", linewidth=0.8)
+    axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
     _shade_guidance_speeds(axes, aircraft)
     _frame(axes, "steepest climb and descent to the air", "airspeed (m/s)", "flight path (°)")
     _legend_above(axes, "height AMSL", 3)
@@ -84,11 +77,16 @@ def _slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
 
 def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     low, high = envelope.level_speed_min, envelope.level_speed_max
-    axes.fill_betweenx(envelope.amsl, low, high, color=drawing.PLANNED, alpha=0.2, linewidth=0)
+    axes.fill_betweenx(envelope.amsl, low, high, color=theme.colour("planned"), alpha=0.2, linewidth=0)
     axes.plot(
-        low, envelope.amsl, color=drawing.MISSILE, linestyle="--", linewidth=1.3, label="slowest: elevator full up"
+        low,
+        envelope.amsl,
+        color=theme.colour("limit"),
+        linestyle="--",
+        linewidth=1.3,
+        label="slowest: elevator full up",
     )
-    axes.plot(high, envelope.amsl, color=drawing.BLUE, linewidth=1.3, label="fastest: full throttle")
+    axes.plot(high, envelope.amsl, color=theme.colour("second"), linewidth=1.3, label="fastest: full throttle")
     _shade_guidance_speeds(axes, aircraft)
     span = float(np.nanmax(high) - np.nanmin(low))
     axes.set_xlim(float(np.nanmin(low)) - 0.08 * span, float(np.nanmax(high)) + 0.08 * span)
@@ -101,10 +99,10 @@ def _in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     for k, wind in enumerate(_WINDS):
         climb, dive = np.degrees([envelope.slope_limits(float(v), TRIM_AMSL, wind) for v in speeds]).T
         name = "calm" if wind == 0.0 else f"{abs(wind):.0f} m/s {'tail' if wind > 0.0 else 'head'}wind"
-        look = {"color": _SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
+        look = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
         axes.plot(speeds, climb, label=name, **look)
         axes.plot(speeds, -dive, **look)
-    axes.axhline(0.0, color="#555555", linewidth=0.8)
+    axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
     _frame(axes, f"steepest climb and dive over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)")
     _legend_above(axes, "", 3)
 
@@ -113,7 +111,7 @@ def _turns(axes: Any, aircraft: Aircraft) -> None:
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max + 10.0, 80)
     for k, bank in enumerate(_BANKS_DEG):
         radii = [turn_radius(float(v), math.radians(bank)) for v in speeds]
-        axes.plot(speeds, radii, color=_SHADES[k], linestyle=_DASHES[k], linewidth=1.3, label=f"{bank}° of bank")
+        axes.plot(speeds, radii, color=theme.SHADES[k], linestyle=_DASHES[k], linewidth=1.3, label=f"{bank}° of bank")
     _shade_guidance_speeds(axes, aircraft)
     _frame(axes, "turn radius", "ground speed (m/s)", "radius (m)")
     axes.set_ylim(0.0, None)
@@ -132,8 +130,8 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
     >>> figure.axes[0].get_xlabel(), figure.axes[1].get_ylabel()
     ('airspeed (m/s)', 'throttle (%)')
     """
-    with drawing.clean_style():
-        figure = drawing.new_figure(8.0)
+    with clean_style():
+        figure = new_figure(8.0)
         axes = figure.subplots(2, 2)
         figure.subplots_adjust(left=0.075, right=0.93, top=0.87, bottom=0.065, wspace=0.28, hspace=0.32)
         _title(figure, f"{aircraft.title}: level flight and its modes", f"JSBSim trims at {TRIM_AMSL:.0f} m AMSL, calm")
@@ -142,9 +140,16 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
             values = np.degrees([getattr(row.trim, name) for row in trims])
             label = "angle of attack" if name == "alpha" else name
             axes[0, 0].plot(
-                speeds, values, "o", linestyle=_DASHES[k], color=_SHADES[k], markersize=3, linewidth=1.2, label=label
+                speeds,
+                values,
+                "o",
+                linestyle=_DASHES[k],
+                color=theme.SHADES[k],
+                markersize=3,
+                linewidth=1.2,
+                label=label,
             )
-        axes[0, 0].axhline(0.0, color="#555555", linewidth=0.8)
+        axes[0, 0].axhline(0.0, color=theme.colour("area"), linewidth=0.8)
         _frame(axes[0, 0], "angle of attack and surfaces", "airspeed (m/s)", "angle (°)")
         _legend_above(axes[0, 0], "", 2)
         _power(axes[0, 1], aircraft, speeds, trims)
@@ -155,12 +160,17 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
 
 def _power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRow]) -> None:
     axes.plot(
-        speeds, [100.0 * row.trim.throttle for row in trims], "o-", color=drawing.FLOWN, markersize=3, label="throttle"
+        speeds,
+        [100.0 * row.trim.throttle for row in trims],
+        "o-",
+        color=theme.colour("flown"),
+        markersize=3,
+        label="throttle",
     )
     kind = "battery power" if aircraft.battery_voltage > 0.0 else "heat of the fuel"
     other = axes.twinx()
     power = np.array([row.power for row in trims]) / 1000.0
-    other.plot(speeds, power, "s", linestyle="--", color=drawing.BLUE, markersize=3, label=f"{kind} (right)")
+    other.plot(speeds, power, "s", linestyle="--", color=theme.colour("second"), markersize=3, label=f"{kind} (right)")
     other.set_ylabel("power (kW)")
     other.set_ylim(0.0, 1.15 * float(power.max(initial=0.1)))
     axes.set_ylim(0.0, 105.0)
@@ -181,11 +191,11 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, whole: bool) -> 
             # Filled at the fastest speed, so that the way over speed can be followed.
             axes.plot(
                 mode.root.real, mode.root.imag, _MARKS[mode.name], color=_MODE_COLORS[mode.name], markersize=5,
-                markerfacecolor=_MODE_COLORS[mode.name] if fastest else "white",
+                markerfacecolor=_MODE_COLORS[mode.name] if fastest else theme.colour("paper"),
                 label=None if mode.name in labelled else mode.name,
             )  # fmt: skip
             labelled.add(mode.name)
-    axes.axvline(0.0, color="#555555", linewidth=0.8)
+    axes.axvline(0.0, color=theme.colour("area"), linewidth=0.8)
     slow_or_fast = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""
     title = f"modes {slow_or_fast}" if whole else "the slow ones, nearer"
     _frame(axes, title, "real part (1/s): right of 0 is unstable", "imaginary part (rad/s)")
@@ -207,8 +217,8 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
     ['change of pitch (°)', 'change of pitch (°)', 'change of roll (°)', 'change of roll (°)']
     """
     deep = max(len(step.quantities) for step in steps)
-    with drawing.clean_style():
-        figure = drawing.new_figure(1.3 + 1.7 * deep)
+    with clean_style():
+        figure = new_figure(1.3 + 1.7 * deep)
         axes = figure.subplots(deep, len(steps), squeeze=False, sharex="col")
         figure.subplots_adjust(left=0.05, right=0.985, top=0.865, bottom=0.065, wspace=0.24, hspace=0.28)
         level = f"level flight at {aircraft.airspeed:g} m/s and {TRIM_AMSL:.0f} m"
@@ -229,13 +239,13 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
 def _answer(axes: Any, step: StepResponse, row: int) -> None:
     name, unit, factor = _ROWS[step.quantities[row]]
     values = factor * step.change[:, row]
-    axes.axhline(0.0, color="#999999", linewidth=0.6)
+    axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
     held = min(step.held, float(step.time[-1]) - 1.0)
-    axes.axvspan(1.0, 1.0 + held, color=drawing.LIMIT, alpha=0.12, linewidth=0)
-    axes.plot(step.time, values, color=drawing.FLOWN, linewidth=1.1)
+    axes.axvspan(1.0, 1.0 + held, color=theme.colour("commanded"), alpha=0.12, linewidth=0)
+    axes.plot(step.time, values, color=theme.colour("flown"), linewidth=1.1)
     axes.set_xlim(0.0, float(step.time[-1]))
     axes.set_title(f"change of {name} ({unit})", fontsize=8.5, pad=3.0)
-    axes.grid(color="#e4e4e4", linewidth=0.5)
+    axes.grid(color=theme.colour("grid"), linewidth=0.5)
     axes.set_axisbelow(True)
 
 
@@ -260,19 +270,19 @@ def _legend_above(axes: Any, title: str, columns: int) -> None:
 
 def _shade_guidance_speeds(axes: Any, aircraft: Aircraft) -> None:
     """Shade the speeds that guidance uses, and mark cruise."""
-    axes.axvspan(aircraft.airspeed_min, aircraft.airspeed_max, color="#000000", alpha=0.05, linewidth=0)
-    axes.axvline(aircraft.airspeed, color=drawing.QUIET, linewidth=0.8, linestyle=":")
+    axes.axvspan(aircraft.airspeed_min, aircraft.airspeed_max, color=theme.colour("flown"), alpha=0.05, linewidth=0)
+    axes.axvline(aircraft.airspeed, color=theme.colour("quiet"), linewidth=0.8, linestyle=":")
 
 
 def _frame(axes: Any, title: str, x: str, y: str) -> None:
     axes.set_title(title, fontsize=9.5)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
-    axes.grid(color="#e4e4e4", linewidth=0.5)
+    axes.grid(color=theme.colour("grid"), linewidth=0.5)
     axes.set_axisbelow(True)
 
 
 def _title(figure: Figure, title: str, subtitle: str) -> None:
     high = figure.get_figheight()
     figure.text(0.06, 1.0 - 0.28 / high, title, fontsize=12, fontweight="bold", va="center")
-    figure.text(0.06, 1.0 - 0.55 / high, subtitle, fontsize=8.5, color=drawing.QUIET, va="center")
+    figure.text(0.06, 1.0 - 0.55 / high, subtitle, fontsize=8.5, color=theme.colour("quiet"), va="center")

@@ -1,62 +1,49 @@
-"""What all figures share: colours, sizes, the clean matplotlib settings they are drawn under, and their bytes.
-
-Colours are those of Okabe and Ito, "Color Universal Design" (2008), which people with any of the common colour
-vision deficiencies tell apart; line style, marker or fill make the same distinction a second time.
-"""
+"""Charts as PNG and SVG: drawn with matplotlib from their descriptions, and the settings that all pictures share."""
 
 import io
-import itertools
+import math
+import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path as FilePath
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+from matplotlib.ticker import MultipleLocator
 from PIL import Image
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from logs import theme
+from logs.views.charts import Chart, Label, Layer, LegendEntry, Panel, legend_entries, nice_step
+from logs.views.labels import DPI, LabelPlacer
+from world.files import write_whole
 
-# 10 in at 150 dots an inch: every picture is 1500 px wide.
-DPI = 150
+# Every picture is 10 in and 1500 px wide.
 WIDTH = 10.0
-
-PLANNED = "#56B4E9"
-FLOWN = "#000000"
-MISSILE = "#D55E00"
-RADAR = "#007A5A"  # Okabe-Ito's bluish green, darkened for thin dashes on pale ground
-FAIL = "#B0408A"  # reddish purple, darkened for text
-LIMIT = "#E69F00"
-# Dark red-brown, always with a hatch or a broad line, which missiles have not; and the same as red, green and blue.
-ZONE, ZONE_FILL = "#7A1F1F", (0.478, 0.122, 0.122)
-BLUE = "#0072B2"
-INK = "#222222"
-QUIET = "#6b6b6b"
-MARKER = "#F0E442"  # start and destination
-# What a picture of few colours keeps as it is.
-DRAWN = (PLANNED, FLOWN, MISSILE, RADAR, FAIL, LIMIT, ZONE, BLUE, INK, QUIET, MARKER, "#FFFFFF")
-
-# Rises in lightness from valley to summit, so that height reads without colour.
-GROUND = ("#9fbfa5", "#cfd8b0", "#efe7c8", "#f6efe2", "#ffffff")
-
 _SETTINGS: Any = {
     "font.family": ["DejaVu Sans"],
     "font.size": 8.5,
-    "axes.edgecolor": "#555555",
-    "axes.labelcolor": INK,
+    "axes.edgecolor": theme.colour("area"),
+    "axes.labelcolor": theme.colour("ink"),
     "axes.linewidth": 0.7,
     "axes.titlesize": 11.0,
     "axes.titlelocation": "left",
     "axes.titlepad": 8.0,
-    "text.color": INK,
+    "grid.color": theme.colour("grid"),
+    "grid.linewidth": 0.5,
+    "text.color": theme.colour("ink"),
     # A scenario's or a threat's name may hold a dollar sign; it is never a formula.
     "text.parse_math": False,
-    "xtick.color": INK,
-    "ytick.color": INK,
+    "xtick.color": theme.colour("ink"),
+    "ytick.color": theme.colour("ink"),
     "xtick.major.width": 0.7,
     "ytick.major.width": 0.7,
     "legend.fontsize": 8.0,
@@ -65,6 +52,13 @@ _SETTINGS: Any = {
     # Names inside an SVG would be random.
     "svg.hashsalt": "planfly",
 }
+# Inches around the panels and between them; right of panels that have legends of their own there.
+_LEFT, _RIGHT, _TOP, _PLAIN_TOP, _BOTTOM, _GAP, _OWN_AXIS_GAP, _LEGENDS = 0.85, 0.25, 0.72, 0.58, 0.6, 0.2, 0.62, 2.15
+# Inches: the legend above panels that share it, a line of one below them, and from a panel to the middle of its label.
+_SHARED_LEGEND, _LEGEND_LINE, _LABEL = 0.28, 0.2, 0.44
+_MARKERS = {"circle": "o", "triangle": "^", "star": "*", "cross": "x"}
+# Waypoints and legs that an axis can number.
+_MAX_TICKS = 45
 
 
 @contextmanager
@@ -89,7 +83,7 @@ def new_figure(height: float) -> Figure:
     >>> new_figure(4.0).get_size_inches().tolist()
     [10.0, 4.0]
     """
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor=theme.colour("paper"))
     FigureCanvasAgg(figure)
     return figure
 
@@ -132,40 +126,374 @@ def _rendered(figure: Figure, kind: str, metadata: Any) -> bytes:
     return buffer.getvalue()
 
 
-def shorten(text: str, length: int) -> str:
-    """Cut the text with an ellipsis to at most `length` characters.
+def write_png(figure: Figure, path: FilePath) -> None:
+    """Write the figure as a PNG, whole or not at all.  Raises OSError.
 
-    >>> shorten("clearance, leg 12", 12)
-    'clearance,…'
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_png(new_figure(2.0), FilePath(folder) / "empty.png")
+    ...     (FilePath(folder) / "empty.png").read_bytes()[1:4]
+    b'PNG'
     """
-    return text if len(text) <= length else text[: length - 1].rstrip() + "…"
+    write_whole(path, png_bytes(figure))
 
 
-def nice_step(span: float, parts: int) -> float:
-    """Find the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `parts` pieces."""
-    raw = max(span, 1e-9) / parts
-    power = 10.0 ** np.floor(np.log10(raw))
-    for factor in (1.0, 2.0, 5.0, 10.0):
-        if factor * power >= raw * (1 - 1e-9):
-            return float(factor * power)
-    return float(10.0 * power)
+def draw_chart(chart: Chart) -> Figure:
+    """Draw a chart of panels; those without a value are left out, as far as another has any.
 
-
-def outline_rows(values: ArrayLike, count: int) -> Indices:
-    """Rows that keep the outline of a long series: lowest and highest of each of `count` equal blocks, in order.
-
-    values: (t,); not-a-number rows are kept out unless a block has nothing else.  Short series come back whole.
+    Where each look means one thing in all stacked panels, and some mean it in several, one legend stands above them.
     """
-    series = np.asarray(values, dtype=np.float64)
-    if series.size <= 2 * count:
-        return np.arange(series.size)
-    edges = np.linspace(0, series.size, count + 1).astype(int)
-    kept = {0, series.size - 1}
-    for low, high in itertools.pairwise(edges):
-        block = series[low:high]
-        good = np.flatnonzero(np.isfinite(block))
-        if good.size == 0:
-            kept.add(int(low))
+    panels = chart.shown_panels() if chart.panels else ()
+    shared = chart.legend == "beside" and shares_legend(panels)
+    entries = legend_entries(panels) if chart.legend == "below" else ()
+    top = (_TOP if chart.legend == "beside" else _PLAIN_TOP) + (_SHARED_LEGEND if shared else 0.0)
+    right = _LEGENDS if chart.legend == "beside" and not shared else _RIGHT
+    columns = _columns(entries)
+    below = _legend_height(entries, columns)
+    rows = 1 if chart.widths else len(panels)
+    gap = _GAP if chart.shared else _OWN_AXIS_GAP
+    total = top + _BOTTOM + below + max(1, rows) * chart.inches + max(0, rows - 1) * gap
+    with clean_style():
+        figure = new_figure(total)
+        for k, panel in enumerate(panels):
+            row = 0 if chart.widths else k
+            base = _BOTTOM + below + (rows - 1 - row) * (chart.inches + gap)
+            left, wide = _across(chart, k, right)
+            axes = figure.add_axes((left, base / total, wide, chart.inches / total))
+            _draw_panel(axes, chart, panel, numbered=k == 0)
+            if chart.legend == "beside" and not shared:
+                _legend_beside(axes)
+            if chart.shared and row < rows - 1:
+                axes.tick_params(labelbottom=False)
+            else:
+                axes.set_xlabel(_axis_label(chart, panel, axes))
+        look: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "va": "center"}
+        figure.text(_LEFT / WIDTH, 1 - 0.3 / total, chart.title, **look)
+        if shared:
+            _legend_above(figure, 1 - 0.45 / total)
+        if entries:
+            draw_legend(figure, [legend_handle(entry) for entry in entries], _LEFT, (below - 0.02) / total, columns)
+    return figure
+
+
+def _across(chart: Chart, k: int, right: float) -> tuple[float, float]:
+    """Left edge and width of a panel as shares of the picture's."""
+    full = WIDTH - _LEFT - right
+    if not chart.widths:
+        return _LEFT / WIDTH, full / WIDTH
+    gap = 0.75 * (len(chart.widths) - 1)
+    before = sum(chart.widths[:k])
+    return (_LEFT + before * (full - gap) + 0.75 * k) / WIDTH, chart.widths[k] * (full - gap) / WIDTH
+
+
+def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
+    label = f"{chart.along} ({chart.unit})" if chart.along else panel.along
+    if not chart.scaled:
+        return label
+    frame = axes.get_window_extent()
+    across = np.ptp(axes.get_xlim()) * 1000.0 / frame.width
+    stretch = across / (np.ptp(axes.get_ylim()) / frame.height)
+    return f"{label}; heights are drawn {stretch:.2g} times larger than distances"
+
+
+def shares_legend(panels: Sequence[Panel]) -> bool:
+    """Whether one legend can stand for all panels: no look has two meanings, no meaning two looks, some repeat.
+
+    >>> none = np.zeros(2)
+    >>> flown, asked = Layer("line", "flown", "flown", none, none), Layer("line", "asked", "commanded", none, none)
+    >>> shares_legend([Panel("bank", "", (asked, flown)), Panel("speed", "", (asked, flown))])
+    True
+    >>> shares_legend([Panel("bank", "", (flown,)), Panel("height", "", (Layer("line", "own", "flown", none, none),))])
+    False
+    """
+    entries: list[tuple[str, Any]] = [
+        (layer.name, (layer.role, layer.dashed, layer.kind))
+        for panel in panels
+        for layer in panel.layers
+        if layer.role != "held"
+    ]
+    entries += [(label, "limit") for panel in panels for label, _ in panel.limits if label]
+    different = set(entries)
+    labels, looks = ({entry[side] for entry in different} for side in (0, 1))
+    return len(labels) == len(looks) == len(different) < len(entries)
+
+
+def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, numbered: bool) -> None:
+    low, high = chart.shown_reach()
+    if chart.shared:
+        axes.set_xlim(low, max(high, low + 1e-3))
+        axes.xaxis.set_major_locator(MultipleLocator(nice_step(float(np.ptp(axes.get_xlim())), 14)))
+        _draw_marks(axes, chart.marks, numbered=numbered and chart.legend == "beside")
+    else:
+        _number_places(axes, panel)
+    axes.set_ylim(*panel.shown_span())
+    if chart.legend == "below" and axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1]:
+        axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.7, zorder=1)
+    draw_layers(axes, panel)
+    write_labels(axes, panel)
+    if panel.note:
+        at: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "fontsize": 7}
+        axes.annotate(panel.note, (1.0, 1.0), (0, 3), color=theme.colour("limit"), **at)
+    axes.set_ylabel(panel.label if chart.inches > 2.0 else "\n".join(_wrapped(panel)))
+    axes.yaxis.set_label_coords(-_LABEL / (WIDTH * axes.get_position().width), 0.5)
+    axes.grid(visible=True, axis="both" if chart.shared else "y")
+    axes.set_axisbelow(True)
+
+
+def _wrapped(panel: Panel) -> list[str]:
+    words = textwrap.wrap(panel.title.replace(" +", "\N{NO-BREAK SPACE}+"), 13)
+    lines = [line.replace("\N{NO-BREAK SPACE}", " ") for line in words]
+    if not panel.unit:
+        return lines
+    unit = f"({panel.unit})"
+    if len(lines) > 1 and len(f"{lines[-1]} {unit}") <= 13:
+        return [*lines[:-1], f"{lines[-1]} {unit}"]
+    return [*lines, unit]
+
+
+def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, numbered: bool) -> None:
+    """Part the legs by thin lines; number them above the topmost panel, as far as the numbers fit."""
+    for value, _ in marks[1:]:
+        axes.axvline(value, color=theme.colour("rim"), linewidth=0.6, alpha=0.7, zorder=1)
+    if not numbered or not marks:
+        return
+    low, high = axes.get_xlim()
+    last = -math.inf
+    ends = [value for value, _ in marks[1:]] + [high]
+    at: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": "center"}
+    for (value, words), end in zip(marks, ends, strict=True):
+        middle = 0.5 * (value + end)
+        if middle - last < 0.022 * (high - low):
             continue
-        kept.update((int(low + good[np.argmin(block[good])]), int(low + good[np.argmax(block[good])])))
-    return np.array(sorted(kept), dtype=np.intp)
+        text = words if last == -math.inf else words.removeprefix("leg ")
+        axes.annotate(text, (middle, 1.0), (0, 3), color=theme.colour("quiet"), annotation_clip=False, fontsize=7, **at)
+        last = middle
+
+
+def _number_places(axes: Any, panel: Panel) -> None:
+    """Number the level axis by waypoints or legs; those that fail in their colour."""
+    at = np.unique(np.concatenate([layer.x for layer in panel.layers]))
+    failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
+    step = -(-len(at) // _MAX_TICKS)
+    ticks = sorted({*at[::step].tolist(), *sorted(failing)[:_MAX_TICKS]})
+    axes.set_xticks(ticks, [f"{tick:.0f}" for tick in ticks])
+    for text, tick in zip(axes.get_xticklabels(), ticks, strict=True):
+        if tick in failing:
+            text.set(color=theme.colour("fail"), fontweight="bold")
+    axes.set_xlim(at[0] - 0.8, at[-1] + 0.8)
+
+
+# Layers.
+
+
+def draw_layers(axes: Any, panel: Panel, above: float = 2.0) -> None:
+    """Draw a panel's layers from the lowest, and its limits over bands and under lines.
+
+    above: matplotlib's order of the lowest.
+    """
+    for label, value in panel.limits:
+        look = theme.LOOKS["limit"]
+        axes.axhline(
+            value,
+            color=look.light,
+            linewidth=look.width,
+            linestyle=_dashes(look),
+            label=label or None,
+            zorder=above + 0.95,
+        )
+    for k, layer in enumerate(panel.layers):
+        # Bands lie below limits, all else above.
+        low = layer.kind in ("band", "area") and layer.role != "terrain"
+        order = above + (0.0 if low else 1.0) + 0.9 * k / len(panel.layers)
+        _DRAWERS[layer.kind](
+            axes, layer, theme.LOOKS[layer.role], zorder=order, label=layer.legend or layer.name or None
+        )
+
+
+def _dashes(look: theme.Look, dashed: bool = False) -> Any:
+    pattern = look.dash or ((8.0, 3.5) if dashed else ())
+    return (0, tuple(part / max(look.width, 0.1) for part in pattern)) if pattern else "-"
+
+
+def _draw_line(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+    blot = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < 0.02 * np.ptp(axes.get_xlim())
+    cap = "round" if blot or layer.role in ("planned", "inside") else "butt"
+    (line,) = axes.plot(
+        layer.x, layer.y, color=look.light, linewidth=look.width, linestyle=_dashes(look, layer.dashed),
+        solid_capstyle=cap, solid_joinstyle="round", **more,
+    )  # fmt: skip
+    if look.halo:
+        rim = patheffects.Stroke(linewidth=look.width + 1.2, foreground=theme.colour("paper"), alpha=0.8)
+        line.set_path_effects([rim, patheffects.Normal()])
+
+
+def _draw_band(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+    low = layer.low if layer.low is not None else np.zeros(len(layer.y))
+    known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(low)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(np.int8)))
+    sides = [
+        np.column_stack([np.append(layer.x[a:b], layer.x[a:b][::-1]), np.append(layer.y[a:b], low[a:b][::-1])])
+        for a, b in zip(edges[::2], edges[1::2], strict=True)
+    ]
+    axes.add_collection(PolyCollection(sides, **_area_look(look), **more))
+
+
+def _area_look(look: theme.Look) -> dict[str, Any]:
+    edge = (theme.colour(look.edge) if look.edge else look.light) if look.width or look.hatch else "none"
+    return {
+        "facecolor": (*theme.rgb(look.light), look.fill), "edgecolor": edge, "linewidth": look.width,
+        "linestyle": _dashes(look), "hatch": look.hatch or None,
+    }  # fmt: skip
+
+
+def _draw_area(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+    """All rings as one path, so that holes stay open."""
+    points = np.column_stack([layer.x, layer.y])
+    gaps = np.flatnonzero(np.isnan(layer.x))
+    rings = [ring[np.isfinite(ring[:, 0])] for ring in np.split(points, gaps)]
+    shape = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
+    axes.add_patch(PathPatch(shape, **_area_look(look), **more))
+
+
+def _draw_bars(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+    axes.bar(layer.x, layer.y, width=0.62, color=look.light, **more)
+
+
+def _draw_dots(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+    axes.plot(layer.x, layer.y, **_dot_look(look, len(layer.x)), **more)
+
+
+def _dot_look(look: theme.Look, count: int = 1) -> dict[str, Any]:
+    size = 3.0 if count > _MAX_TICKS and look.size == 5.5 else look.size
+    found: dict[str, Any] = {"marker": _MARKERS[look.marker], "linestyle": "", "markersize": size, "color": look.light}
+    if look.face:
+        return found | {"mfc": theme.colour(look.face), "mec": look.light, "mew": look.width}
+    faint = look.size < 3.0
+    return found | {"mew": 0.0 if faint else 0.8, "alpha": look.fill if faint else 1.0}
+
+
+def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+    axes.plot(layer.x, layer.y, **_ring_look(look), **more)
+
+
+def _ring_look(look: theme.Look) -> dict[str, Any]:
+    return {
+        "marker": "o", "linestyle": "", "markersize": look.size, "mfc": "none", "mec": look.light, "mew": look.width,
+        "color": look.light, "clip_on": False,
+    }  # fmt: skip
+
+
+def _draw_dashes(axes: Any, layer: Layer, look: theme.Look, **more: Any) -> None:
+    axes.hlines(layer.y, layer.x - 0.42, layer.x + 0.42, color=look.light, linewidth=2.0, **more)
+
+
+_DRAWERS: dict[str, Any] = {
+    "line": _draw_line, "band": _draw_band, "area": _draw_area, "bars": _draw_bars, "dots": _draw_dots,
+    "rings": _draw_rings, "dashes": _draw_dashes,
+}  # fmt: skip
+
+
+# Names and legends.
+
+
+def write_labels(axes: Any, panel: Panel) -> None:
+    """Write a panel's names, the most important first, off each other and off the paths."""
+    placer = LabelPlacer(axes)
+    for layer in panel.layers:
+        if layer.kind == "line" and layer.role in ("planned", "flown", "other"):
+            placer.avoid(layer.x, layer.y)
+    for label in panel.labels:
+        write_label(placer, label)
+
+
+def write_label(placer: LabelPlacer, label: Label) -> None:
+    """Write one name as its rank asks."""
+    size, gap = theme.LABELS[label.rank]
+    look: dict[str, Any] = {"size": size, "gap": gap if label.prefer != (0, 0) else 0.0, "prefer": label.prefer}
+    look["color"] = theme.colour(label.role)
+    if label.rank == "fail":
+        frame = {"boxstyle": "round,pad=0.2", "facecolor": theme.colour("paper"), "edgecolor": theme.colour("fail")}
+        look["bbox"] = frame | {"linewidth": 0.9}
+    elif label.rank == "name":
+        look["optional"] = True
+    else:
+        look["fontweight"] = "bold"
+    placer.place(label.text, label.x, label.y, **look)
+
+
+def legend_handle(entry: LegendEntry) -> Any:
+    """What a legend shows beside an entry's text."""
+    layer = entry.layers[0]
+    look, text = theme.LOOKS[layer.role], textwrap.fill(entry.text, 36)
+    if layer.kind in ("band", "area"):
+        return Patch(label=text, **_area_look(look))
+    if layer.kind == "bars":
+        return Patch(label=text, color=look.light)
+    if layer.kind == "dots":
+        return Line2D([], [], label=text, **_dot_look(look) | {"alpha": 1.0})
+    if layer.kind == "rings":
+        return Line2D([], [], label=text, **_ring_look(look) | {"markersize": 9.0})
+    dashes: Any = "-" if layer.kind == "dashes" else _dashes(look, layer.dashed)
+    return Line2D([], [], label=text, color=look.light, linewidth=min(look.width, 6.0), linestyle=dashes)
+
+
+def draw_legend(figure: Figure, handles: list[Any], left: float, top: float, columns: int = 4) -> None:
+    """Write the legend below the picture, where it hides nothing.
+
+    left: inches from the figure's edge.  top: its upper edge as a share of the figure's height.
+    """
+    figure.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(left / WIDTH - 0.01, top),
+        ncols=columns,
+        columnspacing=1.4,
+        handlelength=2.0,
+        borderaxespad=0.0,
+        borderpad=0.2,
+        labelspacing=0.45,
+    )
+
+
+def _columns(entries: Sequence[LegendEntry]) -> int:
+    """How many columns of a legend fit into a picture: four at most."""
+    for columns in (4, 3, 2):
+        rows = -(-len(entries) // columns)
+        widest = [max(len(e.text[:36]) for e in entries[k : k + rows]) for k in range(0, len(entries), rows or 1)]
+        if sum(0.45 + 0.062 * letters for letters in widest) < WIDTH - 1.0:
+            return columns
+    return 1
+
+
+def _legend_height(entries: Sequence[LegendEntry], columns: int) -> float:
+    if not entries:
+        return 0.0
+    rows = -(-len(entries) // columns)
+    lines = sum(max(len(textwrap.wrap(entry.text, 36)) for entry in entries[row::rows]) for row in range(rows))
+    return 0.1 + _LEGEND_LINE * lines
+
+
+def _legend_beside(axes: Any) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    look: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "handlelength": 1.6}
+    axes.legend(handles, [textwrap.fill(str(label), 23) for label in labels], borderaxespad=0.2, **look)
+
+
+def _legend_above(figure: Figure, top: float) -> None:
+    """Write each entry of the panels once, in a row.  top: its upper edge, of the figure's height."""
+    entries = {
+        str(label): handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        if label
+    }
+    figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="upper left",
+        bbox_to_anchor=(_LEFT / WIDTH - 0.01, top),
+        ncols=len(entries),
+        handlelength=2.2,
+        borderaxespad=0.0,
+        borderpad=0.2,
+    )

@@ -1,85 +1,251 @@
-"""The pictures of a plan and its flight, ready for a file or a page.
+"""The figures of a plan and its flight: one list, which PNG files, the page's charts and its captions read.
 
-Each is drawn by a module of `logs.views`.  Importing this module imports matplotlib (most of a second): commands
-import it when they draw.
+A figure is described by a builder in a module of its own (`logs.views.profile`, ...) and drawn by both renderers.
+To add one, write its module and one entry here.
 """
 
-from pathlib import Path
-from typing import Any
-
-from matplotlib.figure import Figure
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Verdict
 from logs.verdict.measures.route_requirements import with_fence_zones
-from logs.views.drawing import png_bytes, svg_bytes
-from logs.views.envelope import draw_envelope_and_flight
-from logs.views.map import draw_map
-from logs.views.profile import draw_profile
-from logs.views.scene import draw_scene
-from logs.views.time_series import draw_controls, draw_energy, draw_exposure, draw_time_plots
-from logs.views.turns import draw_turns
-from world.files import write_whole
+from logs.views.charts import Chart, chart_json
+from logs.views.envelope import envelope_chart
+from logs.views.failures import failures
+from logs.views.map import MapChart, flight_map, map_json
+from logs.views.moments import waypoint_names
+from logs.views.profile import profile_chart
+from logs.views.scene import SceneView, scene_data
+from logs.views.time_series import control_chart, energy_chart, exposure_chart, time_chart
+from logs.views.turns import turn_chart
 
-__all__ = [
-    "FIGURE_FILES", "draw_figures", "draw_map", "draw_pictures", "draw_profile", "draw_time_plots", "write_png",
-]  # fmt: skip
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-# Those that are files too, beside the page; the others are in the page alone.
-FIGURE_FILES = ("map", "profile", "scene", "turns", "envelope")
+View = Chart | MapChart | SceneView
 
 
-def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, Figure]:
-    """Draw all pictures of a flight, or of a plan that was not flown, by name; what has no data is left out.
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What figures are drawn of.
+
+    setup: with the mission's fence among the zones.
+    track: with at least one row; None for a plan that was not flown.
+    """
+
+    setup: FlightSetup
+    track: Track | None
+    verdict: Verdict
+
+    @property
+    def things(self) -> str:
+        """Ground, threats and paths in words."""
+        legs, threats = self.setup.route.legs, len(self.setup.scenario.threats)
+        ground = "shaded terrain" if self.setup.scenario.terrain is not None else "no terrain"
+        return f"{ground}, {threats} threats, the planned path of {legs} legs{self.flown(' and the flown track')}."
+
+    def flown(self, words: str, otherwise: str = "") -> str:
+        """Words that are true of a flight, and others of a bare plan."""
+        return words if self.track is not None else otherwise
+
+
+@dataclass(frozen=True, slots=True)
+class FigureEntry:
+    """One figure.
+
+    name: of its section in the page and of its file.
+    title: its heading.
+    view: builds its description; None where there is nothing to draw.
+    alternative: its text for those who cannot see it.
+    caption: how to read it.
+    file: whether it is a file, too, beside the page.
+    """
+
+    name: str
+    title: str
+    view: Callable[[Subject], View | None]
+    alternative: Callable[[Subject], str]
+    caption: Callable[[Subject], str]
+    file: bool = True
+
+
+def _paths(subject: Subject) -> dict[str, Any]:
+    plan = subject.setup.plan
+    return {
+        "plan_waypoints": plan.waypoints if plan is not None else None,
+        "route_waypoints": subject.setup.route.waypoints,
+        "track": subject.track,
+        "verdict": subject.verdict,
+    }
+
+
+def _map(subject: Subject) -> MapChart:
+    return flight_map(subject.setup.scenario, **_paths(subject), waypoint_words=waypoint_names(subject.setup))
+
+
+def _scene(subject: Subject) -> SceneView:
+    waypoints = len(subject.setup.route.waypoints)
+    return SceneView(subject.setup, subject.track, failures(subject.verdict, waypoints))
+
+
+def _of_flight(build: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
+    return lambda subject: None if subject.track is None else build(subject.setup, subject.track)
+
+
+def _text(words: str) -> Callable[[Subject], str]:
+    return lambda _: words
+
+
+def _map_caption(subject: Subject) -> str:
+    arcs = " Where they part, at corners, the aircraft flies an arc inside the waypoint."
+    flown = "The broad line is the plan, the thin line on it the flight." + (
+        arcs if subject.setup.source is None else ""
+    )
+    return subject.flown(flown, "Nothing was flown: the line is the plan.")
+
+
+# In the page's order.
+FIGURES = (
+    FigureEntry(
+        "map", "Map", _map,
+        alternative=lambda subject: f"Map, north up: {subject.things}",
+        caption=_map_caption,
+    ),
+    FigureEntry(
+        "profile", "Profile", lambda subject: profile_chart(subject.setup.scenario, **_paths(subject)),
+        alternative=lambda subject: (
+            f"Heights along the path: terrain, required clearance, {subject.flown('planned and flown', 'planned')} "
+            "heights, the ceiling, and the missile and radar spheres that stand over the path."
+        ),
+        caption=lambda subject: (
+            subject.flown("Flown heights stand at the flight's progress along the planned path. ")
+            + "A sphere is cut where the path runs through its column of air; the path is within reach only where its "
+            "line lies inside the cut."
+        ),
+    ),
+    FigureEntry(
+        "scene", "3-D view", _scene,
+        alternative=lambda subject: f"View from aside: {subject.things}",
+        caption=_text(
+            "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. "
+            "What a ridge hides shows faintly."
+        ),
+    ),
+    FigureEntry(
+        "turns", "Turn by turn, leg by leg", lambda subject: turn_chart(subject.setup.scenario.name, subject.verdict),
+        alternative=_text(
+            "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground, waypoint, and "
+            "of the distance from the legs."
+        ),
+        caption=_text(
+            "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's, and of a waypoint "
+            "what counts as reached. Ringed: fails."
+        ),
+    ),
+    FigureEntry(
+        "time", "Over time", _of_flight(time_chart), file=False,
+        alternative=_text(
+            "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground."
+        ),
+        caption=_text(
+            "Cross-track and height error are what guidance saw, against the path with its corners rounded. Height "
+            "above ground is computed from track and terrain."
+        ),
+    ),
+    FigureEntry(
+        "exposure", "Exposure", _of_flight(exposure_chart), file=False,
+        alternative=_text(
+            "Plots along the flown distance: strength and sum of the exposure to missiles and to radars."
+        ),
+        caption=_text(
+            "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 at one scale's distance "
+            "(Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So far: its sum over time."
+        ),
+    ),
+    FigureEntry(
+        "controls", "Controls", _of_flight(control_chart), file=False,
+        alternative=_text(
+            "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits."
+        ),
+        caption=_text("Shaded: the command stands at the control's limit, and the aircraft can give no more."),
+    ),
+    FigureEntry(
+        "energy", "Energy", _of_flight(energy_chart), file=False,
+        alternative=_text(
+            "Plots over time: battery energy used, power, current, and the aircraft's energy as a height."
+        ),
+        caption=_text("Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for."),
+    ),
+    FigureEntry(
+        "envelope", "Envelope", lambda subject: envelope_chart(subject.setup, subject.track),
+        alternative=_text(
+            "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit."
+        ),
+        caption=_text(
+            "Lines: the steepest steady climb and descent of the aircraft, from trims of its model. A dot may stand "
+            "outside for a moment, in a gust or a pull-up; a leg may not."
+        ),
+    ),
+)  # fmt: skip
+
+
+def subject_of(setup: FlightSetup, track: Track | None, verdict: Verdict) -> Subject:
+    """What figures are drawn of; a track without a row is none."""
+    return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict)
+
+
+def figure_views(subject: Subject) -> dict[str, View]:
+    """Descriptions of all figures of a flight, or of a plan that was not flown, by name; what has no data is left out.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.judge_geometry import judge_geometry
     >>> setup = example_log().setup
-    >>> list(draw_figures(setup, None, judge_geometry(setup)))
+    >>> list(figure_views(subject_of(setup, None, judge_geometry(setup))))
     ['map', 'profile', 'scene', 'turns', 'envelope']
     """
-    drawn = with_fence_zones(setup)
-    plan = setup.plan.waypoints if setup.plan is not None else None
-    paths: dict[str, Any] = {"plan_waypoints": plan, "route_waypoints": setup.route.waypoints}
-    flown = track if track is not None and len(track) else None
-    found: dict[str, Figure | None] = {
-        "map": draw_map(drawn.scenario, **paths, track=flown, verdict=verdict),
-        "profile": draw_profile(drawn.scenario, **paths, track=flown, verdict=verdict),
-        "scene": draw_scene(drawn, flown, verdict),
-        "turns": draw_turns(setup.scenario.name, verdict),
-        "envelope": draw_envelope_and_flight(setup, flown),
-    }
-    if flown is not None:
-        found |= {
-            "time": draw_time_plots(setup, flown),
-            "exposure": draw_exposure(setup, flown),
-            "controls": draw_controls(setup, flown),
-            "energy": draw_energy(setup, flown),
-        }
-    return {name: figure for name, figure in found.items() if figure is not None}
+    found = ((entry.name, entry.view(subject)) for entry in FIGURES)
+    return {name: view for name, view in found if view is not None}
 
 
-def draw_pictures(setup: FlightSetup, track: Track | None, verdict: Verdict, *, svg: bool = False) -> dict[str, bytes]:
-    """Render the pictures, each 1500 px wide: file names (`map.png`) and bytes.
+def draw(view: View) -> "Figure":
+    """Draw a description with matplotlib, which takes most of a second to import."""
+    from logs.views.draw_map import draw_map
+    from logs.views.draw_scene import draw_scene
+    from logs.views.drawing import draw_chart
 
-    svg: those of `FIGURE_FILES` as `map.svg` and so on, too.
+    if isinstance(view, MapChart):
+        return draw_map(view)
+    return draw_scene(view) if isinstance(view, SceneView) else draw_chart(view)
+
+
+def view_json(view: View) -> dict[str, Any]:
+    """A description as what JSON can hold, for the page."""
+    if isinstance(view, MapChart):
+        return map_json(view)
+    return scene_data(view) if isinstance(view, SceneView) else chart_json(view)
+
+
+def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, "Figure"]:
+    """Draw all figures by name; what has no data is left out."""
+    return {name: draw(view) for name, view in figure_views(subject_of(setup, track, verdict)).items()}
+
+
+def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
+    """Render figures, each 1500 px wide: file names (`map.png`) and bytes.
+
+    svg: those that are files as `map.svg` and so on, too.
     """
-    figures = draw_figures(setup, track, verdict)
+    from logs.views.drawing import png_bytes, svg_bytes
+
+    figures = {name: draw(view) for name, view in views.items()}
     found = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
     if svg:
-        found |= {f"{name}.svg": svg_bytes(figures[name]) for name in FIGURE_FILES if name in figures}
+        found |= {
+            f"{entry.name}.svg": svg_bytes(figures[entry.name])
+            for entry in FIGURES
+            if entry.file and entry.name in figures
+        }
     return found
-
-
-def write_png(figure: Figure, path: Path) -> None:
-    """Write the figure as a PNG, whole or not at all.  Raises OSError.
-
-    >>> import tempfile
-    >>> from logs.views.drawing import new_figure
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_png(new_figure(2.0), Path(folder) / "empty.png")
-    ...     (Path(folder) / "empty.png").read_bytes()[1:4]
-    b'PNG'
-    """
-    write_whole(path, png_bytes(figure))

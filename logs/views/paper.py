@@ -8,30 +8,24 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
-from numpy.typing import NDArray
+from matplotlib.ticker import MaxNLocator
 
-from logs.views import drawing
-from logs.views.failures import LabelPlacer
-from logs.views.map import draw_ground, draw_legend
-from logs.views.threats_and_zones import draw_threat_circles
+from logs import theme
+from logs.views.charts import Floats, Label, Layer, Panel, legend_entries
+from logs.views.draw_map import draw_ground, map_frame
+from logs.views.drawing import clean_style, draw_layers, draw_legend, legend_handle, new_figure, write_label
+from logs.views.labels import LabelPlacer
+from logs.views.threats_and_zones import threat_circles
 from world.scenario import Scenario
 
-Floats = NDArray[np.float64]
-
-# Inches: as the map's.
-_LEFT, _MAP_WIDTH, _TOP, _BOTTOM = 0.72, 7.72, 0.5, 0.55
-# Height of the legend, and of one with a line pair for each encoding, inches.
-_LEGEND, _TALL_LEGEND = 0.85, 1.2
-_COLUMN = 8.72
+# Inches: left of the map, height of the legend, of one with a line pair for each encoding, and the column beside.
+_LEFT, _TOP, _LEGEND, _TALL_LEGEND, _COLUMN = 0.72, 0.5, 0.85, 1.2, 8.72
 # One look for each algorithm of a figure, distinct without colour too.
-_LOOKS: tuple[dict[str, Any], ...] = (
-    {"color": drawing.BLUE, "linestyle": "-"},
-    {"color": drawing.FAIL, "linestyle": (0, (5, 1.5))},
-    {"color": drawing.INK, "linestyle": (0, (1.2, 1.2))},
-    {"color": drawing.LIMIT, "linestyle": (0, (4, 1.2, 1, 1.2))},
-    {"color": drawing.PLANNED, "linestyle": (0, (7, 2))},
-    {"color": drawing.QUIET, "linestyle": (0, (2.5, 1.5))},
+_DASHES: tuple[Any, ...] = (
+    "-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (4, 1.2, 1, 1.2)), (0, (7, 2)), (0, (2.5, 1.5)),
+)  # fmt: skip
+_LOOKS: tuple[dict[str, Any], ...] = tuple(
+    {"color": shade, "linestyle": dashes} for shade, dashes in zip(theme.SERIES, _DASHES, strict=True)
 )
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 
@@ -56,7 +50,7 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
     """
     safe = sum(path.safe for path in paths)
     title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe} safe"
-    with drawing.clean_style():
+    with clean_style():
         figure, axes, around = _map(scenario, title, _LEGEND)
         handles: list[Any] = []
         for good, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
@@ -86,7 +80,7 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: in
     >>> figure.axes[0].get_title(loc="left")
     'example: one path of each encoding, seed 1'
     """
-    with drawing.clean_style():
+    with clean_style():
         title = f"{scenario.name}: one path of each encoding, seed {seed}"
         figure, axes, around = _map(scenario, title, _TALL_LEGEND)
         handles = []
@@ -105,27 +99,15 @@ def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, li
     """Ground and threats; returns figure, axes and the legend's entries for them.  legend: its height, inches."""
     low, high = scenario.bounds[:, 0], scenario.bounds[:, 1]
     padding = 0.02 * float((high - low).max())
-    tall = _MAP_WIDTH * float((high[1] - low[1] + 2 * padding) / (high[0] - low[0] + 2 * padding))
-    total = _TOP + tall + _BOTTOM + legend
-    figure = drawing.new_figure(total)
-    base = (legend + _BOTTOM) / total
-    axes = figure.add_axes((_LEFT / drawing.WIDTH, base, _MAP_WIDTH / drawing.WIDTH, tall / total))
-    axes.set(xlim=(low[0] - padding, high[0] + padding), ylim=(low[1] - padding, high[1] + padding), aspect="equal")
-    kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
-    step = drawing.nice_step(float((high - low).max()), 12)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MultipleLocator(step))
-        axis.set_major_formatter(kilometres)
+    (west, south), (east, north) = (low - padding).tolist(), (high + padding).tolist()
+    figure, axes = map_frame((west, east), (south, north), legend)
     axes.set(xlabel="east (km)", ylabel="north (km)")
     axes.set_title(title, fontweight="bold")
     around = draw_ground(figure, axes, scenario.terrain, _COLUMN, _TOP)
-    drawn = draw_threat_circles(axes, scenario.threats, None)
     # Seen from above, whatever a path's height: a path inside a circle may pass over the sphere.
-    for handle in drawn:
-        handle.set_label(
-            "missile: circle of its sphere" if isinstance(handle, Patch) else "radar: circle of its sphere"
-        )
-    return figure, axes, around + drawn
+    threats = Panel("north", "m", threat_circles(scenario.threats, None, frozenset()))
+    draw_layers(axes, threats)
+    return figure, axes, around + [legend_handle(entry) for entry in legend_entries([threats])]
 
 
 def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
@@ -133,15 +115,12 @@ def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
     placer = LabelPlacer(axes)
     for path in paths:
         placer.avoid(path[:, 0], path[:, 1])
-    handles: list[Any] = []
-    for point, marker, size, name in (
-        (scenario.start, "^", 9.0, "start"),
-        (scenario.destination, "*", 13.0, "destination"),
-    ):
-        look: dict[str, Any] = {"markersize": size, "markerfacecolor": drawing.MARKER, "markeredgecolor": "black"}
-        handles += axes.plot(*point[:2], marker, zorder=8, linestyle="", label=name, **look)
-        placer.place(name, float(point[0]), float(point[1]), size=8.0, gap=12.0, fontweight="bold")
-    return handles
+    ends = (("start", scenario.start), ("destination", scenario.destination))
+    panel = Panel("north", "m", tuple(Layer("dots", name, name, at[:1], at[1:2]) for name, at in ends))
+    draw_layers(axes, panel, above=6.0)
+    for name, at in ends:
+        write_label(placer, Label(name, float(at[0]), float(at[1]), "end"))
+    return [legend_handle(entry) for entry in legend_entries([panel])]
 
 
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
@@ -156,8 +135,8 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
     ('30 threats', 'length ratio of the safe ones')
     """
     count = len(histories)
-    with drawing.clean_style():
-        figure = drawing.new_figure(6.0)
+    with clean_style():
+        figure = new_figure(6.0)
         grid = figure.add_gridspec(
             2, count, left=0.075, right=0.985, top=0.9, bottom=0.15, wspace=0.28 if count > 1 else 0.2, hspace=0.16
         )
@@ -174,12 +153,17 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
             upper.tick_params(labelbottom=False)
             lower.set(xlabel="generation")
             for axes in (upper, lower):
-                axes.grid(linewidth=0.4, color="#dddddd")
+                axes.grid(linewidth=0.4, color=theme.colour("grid"))
                 axes.set_axisbelow(True)
             if not lower.lines:
                 lower.set_yticks([])
                 lower.text(
-                    0.5, 0.5, "no run holds\na safe path", transform=lower.transAxes, ha="center", color=drawing.QUIET
+                    0.5,
+                    0.5,
+                    "no run holds\na safe path",
+                    transform=lower.transAxes,
+                    ha="center",
+                    color=theme.colour("quiet"),
                 )
             if column == 0:
                 upper.set_ylabel("runs that hold a safe path")
@@ -188,7 +172,7 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
         handles: list[Any] = [
             Line2D([], [], linewidth=1.8, label=name, **look) for name, look in zip(names, _LOOKS, strict=False)
         ]
-        handles.append(Patch(facecolor="#cccccc", label="below: line = median, band = shortest to longest"))
+        handles.append(Patch(facecolor=theme.colour("rule"), label="below: line = median, band = shortest to longest"))
         figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.065, 0.005), ncols=4)
     return figure
 

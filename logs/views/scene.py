@@ -1,38 +1,33 @@
-"""The 3-D picture: ground, threats, plan and flight from aside, for paper and for where no script runs."""
+"""The 3-D scene as data: ground, threats, zones and plan, for the page as what JSON can hold."""
 
 import base64
 import json
-import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Verdict
-from logs.views import drawing
-from logs.views.failures import Failures, LabelPlacer, failures, route_distance, route_samples
-from logs.views.map import draw_legend, failing_handles
-from logs.views.threats_and_zones import zone_handles
+from logs.views.charts import Floats
+from logs.views.failures import Failures
 from world.airspace.zones_on_map import zone_walls
 from world.terrain import Terrain
 
-Floats = NDArray[np.float64]
-
-
-# ----------------------------------------------------------------------
-# Ground, threats and plan as the data of the 3-D pictures; for the report's page as what JSON can hold.
-
-
 MAX_GROUND = 250  # vertices a side: index numbers of the mesh stay below 65,536
 MISSING = 65535
+
+
+@dataclass(frozen=True, slots=True)
+class SceneView:
+    """What the 3-D picture and the page's 3-D view show.
+
+    setup: with the mission's fence among the zones.  track: None for a plan that was not flown.
+    """
+
+    setup: FlightSetup
+    track: Track | None
+    failed: Failures
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,13 +88,13 @@ def script_json(data: object) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def scene_data(setup: FlightSetup, track: Track | None, failed: Failures) -> dict[str, object]:
-    """The scene as what JSON can hold; the flight itself is not in it.
+def scene_data(view: SceneView) -> dict[str, object]:
+    """The scene as what JSON can hold; of the flight only how far the scene reaches.
 
-    track: for how far the scene reaches.
     Lengths are in m; heights of the ground are 16-bit shares of their range, little-endian, in base64.
     """
-    bounds = scene_bounds(setup, track)
+    setup, failed = view.setup, view.failed
+    bounds = scene_bounds(setup, view.track)
     grid = ground_grid(setup.scenario.terrain, bounds, MAX_GROUND)
     threats = setup.scenario.threats
     return {
@@ -147,286 +142,3 @@ def _ground(grid: GroundGrid) -> dict[str, object]:
         "high": high,
         "heights": base64.b64encode(steps.tobytes()).decode("ascii"),
     }
-
-
-_LEFT, _RIGHT, _TOP, _BOTTOM = 0.15, 0.15, 0.5, 0.8
-_ELEVATION = math.radians(36.0)
-_MAX_CELLS, _MAX_TRACK = 130, 1600
-# Of the ground drawn, the shorter side of the longer one, at least; what is narrower is seen from this much further
-# round, rad.
-_MIN_SIDE, _ASLANT = 0.3, math.radians(45.0)
-_MAX_NUMBERS, _MAX_NAMES = 40, 30
-
-
-@dataclass(frozen=True, slots=True)
-class Projection:
-    """A parallel projection.
-
-    azimuth: rad, from east to north, of the direction from the middle to the viewer.  middle: (3,) m.  stretch: of
-    heights.
-    """
-
-    azimuth: float
-    middle: Floats
-    stretch: float
-
-    def project(self, points: Floats) -> Floats:
-        """Picture coordinates in m and, as the third, depth towards the viewer: (..., 3) from (..., 3)."""
-        e, n, u = np.moveaxis(points - self.middle, -1, 0)
-        out, side = math.cos(self.azimuth), math.sin(self.azimuth)
-        across = -side * e + out * n
-        toward = out * e + side * n
-        high = self.stretch * u
-        sin, cos = math.sin(_ELEVATION), math.cos(_ELEVATION)
-        return np.stack([across, cos * high - sin * toward, sin * high + cos * toward], axis=-1)
-
-    @property
-    def toward(self) -> Floats:
-        """Step in world axes, 1 m on the ground, that leads to the viewer."""
-        return np.array([math.cos(self.azimuth), math.sin(self.azimuth), math.tan(_ELEVATION) / self.stretch])
-
-
-def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None) -> Figure:
-    """Draw the scene from aside of the line from start to destination, heights stretched by the factor in the title.
-
-    Lines are dashed and thin behind a ridge.  A long and narrow scene is seen more from its end, with ground about it,
-    so that it is no strip.
-    """
-    all_of_it = scene_bounds(setup, track)
-    bounds = _widened(all_of_it)
-    narrow = not np.array_equal(bounds, all_of_it)
-    terrain = setup.scenario.terrain
-    grid = ground_grid(terrain, bounds, _MAX_CELLS)
-    route = setup.route.waypoints
-    projection = _projection(route, bounds, exaggeration(setup, bounds, grid), narrow)
-    failed = failures(verdict, len(route))
-    with drawing.clean_style():
-        figure, axes = _frame(setup, projection, bounds, grid)
-        handles = _ground_surface(axes, projection, grid, bounds)
-        handles += _threats(axes, projection, setup, failed)
-        handles += _zones(axes, projection, setup)
-        placer = LabelPlacer(axes)
-        handles += _paths(axes, projection, terrain, route, track, failed, placer)
-        _labels(setup, projection, route, failed, placer)
-        name = drawing.shorten(setup.scenario.name, 60)
-        times = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
-        side = _direction(projection.azimuth)
-        axes.set_title(f"{name}: seen from the {side}, {times}", fontweight="bold")
-        draw_legend(figure, handles, _LEFT + 0.1, (_BOTTOM - 0.08) / float(figure.get_figheight()))
-    return figure
-
-
-def _widened(bounds: Floats) -> Floats:
-    """Ground about a narrow scene, (2, 2) m: no side is less than a share of the other."""
-    sides = np.ptp(bounds, axis=1)
-    more = 0.5 * np.maximum(_MIN_SIDE * sides.max() - sides, 0.0)
-    return np.asarray(bounds + np.stack([-more, more], axis=1))
-
-
-def _projection(route: Floats, bounds: Floats, stretch: float, narrow: bool) -> Projection:
-    step = route[-1] - route[0]
-    azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
-    if math.sin(azimuth) > 0.0:
-        azimuth += math.pi
-    azimuth += _ASLANT if narrow else 0.0
-    return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
-
-
-def _direction(azimuth: float) -> str:
-    names = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
-    return names[round(azimuth / (math.pi / 4.0)) % 8]
-
-
-def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None) -> tuple[Figure, Any]:
-    low = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
-    corners = np.array([[e, n, low] for e in bounds[0] for n in bounds[1]])
-    threats = setup.scenario.threats
-    tops = threats.position + np.maximum(threats.kill_radius, threats.detection_radius)[:, None] * np.array([0, 0, 1.0])
-    drawn = [projection.project(corners), projection.project(setup.route.waypoints), projection.project(tops)]
-    if grid is not None:
-        e, n = np.meshgrid(grid.east, grid.north)
-        surface = projection.project(np.stack([e, n, grid.heights], axis=-1)).reshape(-1, 3)
-        drawn.append(surface[np.isfinite(surface).all(axis=1)])
-    together = np.vstack(drawn)[:, :2]
-    least, most = together.min(axis=0), together.max(axis=0)
-    padding = 0.03 * float((most - least).max())
-    least, most = least - padding, most + padding
-    wide = drawing.WIDTH - _LEFT - _RIGHT
-    # A flat scene gets air above and below it.
-    short = max(0.0, 3.0 / wide * (most[0] - least[0]) - (most[1] - least[1]))
-    least[1], most[1] = least[1] - 0.5 * short, most[1] + 0.5 * short
-    tall = float(np.clip(wide * (most[1] - least[1]) / (most[0] - least[0]), 3.0, 8.0))
-    total = tall + _TOP + _BOTTOM
-    figure = drawing.new_figure(total)
-    axes = figure.add_axes((_LEFT / drawing.WIDTH, _BOTTOM / total, wide / drawing.WIDTH, tall / total))
-    axes.set(xlim=(least[0], most[0]), ylim=(least[1], most[1]), facecolor="#edf2f7")
-    axes.set_aspect("equal", adjustable="box")
-    axes.set(xticks=[], yticks=[])
-    for spine in axes.spines.values():
-        spine.set_color("#cccccc")
-    return figure, axes
-
-
-def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
-    """Cells from the farthest to the nearest, shaded by light from the north-west."""
-    if grid is None:
-        base = float(projection.middle[2])
-        corners = np.array(
-            [[e, n, base] for e, n in zip(bounds[0][[0, 1, 1, 0]], bounds[1][[0, 0, 1, 1]], strict=True)]
-        )
-        axes.add_collection(
-            PolyCollection([projection.project(corners)[:, :2]], facecolor="#f4f4f4", edgecolor="#999999", zorder=1)
-        )
-        return [Patch(facecolor="#f4f4f4", edgecolor="#999999", label="no terrain: level at mid height")]
-    e, n = np.meshgrid(grid.east, grid.north)
-    corners = projection.project(np.stack([e, n, grid.heights], axis=-1))
-    cells = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=2).reshape(-1, 4, 3)
-    up_north, up_east = np.gradient(
-        np.nan_to_num(grid.heights, nan=float(np.nanmin(grid.heights))), grid.north, grid.east
-    )
-    slope_e, slope_n = projection.stretch * up_east, projection.stretch * up_north
-    lit = (0.5 * slope_e - 0.5 * slope_n + 0.8) / np.sqrt(1.14 * (1.0 + slope_e**2 + slope_n**2))
-    low, high = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
-    colours = LinearSegmentedColormap.from_list("ground", drawing.GROUND)((grid.heights - low) / max(high - low, 1.0))
-    colours[..., :3] *= np.clip(0.55 + 0.5 * lit, 0.35, 1.0)[..., None]
-    faces = 0.25 * (colours[:-1, :-1] + colours[:-1, 1:] + colours[1:, 1:] + colours[1:, :-1]).reshape(-1, 4)
-    good = np.isfinite(cells).all(axis=(1, 2))
-    order = np.flatnonzero(good)[np.argsort(cells[good][:, :, 2].mean(axis=1), kind="stable")]
-    # Edges in the cells' own colour close the seams that antialiasing leaves.
-    axes.add_collection(
-        PolyCollection(
-            list(cells[order][:, :, :2]),
-            facecolor=faces[order],
-            edgecolor=faces[order],
-            linewidth=0.4,
-            zorder=1,
-            rasterized=True,
-        )
-    )
-    return []
-
-
-def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
-    """Outlines of the spheres' upper halves, on the height of their centres; broad where they are entered."""
-    threats = setup.scenario.threats
-    handles: list[Any] = []
-    # A stretched dome of radius 1: the far half of its outline, and the near half of its foot.
-    tall = math.hypot(math.sin(_ELEVATION), projection.stretch * math.cos(_ELEVATION))
-    round_it = np.linspace(0.0, 2.0 * math.pi, 97)
-    high = np.where(round_it < math.pi, tall, math.sin(_ELEVATION)) * np.sin(round_it)
-    shape = np.column_stack([np.cos(round_it), high])
-    for radii, look, label in (
-        (threats.kill_radius, {"facecolor": (0.835, 0.369, 0.0, 0.2), "edgecolor": drawing.MISSILE}, "missile's reach"),
-        (
-            threats.detection_radius,
-            {"facecolor": "none", "edgecolor": drawing.RADAR, "linestyle": (0, (4, 2.5))},
-            "radar's reach",
-        ),
-    ):
-        some = np.flatnonzero(radii > 0.0)
-        for k in some:
-            dome = projection.project(threats.position[k])[:2] + float(radii[k]) * shape
-            axes.add_patch(Polygon(dome, linewidth=0.9, zorder=3, **look))
-        kind = "missile" if radii is threats.kill_radius else "radar"
-        for entered in (place.index or 0 for place in failed.threats if place.kind == kind):
-            dome = projection.project(threats.position[entered])[:2] + float(radii[entered]) * shape
-            axes.add_patch(Polygon(dome, fill=False, edgecolor=drawing.FAIL, linewidth=2.2, zorder=4.6))
-        if some.size:
-            handles.append(Patch(linewidth=1.1, label=label, **look))
-    return handles
-
-
-def _zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
-    """Walls of the zones, from ground or floor to the ceiling, or to above the path."""
-    zones, route = setup.scenario.zones, setup.route.waypoints
-    low, top = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
-    for zone in zones:
-        fill = (*drawing.ZONE_FILL, 0.10 if zone.kind == "exclusion" else 0.03)
-        for wall in zone_walls(zone, setup.scenario.terrain, low, top):
-            drawn = projection.project(wall)[:, :, :2]
-            sides = np.concatenate([drawn[:-1], drawn[1:, ::-1]], axis=1)
-            axes.add_collection(PolyCollection(list(sides), facecolor=fill, edgecolor="none", zorder=3.2))
-            width = 1.1 if zone.kind == "exclusion" else 2.0
-            for edge in (0, 1):
-                axes.plot(*drawn[:, edge].T, color=drawing.ZONE, linewidth=width, alpha=0.4 + 0.6 * edge, zorder=3.3)
-    return zone_handles(zones)
-
-
-def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
-    """Whether the ground stands between each point (n, 3) and the viewer."""
-    hidden = np.zeros(len(points), dtype=bool)
-    if terrain is None:
-        return hidden
-    for distance in np.geomspace(2.0 * terrain.spacing, 15_000.0, 70):
-        there = points + distance * projection.toward
-        hidden |= terrain.height(there[:, 0], there[:, 1]) > there[:, 2]
-    return hidden
-
-
-def _paths(
-    axes: Any,
-    projection: Projection,
-    terrain: Terrain | None,
-    route: Floats,
-    track: Track | None,
-    failed: Failures,
-    placer: LabelPlacer,
-) -> list[Any]:
-    _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
-    if terrain is not None:
-        under = terrain.height(route[:, 0], route[:, 1])
-        feet = np.column_stack([route[:, :2], np.where(np.isfinite(under), under, route[:, 2])])
-        poles = np.stack([projection.project(route)[:, :2], projection.project(feet)[:, :2]], axis=1)
-        axes.add_collection(LineCollection(list(poles), colors="#555555", linewidths=0.7, zorder=4))
-    for leg in failed.legs:
-        ends = projection.project(route[leg : leg + 2])
-        axes.plot(
-            ends[:, 0], ends[:, 1], color=drawing.FAIL, linewidth=9.0, alpha=0.9, zorder=4.5, solid_capstyle="butt"
-        )
-    _line(axes, projection, terrain, samples, drawing.PLANNED, 3.6, 5)
-    handles: list[Any] = [Line2D([], [], color=drawing.PLANNED, linewidth=3.6, label="planned path")]
-    if track is not None:
-        _line(axes, projection, terrain, track.position[drawn_rows(track, _MAX_TRACK)], drawing.FLOWN, 1.2, 6)
-        handles.append(Line2D([], [], color=drawing.FLOWN, linewidth=1.2, label="flown track"))
-    corners = projection.project(route)
-    placer.avoid(*projection.project(samples)[:, :2].T)
-    axes.plot(corners[:, 0], corners[:, 1], "o", color="white", markeredgecolor=drawing.BLUE, markersize=3.8, zorder=7)
-    for waypoint in failed.waypoints:
-        axes.plot(*corners[waypoint, :2], "o", markersize=12, mfc="none", mec=drawing.FAIL, mew=2.2, zorder=7.5)
-    if terrain is not None:
-        handles.append(Line2D([], [], color="#555555", linewidth=0.7, label="waypoint above the ground"))
-    return handles + failing_handles(failed)
-
-
-def _line(
-    axes: Any, projection: Projection, terrain: Terrain | None, points: Floats, colour: str, width: float, order: float
-) -> None:
-    """Draw a path, thin and dashed where the ground hides it."""
-    projected = projection.project(points)
-    hidden = _hidden(projection, terrain, points)
-    open_part = np.where(hidden[:, None], np.nan, projected[:, :2])
-    # The hidden rows and their neighbours, so that the two parts meet.
-    near = hidden | np.roll(hidden, 1) | np.roll(hidden, -1)
-    shut_part = np.where(near[:, None], projected[:, :2], np.nan)
-    axes.plot(*open_part.T, color=colour, linewidth=width, zorder=order, solid_capstyle="round")
-    axes.plot(*shut_part.T, color=colour, linewidth=0.5 * width, alpha=0.6, linestyle=(0, (2, 1.5)), zorder=order)
-
-
-def _labels(setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    corners = projection.project(route)
-    last = len(route) - 1
-    for k, name in ((0, "start"), (last, "destination")):
-        placer.place(name, *corners[k, :2].tolist(), size=8.0, gap=10.0, fontweight="bold")
-    step = max(1, -(-len(route) // _MAX_NUMBERS))
-    for k in range(1, last):
-        if k % step == 0 or k in failed.waypoints:
-            colour = drawing.FAIL if k in failed.waypoints else drawing.BLUE
-            placer.place(str(k), *corners[k, :2].tolist(), size=7.5, gap=7.0, color=colour, fontweight="bold")
-    threats = setup.scenario.threats
-    entered = failed.threat_names()
-    named = list(zip(threats.names, projection.project(threats.position), strict=True))
-    # Entered ones first: they have the best places.
-    for k in sorted(range(min(len(named), _MAX_NAMES)), key=lambda k: k not in entered):
-        name, point = named[k]
-        look: dict[str, Any] = {"color": drawing.FAIL, "fontweight": "bold"} if k in entered else {"optional": True}
-        placer.place(drawing.shorten(name, 20), *point[:2].tolist(), size=6.5, gap=2.0, **look)

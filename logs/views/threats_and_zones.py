@@ -1,81 +1,89 @@
 """Threats and zones on the map (their outlines) and on the profile (the part of each that stands over the path)."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib.collections import PatchCollection
-from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch, PathPatch
-from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from logs.views import drawing
-from logs.views.failures import Failures, LabelPlacer, radius_of, route_samples
+from logs.views.charts import Floats, Label, Layer, shorten
+from logs.views.failures import Failures, radius_of, route_samples
 from world.airspace.zone_kernels import edge_distance, zone_records
 from world.airspace.zones import Zone, ZoneLevel
 from world.airspace.zones_on_map import level_heights, zone_rings
 from world.threats import Threats
 
-Floats = NDArray[np.float64]
+# Beyond these numbers, names would be a grey mat: of threats and zones on the map, and on the profile.
+_MAX_NAMES, _MAX_ZONE_NAMES, _MAX_CUT_NAMES = 80, 40, 24
+_TURN = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
-# ----------------------------------------------------------------------
-# Threats on the map (circles) and on the profile (the part of each sphere that stands over the path).
+# Threats.
 
 
-_DASHES = (0, (4, 2.5))
+def threat_circles(threats: Threats, route: Floats | None, entered: frozenset[int]) -> tuple[Layer, ...]:
+    """Circles of missiles and radars from above, m: a line for the sphere, filled as far as it reaches at the path.
 
-
-def draw_threat_circles(axes: Any, threats: Threats, route: Floats | None) -> list[Any]:
-    """Draw circles of missiles and radars; returns what the legend shows of them."""
-    handles: list[Any] = []
-    missiles = np.flatnonzero(threats.kill_radius > 0.0)
-    radars = np.flatnonzero(threats.detection_radius > 0.0)
-    centres = threats.position[:, :2]
-    if missiles.size:
-        radii = kill_radius_at_path(threats, missiles, route)
-        axes.add_collection(
-            PatchCollection(
-                [Circle(tuple(centres[k]), float(r)) for k, r in zip(missiles, radii, strict=True) if r > 0.0],
-                facecolor=drawing.MISSILE,
-                alpha=0.3,
-                edgecolor="none",
-                zorder=3,
+    route: (w, 3) m, or None where the spheres alone are shown.  entered: threats whose rule fails.
+    """
+    radars, reach, missiles, units = [], [], [], []
+    shown = np.flatnonzero(threats.kill_radius > 0.0)
+    at_path = np.zeros(len(threats))
+    if shown.size:
+        at_path[shown] = kill_radius_at_path(threats, shown, route)
+    called = "missile: its reach at path height" if route is not None else "missile: circle of its sphere"
+    for k, name in enumerate(threats.names):
+        kill, detection = float(threats.kill_radius[k]), float(threats.detection_radius[k])
+        centre = threats.position[k, :2]
+        words = (_threat_words(name, kill, detection),)
+        if detection > 0.0:
+            x, y = circle(centre, detection)
+            radars.append(
+                Layer(
+                    "line",
+                    name,
+                    "radar",
+                    x,
+                    y,
+                    quiet=True,
+                    legend="radar: circle of its sphere (at altitude it reaches less far)",
+                )
             )
-        )
-        axes.add_collection(
-            PatchCollection(
-                [Circle(tuple(centres[k]), float(threats.kill_radius[k])) for k in missiles],
-                facecolor="none",
-                edgecolor=drawing.MISSILE,
-                linewidth=1.1,
-                zorder=3.1,
-            )
-        )
-        handles.append(
-            Patch(
-                facecolor="#f2bf9f",
-                edgecolor=drawing.MISSILE,
-                label="missile: line = sphere's radius,\nfill = its reach at path height",
-            )
-        )
-    if radars.size:
-        axes.add_collection(
-            PatchCollection(
-                [Circle(tuple(centres[k]), float(threats.detection_radius[k])) for k in radars],
-                facecolor="none",
-                edgecolor=drawing.RADAR,
-                linewidth=1.1,
-                linestyle=_DASHES,
-                zorder=3.2,
-            )
-        )
-        label = "radar: sphere's radius\n(at altitude the reach is smaller)"
-        handles.append(Line2D([], [], color=drawing.RADAR, linewidth=1.1, linestyle=_DASHES, label=label))
-    if len(threats):
-        axes.plot(*centres.T, "x", color="#333333", markersize=3.0, markeredgewidth=0.8, zorder=3.3)
-    return handles
+        if at_path[k] > 0.0:
+            x, y = circle(centre, float(at_path[k]))
+            reach.append(Layer("area", name, "missile-reach", x, y, legend=called, words=words))
+        if kill > 0.0:
+            x, y = circle(centre, kill)
+            fails = k in entered
+            legend = "threat that is entered" if fails else "missile: circle of its sphere"
+            missiles.append(Layer("line", name, "fail" if fails else "missile", x, y, quiet=True, legend=legend))
+        units.append(Layer("dots", "", "unit", centre[:1], centre[1:], words=words))
+    return (*radars, *reach, *missiles, *units)
+
+
+def _threat_words(name: str, kill: float, detection: float) -> str:
+    return "\n".join(
+        [
+            name,
+            *([f"missile: {kill:.0f} m"] if kill > 0.0 else []),
+            *([f"radar: {detection:.0f} m"] if detection else []),
+        ]
+    )
+
+
+def circle(centre: Floats, radius: float) -> tuple[Floats, Floats]:
+    """East and north (73,) of a circle, closed."""
+    return centre[0] + radius * np.cos(_TURN), centre[1] + radius * np.sin(_TURN)
+
+
+def threat_names(threats: Threats, named: frozenset[int] = frozenset()) -> tuple[Label, ...]:
+    """Names of threats at their places on the map.  named: those that have labels of their own."""
+    if len(threats) > _MAX_NAMES:
+        return ()
+    return tuple(
+        Label(shorten(name, 20), float(east), float(north), "name")
+        for k, (name, (east, north, _)) in enumerate(zip(threats.names, threats.position, strict=True))
+        if k not in named
+    )
 
 
 def kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
@@ -103,19 +111,6 @@ def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, 
     return centre[2] - half, centre[2] + half
 
 
-@dataclass(frozen=True, slots=True)
-class SphereName:
-    """Where a sphere's name stands on the profile.
-
-    index: of its threat.  at: (km, m AMSL) on its outline, inside the picture.  prefer: the side of the name.
-    """
-
-    index: int
-    colour: str
-    at: tuple[float, float]
-    prefer: tuple[int, int]
-
-
 def outline_anchor(
     kilometres: Floats, lower: Floats, upper: Floats, low: Floats, high: float
 ) -> tuple[float, float, tuple[int, int]] | None:
@@ -140,93 +135,71 @@ def outline_anchor(
     return None
 
 
-def draw_entered_cuts(
-    axes: Any, threats: Threats, failed: Failures, distance: Floats, points: Floats, ground: Floats | None
-) -> dict[int, tuple[float, float]]:
-    """Draw the cut of each sphere whose rule fails, where it stands over the flight; returns where to label each.
+@dataclass(frozen=True, slots=True)
+class PathPlane:
+    """The vertical plane through a path, in which its profile stands.
 
-    distance: (s,) m along the route, points: (s, 3) m of the flight there, ground: (s,) m AMSL or None.
+    kilometres: (s,) along the path.  points: (s, 3) m.  ground: (s,) m AMSL under them, None where there is none.
+    low, high: what the profile shows, m AMSL.
     """
-    labels: dict[int, tuple[float, float]] = {}
-    low, high = _visible(axes, ground, len(points))
-    kilometres = distance / 1000.0
+
+    kilometres: Floats
+    points: Floats
+    ground: Floats | None
+    low: float
+    high: float
+
+    def visible_low(self) -> Floats:
+        """Lower end of what is seen at each sample, (s,) m AMSL: the ground where it stands in the picture."""
+        base = np.full(len(self.points), self.low)
+        return base if self.ground is None else np.fmax(self.ground, self.low)
+
+
+def threat_cuts(threats: Threats, plane: PathPlane, named: frozenset[int]) -> tuple[list[Layer], list[Label]]:
+    """What missile and radar spheres take of the plane, radars first, and their names, once for each unit.
+
+    named: threats that have labels of their own.
+    """
+    layers: list[Layer] = []
+    labels: dict[int, Label] = {}
+    low, high = plane.points[:, :2].min(axis=0), plane.points[:, :2].max(axis=0)
+    away = np.hypot(*np.maximum(np.maximum(low - threats.position[:, :2], threats.position[:, :2] - high), 0.0).T)
+    for kind, radii in (("radar", threats.detection_radius), ("missile", threats.kill_radius)):
+        for k in np.flatnonzero((radii > 0.0) & (away <= radii)):
+            lower, upper = sphere_cuts(threats.position[k], float(radii[k]), plane.points)
+            over = np.flatnonzero(np.isfinite(upper))
+            if not over.size:
+                continue
+            # One sample more on either side, so that the outline ends where the sphere does.
+            cut = slice(max(0, int(over[0]) - 1), int(over[-1]) + 2)
+            name, legend = f"{threats.names[k][:40]} ({kind})", f"{kind}'s sphere over the path"
+            layers.append(Layer("band", name, kind, plane.kilometres[cut], upper[cut], lower[cut], legend=legend))
+            anchor = outline_anchor(plane.kilometres, lower, upper, plane.visible_low(), plane.high)
+            if anchor is not None and k not in named:
+                role = "radar" if kind == "radar" else "ink"
+                labels[int(k)] = Label(shorten(threats.names[k], 20), anchor[0], anchor[1], "name", role, anchor[2])
+    return layers, list(labels.values())[:_MAX_CUT_NAMES]
+
+
+def entered_cuts(
+    threats: Threats, failed: Failures, plane: PathPlane
+) -> tuple[list[Layer], dict[int, tuple[float, float]]]:
+    """The cut of each sphere whose rule fails, where it stands over the flight, and where to label it, by its index."""
+    layers, places = [], {}
     for place in failed.threats:
         k = place.index or 0
-        lower, upper = sphere_cuts(threats.position[k], radius_of(threats, place), points)
+        lower, upper = sphere_cuts(threats.position[k], radius_of(threats, place), plane.points)
         if not np.isfinite(upper).any():
             continue
-        axes.fill_between(kilometres, lower, upper, color=drawing.FAIL, alpha=0.16, linewidth=0, zorder=2.6)
-        for edge in (lower, upper):
-            axes.plot(kilometres, edge, color=drawing.FAIL, linewidth=1.6, zorder=4.6)
-        anchor = outline_anchor(kilometres, lower, upper, low, high)
+        legend = "threat that is entered"
+        layers.append(Layer("band", legend, "entered", plane.kilometres, upper, lower, quiet=True))
+        anchor = outline_anchor(plane.kilometres, lower, upper, plane.visible_low(), plane.high)
         if anchor is not None:
-            labels[k] = anchor[:2]
-    return labels
+            places[k] = anchor[:2]
+    return layers, places
 
 
-def _visible(axes: Any, ground: Floats | None, count: int) -> tuple[Floats, float]:
-    """Lower end at each of so many samples, the ground where it stands in the picture, and upper end (m AMSL)."""
-    low, high = axes.get_ylim()
-    return np.full(count, low) if ground is None else np.fmax(ground, low), float(high)
-
-
-def draw_threat_cuts(
-    axes: Any, threats: Threats, distance: Floats, points: Floats, ground: Floats | None
-) -> tuple[list[Any], list[SphereName]]:
-    """Fill what missile and radar spheres take of the vertical plane through the path.
-
-    distance: (s,) m along the path, points: (s, 3) m, ground: (s,) m AMSL or None.  Returns the legend's handles, and
-    where to name the spheres that stand over the path, once for each unit.
-    """
-    handles: list[Any] = []
-    names: dict[int, SphereName] = {}
-    bottom, top = _visible(axes, ground, len(points))
-    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    kilometres = distance / 1000.0
-    for radii, colour, label in (
-        (threats.detection_radius, drawing.RADAR, "radar's sphere over the path"),
-        (threats.kill_radius, drawing.MISSILE, "missile's sphere over the path"),
-    ):
-        missile = colour == drawing.MISSILE
-        away = np.maximum(np.maximum(low - threats.position[:, :2], threats.position[:, :2] - high), 0.0)
-        for k in np.flatnonzero((radii > 0.0) & (np.hypot(*away.T) <= radii)):
-            lower, upper = sphere_cuts(threats.position[k], float(radii[k]), points)
-            over = np.isfinite(upper)
-            if not over.any():
-                continue
-            axes.fill_between(
-                kilometres, lower, upper, color=colour, alpha=0.22 if missile else 0.05, linewidth=0, zorder=2
-            )
-            look: dict[str, Any] = {
-                "linewidth": 1.1,
-                "linestyle": "-" if missile else _DASHES,
-                "color": colour,
-                "zorder": 2.2,
-            }
-            axes.plot(kilometres, upper, **look)
-            axes.plot(kilometres, lower, **look)
-            for edge in np.flatnonzero(np.diff(over.astype(np.int8))) + 1:
-                at = kilometres[edge if over[edge] else edge - 1]
-                which = edge if over[edge] else edge - 1
-                axes.plot([at, at], [lower[which], upper[which]], **look)
-            anchor = outline_anchor(kilometres, lower, upper, bottom, top)
-            if anchor is not None:
-                names[int(k)] = SphereName(int(k), drawing.INK if missile else colour, anchor[:2], anchor[2])
-            if not handles or handles[-1].get_label() != label:
-                handles.append(
-                    Patch(facecolor="#f7d2bd", edgecolor=colour, label=label)
-                    if missile
-                    else Patch(facecolor="#eef6f3", edgecolor=colour, linestyle=_DASHES, label=label)
-                )
-    return handles, list(names.values())
-
-
-# ----------------------------------------------------------------------
-# Zones of airspace on the map (their shapes) and on the profile (what they take of the plane through the path).
-
-_HATCH = "////"
-# Beyond this number, names of zones would be a grey mat.
-_MAX_NAMES = 40
+# Zones of airspace.
 
 
 def zone_label(zone: Zone) -> str:
@@ -236,7 +209,7 @@ def zone_label(zone: Zone) -> str:
     >>> zone_label(Zone("mast", "exclusion", Cylinder(0.0, 0.0, 90.0), ceiling=ZoneLevel(120.0, "ground")))
     'mast, below 120 m above ground'
     """
-    name = drawing.shorten(zone.name, 24)
+    name = shorten(zone.name, 24)
     if zone.floor is not None and zone.ceiling is not None:
         if zone.floor.datum == zone.ceiling.datum:
             return f"{name}, {zone.floor.height:g} to {_level_text(zone.ceiling)}"
@@ -250,50 +223,31 @@ def _level_text(level: ZoneLevel) -> str:
     return f"{level.height:g} m {'AMSL' if level.datum == 'amsl' else 'above ground'}"
 
 
-def zone_handles(zones: tuple[Zone, ...]) -> list[Any]:
-    """What the legend shows of zones."""
-    kinds = {zone.kind for zone in zones}
-    handles: list[Any] = []
-    if "exclusion" in kinds:
-        look: dict[str, Any] = {"facecolor": "none", "edgecolor": drawing.ZONE, "hatch": _HATCH, "linewidth": 1.1}
-        handles.append(Patch(label="zone to keep out of", **look))
-    if "inclusion" in kinds:
-        handles.append(Line2D([], [], color=drawing.ZONE, linewidth=2.2, label="edge of a zone to stay in"))
-    return handles
+def zone_shapes(zones: tuple[Zone, ...]) -> tuple[Layer, ...]:
+    """Zones from above, m: exclusions as areas, holes left open, inclusions as lines."""
+    layers = []
+    for zone in zones:
+        gap = np.full((1, 2), np.nan)
+        x, y = np.vstack([np.vstack([ring, gap]) for ring in zone_rings(zone)])[:-1].T
+        words = (zone_label(zone),)
+        if zone.kind == "exclusion":
+            layers.append(Layer("area", zone.name, "zone", x, y, legend="zone to keep out of", words=words))
+        else:
+            layers.append(Layer("line", zone.name, "stay-in", x, y, legend="edge of a zone to stay in", words=words))
+    return tuple(layers)
 
 
-def draw_zone_shapes(axes: Any, zones: tuple[Zone, ...]) -> list[Any]:
-    """Draw zones from above: exclusions hatched, inclusions as a line; returns what the legend shows of them."""
-    looks: dict[str, dict[str, Any]] = {
-        "exclusion": {"facecolor": (*drawing.ZONE_FILL, 0.14), "hatch": _HATCH, "linewidth": 1.1},
-        "inclusion": {"facecolor": "none", "linewidth": 2.2},
-    }
-    for kind, look in looks.items():
-        patches = [PathPatch(_shape(zone)) for zone in zones if zone.kind == kind]
-        if patches:
-            axes.add_collection(PatchCollection(patches, edgecolor=drawing.ZONE, zorder=3.4, **look))
-    return zone_handles(zones)
-
-
-def _shape(zone: Zone) -> Path:
-    """All rings of a zone as one path, so that holes stay open."""
-    return Path.make_compound_path(*(Path(ring, closed=True) for ring in zone_rings(zone)))
-
-
-def name_zones(axes: Any, zones: tuple[Zone, ...], placer: LabelPlacer) -> None:
-    """Write exclusions' names and heights in their middles, inclusions' at their northernmost corner."""
-    if len(zones) > _MAX_NAMES:
-        return
+def zone_names(zones: tuple[Zone, ...]) -> tuple[Label, ...]:
+    """Exclusions' names and heights in their middles, inclusions' at their northernmost corner."""
+    if len(zones) > _MAX_ZONE_NAMES:
+        return ()
+    found = []
     for zone in zones:
         ring = zone_rings(zone)[0]
-        corner = ring[np.argmax(ring[:, 1])]
-        place, gap = (ring[:-1].mean(axis=0), 0.0) if zone.kind == "exclusion" else (corner, 3.0)
-        (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
-        if west < place[0] < east and south < place[1] < north:
-            prefer = (0, 0) if zone.kind == "exclusion" else (0, 1)
-            placer.place(
-                zone_label(zone), *place.tolist(), size=6.0, gap=gap, prefer=prefer, optional=True, color=drawing.ZONE
-            )
+        inside = zone.kind == "exclusion"
+        east, north = (ring[:-1].mean(axis=0) if inside else ring[np.argmax(ring[:, 1])]).tolist()
+        found.append(Label(zone_label(zone), east, north, "name", "zone", (0, 0) if inside else (0, 1)))
+    return tuple(found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,12 +265,12 @@ class ZoneCut:
     where: NDArray[np.bool_]
 
 
-def zone_cuts(zones: tuple[Zone, ...], points: Floats, ground: Floats | None, low: float, high: float) -> list[ZoneCut]:
-    """What zones forbid between low and high (m AMSL) over the points (s, 3); nothing of those away from the path.
-
-    ground: (s,) m AMSL or None.
-    """
-    under = np.full(len(points), low) if ground is None else np.where(np.isfinite(ground), ground, low)
+def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
+    """What zones forbid of the plane; nothing of those away from the path."""
+    low, high, points = plane.low, plane.high, plane.points
+    under = np.full(len(points), low)
+    if plane.ground is not None:
+        under = np.where(np.isfinite(plane.ground), plane.ground, low)
     records, cuts = zone_records(zones), []
     for z, zone in enumerate(zones):
         over = np.array([edge_distance(records, z, east, north) <= 0.0 for east, north, _ in points])
@@ -324,27 +278,22 @@ def zone_cuts(zones: tuple[Zone, ...], points: Floats, ground: Floats | None, lo
         ceiling = np.clip(level_heights(zone.ceiling, under, high), low, high)
         bands = [(floor, ceiling, over)]
         if zone.kind == "inclusion":
-            whole = np.full(len(points), low), np.full(len(points), high)
-            bands = [(whole[0], floor, over), (ceiling, whole[1], over), (*whole, ~over)]
+            full = np.full(len(points), low), np.full(len(points), high)
+            bands = [(full[0], floor, over), (ceiling, full[1], over), (*full, ~over)]
         cuts += [ZoneCut(zone, bottom, top, where & (top > bottom)) for bottom, top, where in bands]
     return [cut for cut in cuts if cut.where.any()]
 
 
-def draw_zone_cuts(
-    axes: Any, zones: tuple[Zone, ...], distance: Floats, points: Floats, ground: Floats | None
-) -> list[tuple[str, float, float]]:
-    """Fill what zones forbid of the vertical plane through the path.
-
-    distance: (s,) m along the path, points: (s, 3) m, ground: (s,) m AMSL or None.  Returns each such zone's label, the
-    middle of its stretch (km) and the height (m AMSL) to write it at.
-    """
-    low, high = axes.get_ylim()
-    kilometres, names = distance / 1000.0, []
-    look: dict[str, Any] = {"facecolor": (*drawing.ZONE_FILL, 0.14), "edgecolor": drawing.ZONE, "hatch": _HATCH}
-    for cut in zone_cuts(zones, points, ground, low, high):
-        axes.fill_between(kilometres, cut.bottom, cut.top, where=cut.where, linewidth=0.9, zorder=2.4, **look)
-        if cut.zone.kind == "exclusion":
+def zone_bands(zones: tuple[Zone, ...], plane: PathPlane) -> tuple[list[Layer], list[Label]]:
+    """What zones forbid of the plane, and the names of those to keep out of, in the middle of each."""
+    layers, labels = [], []
+    for cut in zone_cuts(zones, plane):
+        keep_out = cut.zone.kind == "exclusion"
+        legend = "zone to keep out of" if keep_out else "outside a zone to stay in"
+        top = np.where(cut.where, cut.top, np.nan)
+        layers.append(Layer("band", zone_label(cut.zone), "zone", plane.kilometres, top, cut.bottom, legend=legend))
+        if keep_out:
             middle = int(np.flatnonzero(cut.where)[cut.where.sum() // 2])
-            height = 0.5 * float(cut.bottom[middle] + cut.top[middle])
-            names.append((zone_label(cut.zone), float(kilometres[middle]), height))
-    return names
+            amsl = 0.5 * float(cut.bottom[middle] + cut.top[middle])
+            labels.append(Label(zone_label(cut.zone), float(plane.kilometres[middle]), amsl, "name", "zone", (0, 0)))
+    return layers, labels[:_MAX_CUT_NAMES]

@@ -3,20 +3,22 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+import numpy as np
 
 from logs.verdict.findings import Finding, Verdict
-from logs.views import drawing
-from logs.views.map import draw_legend
+from logs.views.charts import Chart, Floats, Layer, Panel, shorten
 
-_LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 0.25, 0.6, 0.85, 1.55, 0.62
-_NUMBERED = 45
-# Room above and below what a panel shows, of its span: half a ring, and some air.
-_ROOM = 0.12
+# Margin above and below what a panel shows, of its span; and a limit so many times as high is left out of it.
+_MARGIN, _FAR = 0.12, 4.0
+# Rule, kind of place, title and unit.
+PLACE_PANELS = (
+    ("turn", "waypoint", "turn", "°"),
+    ("slope", "leg", "slope", "°"),
+    ("clearance", "leg", "least height above ground", "m"),
+    ("waypoint", "waypoint", "passed at", "m"),
+    ("corridor", "leg", "farthest from the legs", "m"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,16 +30,6 @@ class PlaceValue:
     flown: float
     limit: float
     ok: bool | None
-
-
-# Rule, kind of place, and the title with the unit.
-PLACE_PANELS = (
-    ("turn", "waypoint", "turn\n(°)"),
-    ("slope", "leg", "slope\n(°)"),
-    ("clearance", "leg", "least height above\nground (m)"),
-    ("waypoint", "waypoint", "passed at\n(m)"),
-    ("corridor", "leg", "farthest from\nthe legs (m)"),
-)
 
 
 def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
@@ -53,82 +45,53 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
     return sorted(found, key=lambda value: value.number)
 
 
-def draw_turns(name: str, verdict: Verdict) -> Figure:
-    """Panels of turns, slopes, clearances, waypoints and corridor.
+def turn_chart(name: str, verdict: Verdict) -> Chart:
+    """Panels of turns, slopes, clearances, waypoints and corridor; none where the verdict has none of them.
 
-    Bars stand for the plan, dots for the flight, dashes for limits.
-    What fails is ringed and its number is written in the same colour.
+    Bars stand for the plan, dots for the flight, dashes for limits; what fails is ringed.
+    name: of the scenario.
+
+    >>> turn_chart("a plan", Verdict((), flyable=False, complete=False, lines=(), level="plan")).panels
+    ()
     """
-    shown = [(*panel, values) for panel in PLACE_PANELS if (values := place_values(verdict.findings, panel[0]))]
-    total = _TOP + _BOTTOM + max(1, len(shown)) * _PANEL + max(0, len(shown) - 1) * _GAP
-    with drawing.clean_style():
-        figure = drawing.new_figure(total)
-        for row, (rule, place, title, values) in enumerate(shown):
-            base = _BOTTOM + (len(shown) - 1 - row) * (_PANEL + _GAP)
-            frame = (_LEFT / drawing.WIDTH, base / total, 1 - (_LEFT + _RIGHT) / drawing.WIDTH, _PANEL / total)
-            axes = figure.add_axes(frame)
-            _bars(axes, values, rule)
-            axes.set_ylabel(title)
-            axes.set_xlabel(place, labelpad=1.0)
-        heading = f"{drawing.shorten(name, 60)}: turn by turn, leg by leg"
-        figure.text(_LEFT / drawing.WIDTH, 1 - 0.28 / total, heading, fontsize=11, fontweight="bold", va="center")
-        draw_legend(figure, _handles(any(v.ok is False for *_, values in shown for v in values)), _LEFT, 0.3 / total)
-    return figure
+    panels = tuple(
+        _panel(rule, title, unit, place, values)
+        for rule, place, title, unit in PLACE_PANELS
+        if (values := place_values(verdict.findings, rule))
+    )
+    title = f"{shorten(name, 60)}: turn by turn, leg by leg"
+    return Chart(title, "", "", panels, shared=False, tall=170, inches=1.55, legend="below")
 
 
-def _bars(axes: Any, values: list[PlaceValue], rule: str) -> None:
-    numbers = [value.number for value in values]
-    small = 3.0 if len(values) > _NUMBERED else 5.5
-    axes.bar(numbers, [value.planned for value in values], width=0.62, color=drawing.PLANNED, zorder=2)
-    axes.plot(numbers, [value.flown for value in values], "o", color=drawing.FLOWN, markersize=small, zorder=4)
-    axes.hlines(
-        [value.limit for value in values],
-        [number - 0.42 for number in numbers],
-        [number + 0.42 for number in numbers],
-        color=drawing.MISSILE, linewidth=2.0, zorder=3,
-    )  # fmt: skip
-    failed = [value for value in values if value.ok is False]
-    tops = [value.flown if math.isfinite(value.flown) else value.planned for value in failed]
-    ring: dict[str, Any] = {"mfc": "none", "mec": drawing.FAIL, "mew": 2.0, "markersize": small + 7.0, "zorder": 5}
-    axes.plot([value.number for value in failed], tops, "o", **ring)
-    axes.axhline(0.0, color="#777777", linewidth=0.7, zorder=1)
-    step = -(-len(values) // _NUMBERED)
-    ticks = sorted({*numbers[::step], *(value.number for value in failed[:_NUMBERED])})
-    axes.set_xticks(ticks)
-    for label, number in zip(axes.get_xticklabels(), ticks, strict=True):
-        if any(value.number == number for value in failed):
-            label.set(color=drawing.FAIL, fontweight="bold")
-    axes.set_xlim(numbers[0] - 0.8, numbers[-1] + 0.8)
-    axes.grid(axis="y", color="#e4e4e4", linewidth=0.5)
-    axes.set_axisbelow(True)
-    _frame_values(axes, values, rule)
-
-
-def _frame_values(axes: Any, values: list[PlaceValue], rule: str) -> None:
-    """Show every bar, dot and ring whole; of turns and corridors, limits far above them all are cut off, and named."""
-    shown = [v for value in values for v in (value.planned, value.flown) if math.isfinite(v)]
-    limits = [value.limit for value in values if math.isfinite(value.limit)]
-    far = 4.0 * max((abs(v) for v in shown), default=math.inf) if rule in ("turn", "corridor") else math.inf
-    cut = [limit for limit in limits if limit > far]
-    seen = [0.0, *shown, *(limit for limit in limits if limit <= far)]
-    low, high = min(seen), max(seen)
-    room = _ROOM * ((high - low) or 1.0)
-    ringed = any(value.ok is False for value in values)
-    axes.set_ylim(low - room if ringed or low < 0.0 else 0.0, high + room)
-    if cut:
-        unit = "°" if rule == "turn" else " m"
-        text = f"{'limits' if len(cut) == len(limits) else 'other limits'} from {min(cut):.0f}{unit}"
-        axes.annotate(
-            text, (1.0, 1.0), (0, 3), xycoords="axes fraction", textcoords="offset points", ha="right", fontsize=7,
-            color=drawing.MISSILE,
-        )  # fmt: skip
-
-
-def _handles(failing: bool) -> list[Any]:
-    ring: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 9, "mfc": "none", "markeredgewidth": 2.0}
-    handles: list[Any] = [
-        Patch(color=drawing.PLANNED, label="planned"),
-        Line2D([], [], marker="o", linestyle="", color=drawing.FLOWN, markersize=5.5, label="flown"),
-        Line2D([], [], color=drawing.MISSILE, linewidth=2.0, label="limit"),
+def _panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
+    at = np.array([value.number for value in values], dtype=np.float64)
+    planned, flown, limit = (
+        np.array([getattr(value, name) for value in values]) for name in ("planned", "flown", "limit")
+    )
+    failed = np.array([value.ok is False for value in values])
+    layers = [
+        Layer("bars", "planned", "planned", at, planned),
+        Layer("dashes", "limit", "limit", at, limit),
+        Layer("dots", "flown", "flown", at, flown),
     ]
-    return [*handles, Line2D([], [], color=drawing.FAIL, label="fails", **ring)] if failing else handles
+    if failed.any():
+        shown = np.where(np.isfinite(flown), flown, planned)
+        layers.append(Layer("rings", "fails", "fail", at[failed], shown[failed], quiet=True))
+    seen = np.concatenate([[0.0], planned, flown])
+    seen = seen[np.isfinite(seen)]
+    limits = limit[np.isfinite(limit)]
+    near = limits[_is_near(limits, rule, float(np.abs(seen).max()))]
+    low, high = float(min([*seen, *near])), float(max([*seen, *near]))
+    margin = _MARGIN * ((high - low) or 1.0)
+    note = ""
+    if len(near) < len(limits):
+        far = limits[~_is_near(limits, rule, float(np.abs(seen).max()))]
+        note = f"{'other ' if near.size else ''}limits from {far.min():.0f}{unit if unit == '°' else ' ' + unit}"
+    base = low - margin if failed.any() or low < 0.0 else 0.0
+    return Panel(title, unit, tuple(layers), span=(base, high + margin), along=place, note=note)
+
+
+def _is_near(limits: Floats, rule: str, largest: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Which limits are shown: of turns and corridors, one far above everything else would press that flat."""
+    far = _FAR * max(largest, 1e-9) if rule in ("turn", "corridor") else math.inf
+    return np.asarray(limits <= far, dtype=np.bool_)

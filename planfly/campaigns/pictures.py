@@ -9,10 +9,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
-from logs.views.drawing import BLUE, FAIL, INK, LIMIT, PLANNED, QUIET, clean_style, new_figure, shorten
+from logs import theme
+from logs.views.charts import shorten
+from logs.views.drawing import clean_style, new_figure
 from planfly.campaigns.statistics.decision import Interval, wilson
 
 Floats = NDArray[np.float64]
+
+PLANNED, BLUE, FAIL, LIMIT, INTERVAL = (
+    theme.colour(role) for role in ("planned", "second", "fail", "limit", "commanded")
+)
+INK, QUIET, GRID, PAPER = (theme.colour(name) for name in ("ink", "quiet", "grid", "paper"))
 
 
 # ----------------------------------------------------------------------
@@ -165,7 +172,7 @@ def _light(axes: object) -> None:
     from matplotlib.axes import Axes
 
     if isinstance(axes, Axes):
-        axes.grid(visible=True, color="#dddddd", linewidth=0.6)
+        axes.grid(visible=True, color=GRID, linewidth=0.6)
         axes.set_axisbelow(True)
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
@@ -214,13 +221,13 @@ def draw_clearance_fan(
         # Over the panel, where it covers no band.
         top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
         top.tick_params(labelbottom=False)
-        low.fill_between(along, ground, np.nanmin(ground) - 10.0, color="#cfd8b0", linewidth=0.0)
+        low.fill_between(along, ground, np.nanmin(ground) - 10.0, color=theme.GROUND[1], linewidth=0.0)
         low.plot(along, ground, color=QUIET, linewidth=0.8)
         low.set_xlim(0.0, length / 1000.0)
         low.set_ylabel("ground (m AMSL)")
         low.set_xlabel("along the way (km)")
         for axes in (top, low):
-            axes.grid(visible=True, color="#e2e2e2", linewidth=0.5)
+            axes.grid(visible=True, color=GRID, linewidth=0.5)
             axes.set_axisbelow(True)
             for side in ("top", "right"):
                 axes.spines[side].set_visible(False)
@@ -248,8 +255,8 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
                 continue
             here = crossings[:, k]
             good = np.isfinite(here).all(axis=1)
-            axes.axhline(0.0, color="#cccccc", linewidth=0.6)
-            axes.axvline(0.0, color="#cccccc", linewidth=0.6)
+            axes.axhline(0.0, color=GRID, linewidth=0.6)
+            axes.axvline(0.0, color=GRID, linewidth=0.6)
             axes.plot(*here[good & ~failed].T, ".", color=BLUE, markersize=2.2, alpha=0.5)
             axes.plot(*here[good & failed].T, "x", color=FAIL, markersize=3.5)
             reach = _reach(here)
@@ -334,7 +341,7 @@ def draw_go_no_go(
         boundary = outline([one.boundary for one in ring])
         axes.fill_between(fine, 0.0, low, color=PLANNED, alpha=0.45, linewidth=0.0)
         axes.fill_between(fine, boundary, most, color=FAIL, alpha=0.13, linewidth=0.0)
-        axes.fill_between(fine, low, high, color=LIMIT, alpha=0.45, linewidth=0.0)
+        axes.fill_between(fine, low, high, color=INTERVAL, alpha=0.45, linewidth=0.0)
         axes.plot(fine, boundary, color=INK, linewidth=1.8)
         for one in spokes:
             for speed, flights, flyable in one.flights:
@@ -344,12 +351,12 @@ def draw_go_no_go(
                     markersize=2.6 if all_well else 3.6, linewidth=0.0, alpha=0.75,
                 )  # fmt: skip
         if wind is not None:
-            axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK, markersize=13, markeredgecolor="white")
+            axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK, markersize=13, markeredgecolor=PAPER)
         axes.set_ylim(0.0, most)
         axes.set_xticks(np.radians(np.arange(0, 360, 45)), ["N", "NE", "E", "SE", "S", "SW", "W", "NW"])
         axes.set_rlabel_position(11.0)  # type: ignore[attr-defined]  # of polar axes
         axes.tick_params(axis="y", labelsize=8)
-        axes.grid(color="#cccccc", linewidth=0.6)
+        axes.grid(color=GRID, linewidth=0.6)
         figure.text(0.03, 0.955, f"{name}: in which wind it flies", fontsize=14, color=INK)
         figure.text(
             0.03, 0.922, f"wind from each direction, m/s; flies with a probability of {target:g} or more",
@@ -367,7 +374,7 @@ def _legend(figure: Figure, target: float, confidence: float, wind: tuple[float,
     entries: list[tuple[Artist, str]] = [
         (Patch(color=PLANNED, alpha=0.45), f"go: P >= {target:g} also at the\nlow end of the interval"),
         (Line2D([], [], color=INK, linewidth=1.8), f"boundary, P = {target:g}"),
-        (Patch(color=LIMIT, alpha=0.45), f"its interval, {100 * confidence:g} %"),
+        (Patch(color=INTERVAL, alpha=0.45), f"its interval, {100 * confidence:g} %"),
         (Patch(color=FAIL, alpha=0.13), f"no-go: P < {target:g}"),
         (Line2D([], [], color=BLUE, marker="o", markersize=3, linewidth=0), "flown, all flyable"),
         (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not"),

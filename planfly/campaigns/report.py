@@ -13,8 +13,10 @@ from pathlib import Path
 
 import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from logs.theme import css_variables
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text
 from logs.views.drawing import png_bytes
@@ -97,7 +99,7 @@ def _render(template: str, **values: object) -> str:
         loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    return environment.get_template(template).render(**values)
+    return environment.get_template(template).render(colours=Markup(css_variables()), **values)
 
 
 def _embedded(figure: Figure) -> str:

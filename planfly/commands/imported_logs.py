@@ -140,12 +140,13 @@ def _refly_answer(lines: list[str], files: list[Path], code: int) -> object:
 
 def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
     # matplotlib loads for pictures alone.
-    from logs.views.compare_charts import refly_pictures
+    from logs.views.compare import refly_charts
+    from logs.views.drawing import draw_chart, png_bytes
 
     files = []
-    for name, data in refly_pictures(again).items():
+    for name, chart in refly_charts(again).items():
         path = (folder / name).with_stem(f"{Path(name).stem}{ending}")
-        write_whole(path, data)
+        write_whole(path, png_bytes(draw_chart(chart)))
         files.append(path)
     return files
 

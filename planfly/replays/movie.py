@@ -15,7 +15,7 @@ import numpy as np
 from PIL import Image, ImageColor
 
 from logs.recording.reader import FlightLog
-from logs.views.drawing import DRAWN
+from logs.theme import drawn_colours
 from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.terminal.output import progress
 from planfly.terminal.results import refuse_existing, refuse_folder
@@ -85,7 +85,7 @@ def _colours(frame: Image.Image) -> Image.Image:
 
     Of few colours chosen by area alone, thin lines and small marks would lose theirs to the ground.
     """
-    kept = [ImageColor.getrgb(colour)[:3] for colour in DRAWN]
+    kept = [ImageColor.getrgb(colour)[:3] for colour in drawn_colours()]
     blended = frame.quantize(_CLEAR - len(kept), dither=Image.Dither.NONE).getpalette() or []
     palette = [part for colour in kept for part in colour] + blended[: 3 * (_CLEAR - len(kept))]
     holder = Image.new("P", (1, 1))

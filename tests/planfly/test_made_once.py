@@ -23,7 +23,7 @@ from flight.live.flight_process import (
     read_event,
     serve_flights,
 )
-from logs.views import figures
+from logs.views import drawing
 from planfly.cli import main
 from planfly.commands.registry import COMMAND_NAMES, find_command
 from planfly.served_flights import ServedFlights, ServeOptions
@@ -81,7 +81,7 @@ def entered(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     for room in ("logs.views.report.page", "logs.views.replay.timeline"):
         import_module(room)
     # What is drawn enters stages as ever; to render it takes longer than all of them.
-    monkeypatch.setattr(figures, "png_bytes", lambda figure: b"")
+    monkeypatch.setattr(drawing, "png_bytes", lambda figure: b"")
     entered: Counter[str] = Counter()
     for stage in STAGES:
         home, _, name = stage.partition(":")

@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs import theme
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
-from logs.views import drawing
-from logs.views.map import draw_map
+from logs.views.charts import shorten
+from logs.views.draw_map import draw_map
+from logs.views.drawing import clean_style
+from logs.views.map import flight_map
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -62,17 +65,19 @@ class MovieFrames:
         """Each frame as (height, width, 3); both even, as video formats want them."""
         setup, track = self.setup, with_legs(self.track, find_leg_ends(self.setup, self.track))
         figure = draw_map(
-            with_fence_zones(setup).scenario,
-            plan_waypoints=None,
-            route_waypoints=setup.route.waypoints,
-            track=None,
-            verdict=None,
+            flight_map(
+                with_fence_zones(setup).scenario,
+                plan_waypoints=None,
+                route_waypoints=setup.route.waypoints,
+                track=None,
+                verdict=None,
+            )
         )
         axes = figure.axes[0]
         figure.set_dpi(_DPI)
         canvas = FigureCanvasAgg(figure)
-        with drawing.clean_style():
-            axes.set_title(f"{drawing.shorten(setup.scenario.name, 60)}: the flight", fontweight="bold")
+        with clean_style():
+            axes.set_title(f"{shorten(setup.scenario.name, 60)}: the flight", fontweight="bold")
             canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no types here
             ground = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]  # nor here
             moving = _MovingParts(figure, axes, setup, track)
@@ -89,11 +94,11 @@ class _MovingParts:
     def __init__(self, figure: Figure, axes: Any, setup: FlightSetup, track: Track) -> None:
         self._axes, self._figure, self._setup, self._track = axes, figure, setup, track
         look: dict[str, Any] = {"animated": True, "zorder": 9}
-        (self._trail,) = axes.plot([], [], color=drawing.FLOWN, linewidth=1.6, **look)
-        (self._aircraft,) = axes.plot([], [], linestyle="", markersize=17.0, color=drawing.FAIL, **look)
+        (self._trail,) = axes.plot([], [], color=theme.colour("flown"), linewidth=1.6, **look)
+        (self._aircraft,) = axes.plot([], [], linestyle="", markersize=17.0, color=theme.colour("aircraft"), **look)
         self._text = figure.text(
             0.02, 0.018, "", family="monospace", fontsize=9.5, va="bottom", animated=True,
-            bbox={"facecolor": "white", "edgecolor": "#bbbbbb", "pad": 4.0},
+            bbox={"facecolor": theme.colour("paper"), "edgecolor": theme.colour("rim"), "pad": 4.0},
         )  # fmt: skip
         position = track.position
         terrain = setup.scenario.terrain

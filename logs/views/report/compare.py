@@ -1,7 +1,7 @@
 """Two flights measured alike, and their differences, from their logs alone."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,16 @@ from logs.recording.reader import FlightLog
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.path_sweeps import path_spheres, segment_clearances
+from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.rules.registry import RULES
-from logs.views.compare_charts import NamedFlight, draw_both_on_map, draw_both_over_distance
-from logs.views.drawing import png_bytes, svg_bytes
-from logs.views.report.charts import compare_charts
+from logs.views.charts import shorten
+from logs.views.compare import ROLES, NamedFlight, both_along, both_on_map
+from logs.views.failures import Failures
+from logs.views.figures import View, draw, view_json
+from logs.views.moments import flight_moments
 from logs.views.report.page import CHART_SCRIPTS, page_library, picture_address, script_digest, script_text, style_text
 from logs.views.report.text import NOTHING, number
-from logs.views.scene import script_json
+from logs.views.scene import SceneView, script_json
 from world.files import write_whole
 from world.geometry import path_length
 from world.html_table import html_table
@@ -239,8 +242,8 @@ def difference_lines(comparison: Comparison) -> list[str]:
 
 # Name of the chart that stands for each picture, and what it shows.
 _PICTURES = {
-    "compare-map.png": ("map", "Both flights from above, over the first one's map"),
-    "compare-profile.png": (
+    "compare-map": ("map", "Both flights from above, over the first one's map"),
+    "compare-profile": (
         "along",
         "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
     ),
@@ -265,11 +268,12 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     first, second = (
         NamedFlight(name, log.setup, log.track) for name, log in zip(comparison.names, comparison.logs, strict=True)
     )
-    figures = {"compare-profile": draw_both_over_distance((first, second))}
-    if first.setup.scenario.origin == second.setup.scenario.origin:
-        figures = {"compare-map": draw_both_on_map((first, second)), **figures}
+    from logs.views.drawing import png_bytes, svg_bytes
+
+    views = comparison_views((first, second))
+    figures = {name: draw(view) for name, view in views.items()}
     files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
-    page = _page(comparison, (first, second), files)
+    page = _page(comparison, (first, second), views, files)
     if svg:
         files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
     files["compare.html"] = page.encode("utf-8")
@@ -279,10 +283,40 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     return [out_dir / name for name in files]
 
 
-def _page(comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], files: dict[str, bytes]) -> str:
+def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View]:
+    """Descriptions of the pictures by file name; no map where the flights' origins differ.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> list(comparison_views(tuple(NamedFlight(name, log.setup, log.track) for name in ("one", "other"))))
+    ['compare-map', 'compare-profile']
+    """
+    first, second = flights
+    same = first.setup.scenario.origin == second.setup.scenario.origin
+    views: dict[str, View] = {"compare-map": both_on_map(flights)} if same else {}
+    return views | {"compare-profile": both_along(flights)}
+
+
+def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View]) -> dict[str, Any]:
+    """Scene, flights and charts of the page as what JSON can hold; the scene has the map's ground."""
+    first, _ = flights
+    scene = None
+    if "compare-map" in views:
+        scene = view_json(SceneView(with_fence_zones(first.setup), first.track, Failures({}, {})))
+    moments = [
+        flight_moments(flight.setup, flight.track, name=shorten(flight.name, 40), role=role)
+        for flight, role in zip(flights, ROLES, strict=True)
+    ]
+    charts = {_PICTURES[name][0]: view_json(view) for name, view in views.items()}
+    return {"scene": scene, "flight": {"flights": moments}, "charts": charts}
+
+
+def _page(
+    comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View], files: dict[str, bytes]
+) -> str:
     """The page, its pictures, charts and scripts inside."""
-    pictures = [(*_PICTURES[name], picture_address(data)) for name, data in files.items()]
-    data, script = compare_charts(flights), script_text(CHART_SCRIPTS)
+    pictures = [(*_PICTURES[name.removesuffix(".png")], picture_address(data)) for name, data in files.items()]
+    data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
     verdicts = [
         (name, verdict.flyable, verdict.headline)
         for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)

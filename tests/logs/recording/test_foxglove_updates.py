@@ -14,6 +14,7 @@ from shapely import LineString, Point
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs import theme
 from logs.recording.foxglove_scene import body_rotation
 from logs.recording.foxglove_updates import EVERY, MAX_POINTS, THINNED, TrackSoFar, along, thinned
 from logs.recording.mcap_writer import SECOND_NS
@@ -178,7 +179,7 @@ def test_the_points_are_those_of_the_scenario(
         assert np.abs(sphere.mean(axis=0) - setup.scenario.threats.position[index]).max() < 0.05 * radius
     colours = [int(value) for value in row["Points3D:colors"]]
     red = [value >> 24 for value in colours]
-    assert set(red) == {217, 242}
+    assert set(red) == {round(255 * theme.rgba(role, dark=True)[0]) for role in ("missile", "radar")}
     (row,) = shown["/points/plan"]
     assert points(row)[-1] == pytest.approx(setup.route.waypoints[-1], abs=0.05)
 

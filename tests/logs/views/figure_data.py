@@ -3,11 +3,16 @@
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from flight.simulation.track import COLUMNS, Track
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Place
+from logs.views.draw_map import draw_map
+from logs.views.drawing import draw_chart
 from logs.views.failures import route_distance
+from logs.views.map import flight_map
+from logs.views.profile import profile_chart
 from world.scenario import Scenario, from_spec
 
 # A right angle and a climb, in round numbers: legs of 1,000, 800 and 600 m.
@@ -55,3 +60,11 @@ def make_verdict(*bad: tuple[str, Place]) -> Verdict:
 ALL = {"plan_waypoints": ROUTE, "route_waypoints": ROUTE}
 NONE_TERRAIN = {"terrain": {"kind": "none"}, "threats": []}
 FAILED = make_verdict(("slope", Place("leg", 1)), ("turn", Place("waypoint", 2, 3)))
+
+
+def drawn_map(scenario: Scenario, **of: Any) -> Figure:
+    return draw_map(flight_map(scenario, **of))
+
+
+def drawn_profile(scenario: Scenario, **of: Any) -> Figure:
+    return draw_chart(profile_chart(scenario, **of))

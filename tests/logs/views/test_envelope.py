@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.views.drawing import FLOWN
-from logs.views.envelope import draw_envelope_and_flight
+from logs.views.drawing import draw_chart
+from logs.views.envelope import envelope_chart
 from tests.logs.views.report.report_data import make_setup, make_track
 
 
@@ -17,27 +17,27 @@ def labelled(axes: Any, label: str) -> Any:
 
 
 def test_limits_are_the_envelopes_and_the_bank_limit_the_plans() -> None:
-    slopes, bank = draw_envelope_and_flight(make_setup(), None).axes
+    slopes, bank = draw_chart(envelope_chart(make_setup(), None)).axes
     # report_data's aircraft climbs 0.2 rad and descends 0.1 rad at every speed and height; the route is at 300..380 m.
     assert labelled(slopes, "steepest climb at 300 m").get_ydata() == pytest.approx(math.degrees(0.2))
     assert labelled(slopes, "steepest descent at 380 m").get_ydata() == pytest.approx(-math.degrees(0.1))
-    assert labelled(bank, "limit of planned turns;\ncorrections may bank beyond it").get_ydata()[0] == pytest.approx(
+    assert labelled(bank, "limit of planned turns; corrections may bank beyond it").get_ydata()[0] == pytest.approx(
         30.0
     )
-    assert labelled(bank, "the aircraft's").get_ydata()[0] == pytest.approx(math.degrees(0.7))
+    assert labelled(bank, "the aircraft's bank limit").get_ydata()[0] == pytest.approx(math.degrees(0.7))
     legs = labelled(slopes, "legs as planned (over the ground)")
     np.testing.assert_allclose(legs.get_xdata(), 25.0)
     # 40 m up over 1000 m, 40 m up over 800 m, 20 m down over 600 m.
     wanted = np.degrees(np.arctan([40.0 / 1000.0, 40.0 / 800.0, -20.0 / 600.0]))
     np.testing.assert_allclose(legs.get_ydata(), wanted)
-    assert not any(line.get_color() == FLOWN for line in slopes.lines)
+    assert not any("flown" in line.get_label() for line in slopes.lines)
 
 
 def test_dots_are_the_path_through_the_air_and_the_bank_to_either_side() -> None:
     track = make_track()
     velocity = np.tile(np.array([30.0, 0.0, 5.0]), (len(track), 1)).astype(np.float32)
     wind = np.tile(np.array([10.0, 0.0, 1.0]), (len(track), 1)).astype(np.float32)
-    slopes, bank = draw_envelope_and_flight(make_setup(), replace(track, velocity=velocity, wind=wind)).axes
+    slopes, bank = draw_chart(envelope_chart(make_setup(), replace(track, velocity=velocity, wind=wind))).axes
     dots = labelled(slopes, "flown, moment by moment")
     # 20 m/s ahead and 4 m/s up through the air.
     assert dots.get_ydata() == pytest.approx(math.degrees(math.atan2(4.0, 20.0)), abs=1e-4)
@@ -50,5 +50,5 @@ def test_rows_that_are_no_numbers_are_left_out() -> None:
     track = make_track()
     airspeed = track.airspeed.copy()
     airspeed[5:20] = np.nan
-    slopes, _ = draw_envelope_and_flight(make_setup(), replace(track, airspeed=airspeed)).axes
+    slopes, _ = draw_chart(envelope_chart(make_setup(), replace(track, airspeed=airspeed))).axes
     assert len(labelled(slopes, "flown, moment by moment").get_xdata()) == len(track) - 15

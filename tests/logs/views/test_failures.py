@@ -6,30 +6,28 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.patches import Circle
 
 from flight.simulation.track import COLUMNS, Track
+from logs import theme
 from logs.verdict.places import Place
-from logs.views import drawing
+from logs.views.drawing import new_figure
 from logs.views.failures import (
     Failures,
-    LabelPlacer,
+    fail_labels,
     failures,
     inside_threats,
     paths_differ,
     radius_of,
     route_distance,
     track_distance,
-    write_fail_labels,
 )
-from logs.views.map import draw_map
-from logs.views.profile import draw_profile
-from tests.logs.views.figure_data import ALL, ROUTE, make_scenario, make_track, make_verdict
+from logs.views.labels import LabelPlacer
+from tests.logs.views.figure_data import ALL, ROUTE, drawn_map, drawn_profile, make_scenario, make_track, make_verdict
 
 
 @pytest.fixture
 def axes() -> Any:
-    figure = drawing.new_figure(6.0)
+    figure = new_figure(6.0)
     axes = figure.add_axes((0.1, 0.1, 0.8, 0.8))
     axes.set(xlim=(0.0, 100.0), ylim=(0.0, 100.0))
     return axes
@@ -55,7 +53,7 @@ def test_labels_of_one_place_do_not_cover_each_other(axes: Any) -> None:
 
 def test_framed_labels_of_a_crowd_find_room_further_off_and_point_to_their_places(axes: Any) -> None:
     placer = LabelPlacer(axes)
-    frame = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": drawing.FAIL}
+    frame = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": theme.colour("fail")}
     at = [(48.0 + k % 4, 48.0 + k // 4) for k in range(14)]
     for k, (x, y) in enumerate(at):
         placer.place(f"waypoint {k} (item {k + 2}): turn, waypoint", x, y, gap=16.0, bbox=frame)
@@ -175,15 +173,17 @@ def texts(figure: Any) -> set[str]:
 
 def broad_line(figure: Any) -> Any:
     return next(
-        line for line in figure.axes[0].lines if line.get_color() == drawing.FAIL and line.get_linewidth() == 3.6
+        line
+        for line in figure.axes[0].lines
+        if line.get_color() == theme.colour("fail") and line.get_linewidth() == 3.6
     )
 
 
 def test_an_entered_missile_is_ringed_and_named_on_the_map() -> None:
     track, inside = inside_rows()
-    figure = draw_map(SCENARIO, **ALL, track=track, verdict=ENTERED)
-    (ring,) = [patch for patch in figure.axes[0].patches if isinstance(patch, Circle) and patch.get_linewidth() == 2.2]
-    assert (ring.center, ring.radius) == ((300.0, 0.0), 250.0)
+    figure = drawn_map(SCENARIO, **ALL, track=track, verdict=ENTERED)
+    (ring,) = [line.get_xydata() for line in figure.axes[0].lines if line.get_label() == "threat that is entered"]
+    np.testing.assert_allclose(np.hypot(*(ring - [300.0, 0.0]).T), 250.0)
     assert {"post 25 (missile): threat", "leg 1, to item 9: slope"} <= texts(figure)
     assert "post 25" not in texts(figure)
     assert 4 < inside.sum() < len(track) // 2
@@ -194,20 +194,19 @@ def test_an_entered_missile_is_ringed_and_named_on_the_map() -> None:
 
 def test_an_entered_missile_stands_over_the_flown_heights() -> None:
     track, inside = inside_rows()
-    figure = draw_profile(SCENARIO, **ALL, track=track, verdict=ENTERED)
+    figure = drawn_profile(SCENARIO, **ALL, track=track, verdict=ENTERED)
     assert {"post 25 (missile): threat", "leg 1, to item 9: slope"} <= texts(figure)
     np.testing.assert_array_equal(np.isfinite(broad_line(figure).get_ydata()), inside)
     # Its foot and its top over the path, 200 m beside the centre: 300 m less and more of sqrt(250^2 - 200^2) = 150 m.
-    edges = [line.get_ydata() for line in figure.axes[0].lines if line.get_color() == drawing.FAIL]
-    edges = [line for line in edges if len(line) == len(track)]
-    assert np.nanmin(edges[0]) == pytest.approx(150.0, abs=1.0)
-    assert np.nanmax(edges[1]) == pytest.approx(450.0, abs=1.0)
+    (cut,) = [band for band in figure.axes[0].collections if band.get_label() == "threat that is entered"]
+    amsl = cut.get_paths()[0].vertices[:, 1]
+    assert (amsl.min(), amsl.max()) == (pytest.approx(150.0, abs=1.0), pytest.approx(450.0, abs=1.0))
 
 
 def test_a_plan_that_was_not_flown_shows_its_own_entry() -> None:
-    figure = draw_profile(SCENARIO, **ALL, track=None, verdict=ENTERED)
+    figure = drawn_profile(SCENARIO, **ALL, track=None, verdict=ENTERED)
     assert "post 25 (missile): threat" in texts(figure)
-    assert not texts(draw_profile(SCENARIO, **ALL, track=None, verdict=make_verdict())) & {"post 25 (missile): threat"}
+    assert not texts(drawn_profile(SCENARIO, **ALL, track=None, verdict=make_verdict())) & {"post 25 (missile): threat"}
 
 
 def test_a_sphere_is_the_one_that_the_place_names() -> None:
@@ -220,7 +219,5 @@ def test_a_sphere_is_the_one_that_the_place_names() -> None:
 
 
 def test_threats_without_a_place_in_the_picture_get_no_label() -> None:
-    axes = drawing.new_figure(4.0).add_axes((0.1, 0.1, 0.8, 0.8))
-    axes.set(xlim=(-1000.0, 1000.0), ylim=(-1000.0, 1000.0))
-    write_fail_labels(failures(ENTERED, 4), ROUTE[:, :2], {}, LabelPlacer(axes), 10.0)
-    assert [text.get_text() for text in axes.texts] == ["leg 1, to item 9: slope"]
+    labels = fail_labels(failures(ENTERED, 4), ROUTE[:, :2], {})
+    assert [label.text for label in labels] == ["leg 1, to item 9: slope"]

@@ -9,13 +9,23 @@ from typing import Any
 import matplotlib as mpl
 import pytest
 
+from logs import theme
 from logs.verdict.findings import Verdict
 from logs.verdict.places import Place
-from logs.views.drawing import FAIL, png_bytes
-from logs.views.figures import draw_map, draw_profile, write_png
-from tests.logs.views.figure_data import ALL, FAILED, NONE_TERRAIN, ROUTE, make_scenario, make_track, make_verdict
+from logs.views.drawing import png_bytes, write_png
+from tests.logs.views.figure_data import (
+    ALL,
+    FAILED,
+    NONE_TERRAIN,
+    ROUTE,
+    drawn_map,
+    drawn_profile,
+    make_scenario,
+    make_track,
+    make_verdict,
+)
 
-DRAWERS = [draw_map, draw_profile]
+DRAWERS = [drawn_map, drawn_profile]
 
 
 @pytest.mark.parametrize("draw", DRAWERS)
@@ -67,7 +77,7 @@ def test_failing_places_are_marked_and_only_those(draw: Any) -> None:
         figure = draw(make_scenario(), **ALL, track=None, verdict=verdict)
         lines = figure.axes[0].lines
         marked = [line for line in lines if line.get_gid() != "leader"]
-        return sum(FAIL in (line.get_color(), line.get_markeredgecolor()) for line in marked)
+        return sum(theme.colour("fail") in (line.get_color(), line.get_markeredgecolor()) for line in marked)
 
     assert marks(None) == 0
     assert marks(make_verdict()) == 0
@@ -78,13 +88,13 @@ def test_failing_places_are_marked_and_only_those(draw: Any) -> None:
 
 def test_settings_of_the_caller_come_back_and_do_not_matter(tmp_path: Path) -> None:
     def picture() -> bytes:
-        return png_bytes(draw_profile(make_scenario(), **ALL, track=None, verdict=None))
+        return png_bytes(drawn_profile(make_scenario(), **ALL, track=None, verdict=None))
 
     plain = picture()
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 20.0, "savefig.facecolor": "red"}):
         assert picture() == plain
         assert mpl.rcParams["font.size"] == 20.0
-    figure = draw_profile(make_scenario(), **ALL, track=None, verdict=None)
+    figure = drawn_profile(make_scenario(), **ALL, track=None, verdict=None)
     write_png(figure, tmp_path / "profile.png")
     assert (tmp_path / "profile.png").read_bytes() == plain
     assert [path.name for path in tmp_path.iterdir()] == ["profile.png"]

@@ -5,17 +5,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.views import drawing
-from logs.views.drawing import FLOWN
-from logs.views.failures import Failures
-from logs.views.figures import draw_map
-from logs.views.map import NamedWind, draw_compass, draw_ground, draw_legend, failing_handles
-from tests.logs.views.figure_data import ALL, FAILED, ROUTE, make_scenario, make_track
+from logs import theme
+from logs.verdict.places import Place
+from logs.views.charts import legend_entries
+from logs.views.draw_map import draw_compass, draw_ground
+from logs.views.drawing import WIDTH, draw_legend, legend_handle, new_figure
+from logs.views.map import NamedWind, flight_map, map_json
+from tests.logs.views.figure_data import ALL, FAILED, ROUTE, drawn_map, make_scenario, make_track, make_verdict
 from world.wind import Wind
 
 
 def drawn(**changes: Any) -> tuple[Any, Any, list[Any]]:
-    figure = drawing.new_figure(6.0)
+    figure = new_figure(6.0)
     axes = figure.add_axes((0.1, 0.1, 0.7, 0.8))
     axes.set(xlim=(-1200.0, 1200.0), ylim=(-800.0, 800.0))
     return figure, axes, draw_ground(figure, axes, make_scenario(threats=[], **changes).terrain, 8.7, 0.5)
@@ -66,14 +67,15 @@ def test_contours_stand_at_round_heights_within_the_hill() -> None:
 
 
 def test_failing_marks_are_explained_where_there_are_any() -> None:
-    def labels(legs: tuple[int, ...], waypoints: tuple[int, ...]) -> list[str]:
-        failed = Failures(dict.fromkeys(legs, ("slope",)), dict.fromkeys(waypoints, ("turn",)))
-        return [handle.get_label() for handle in failing_handles(failed)]
+    def marked(*bad: tuple[str, Place]) -> list[str]:
+        chart = flight_map(make_scenario(), **ALL, track=None, verdict=make_verdict(*bad))
+        return [entry.text for entry in legend_entries([chart.panel]) if "fails" in entry.text]
 
-    assert labels((), ()) == []
-    assert labels((1, 2), ()) == ["leg that fails a rule"]
-    assert labels((), (3,)) == ["waypoint that fails a rule"]
-    assert labels((1,), (3,)) == ["leg that fails a rule", "waypoint that fails a rule"]
+    leg, waypoint = ("slope", Place("leg", 1)), ("turn", Place("waypoint", 2, 3))
+    assert marked() == []
+    assert marked(leg, ("slope", Place("leg", 2))) == ["leg that fails a rule"]
+    assert marked(waypoint) == ["waypoint that fails a rule"]
+    assert marked(leg, waypoint) == ["leg that fails a rule", "waypoint that fails a rule"]
 
 
 def wind(speed: float, from_deg: float, turbulence: str = "none") -> Wind:
@@ -82,7 +84,7 @@ def wind(speed: float, from_deg: float, turbulence: str = "none") -> Wind:
 
 @pytest.mark.parametrize(("from_deg", "to"), [(270.0, (1.0, 0.0)), (0.0, (0.0, -1.0)), (45.0, (-1.0, -1.0))])
 def test_the_arrow_points_to_where_the_wind_blows(from_deg: float, to: tuple[float, float]) -> None:
-    figure = drawing.new_figure(6.0)
+    figure = new_figure(6.0)
     draw_compass(figure, [NamedWind(wind(5.0, from_deg, "light"))], 8.7)
     (arrow,) = [text for text in figure.axes[0].texts if hasattr(text, "arrow_patch")]
     head, tail = np.array(arrow.xy), np.array(arrow.xyann)
@@ -92,21 +94,22 @@ def test_the_arrow_points_to_where_the_wind_blows(from_deg: float, to: tuple[flo
 
 
 def test_calm_air_has_no_arrow() -> None:
-    figure = drawing.new_figure(6.0)
+    figure = new_figure(6.0)
     draw_compass(figure, [NamedWind(wind(0.0, 0.0))], 8.7)
     assert not any(hasattr(text, "arrow_patch") for text in figure.axes[0].texts)
     assert [text.get_text() for text in figure.texts] == ["no mean wind"]
 
 
 def test_two_winds_are_both_drawn_and_told_apart() -> None:
-    figure = drawing.new_figure(6.0)
-    winds = [NamedWind(wind(5.0, 270.0), "a.mcap", drawing.FLOWN), NamedWind(wind(8.0, 0.0), "b.mcap", drawing.MISSILE)]
+    figure = new_figure(6.0)
+    winds = [NamedWind(wind(5.0, 270.0), "a.mcap", "flown"), NamedWind(wind(8.0, 0.0), "b.mcap", "other")]
     draw_compass(figure, winds, 8.7)
     arrows = [text for text in figure.axes[0].texts if hasattr(text, "arrow_patch")]
     assert [np.sign(np.round(np.array(arrow.xy), 9)).tolist() for arrow in arrows] == [[1.0, 0.0], [0.0, -1.0]]
     notes = [(text.get_text(), text.get_color()) for text in figure.texts]
     assert notes == [
-        ("a.mcap:\nwind 5.0 m/s\nfrom 270°", drawing.FLOWN), ("b.mcap:\nwind 8.0 m/s\nfrom 000°", drawing.MISSILE),
+        ("a.mcap:\nwind 5.0 m/s\nfrom 270°", theme.colour("flown")),
+        ("b.mcap:\nwind 8.0 m/s\nfrom 000°", theme.colour("other")),
     ]  # fmt: skip
     figure.canvas.draw()
     upper, lower = (text.get_window_extent() for text in figure.texts)
@@ -114,20 +117,20 @@ def test_two_winds_are_both_drawn_and_told_apart() -> None:
 
 
 def test_a_wind_from_just_west_of_north_is_no_360() -> None:
-    figure = drawing.new_figure(6.0)
+    figure = new_figure(6.0)
     draw_compass(figure, [NamedWind(wind(5.0, 359.7))], 8.7)
     assert figure.texts[0].get_text().endswith("from 000°")
 
 
 def test_the_legend_stands_where_it_is_put() -> None:
-    figure = drawing.new_figure(6.0)
-    failed = Failures({1: ("slope",)}, {})
-    draw_legend(figure, failing_handles(failed), 0.8, 0.3)
+    figure = new_figure(6.0)
+    chart = flight_map(make_scenario(), **ALL, track=None, verdict=FAILED)
+    draw_legend(figure, [legend_handle(entry) for entry in legend_entries([chart.panel])], 0.8, 0.3)
     figure.canvas.draw()
     box = figure.legends[0].get_window_extent()
     assert box.y1 == pytest.approx(0.3 * figure.bbox.height, abs=1.0)
     # 0.01 of the width further left, for its own frame.
-    assert box.x0 == pytest.approx((0.8 / drawing.WIDTH - 0.01) * figure.bbox.width, abs=1.0)
+    assert box.x0 == pytest.approx((0.8 / WIDTH - 0.01) * figure.bbox.width, abs=1.0)
 
 
 # ----------------------------------------------------------------------
@@ -139,7 +142,7 @@ def test_labels_do_not_cover_each_other() -> None:
         {"name": f"unit {k}", "east_m": 40 * (k % 3), "north_m": 40 * (k // 3), "kill_radius_m": 90, "kill_scale_m": 9}
         for k in range(9)
     ]
-    figure = draw_map(make_scenario(threats=crowd), **ALL, track=make_track(), verdict=FAILED)
+    figure = drawn_map(make_scenario(threats=crowd), **ALL, track=make_track(), verdict=FAILED)
     renderer = figure.canvas.get_renderer()
     boxes = [text.get_window_extent(renderer) for text in figure.axes[0].texts if text.get_zorder() == 9]
     assert len(boxes) == 15  # two ends, two inner waypoints, two failures, nine threats
@@ -152,17 +155,19 @@ def test_missiles_are_filled_as_far_as_they_reach_at_the_height_of_the_path() ->
     units = [{"east_m": -400, "north_m": -400}, {"east_m": 100, "north_m": 0}]
     threats = [{**unit, "kill_radius_m": 250, "kill_scale_m": 50} for unit in units]
     scenario = make_scenario(terrain={"kind": "flat", "amsl_m": 100}, threats=threats)
-    fills, outlines = draw_map(scenario, **ALL, track=None, verdict=None).axes[0].collections
-    reach = [path.get_extents().width / 2 for path in fills.get_paths()]
-    assert reach == [pytest.approx(np.sqrt(250.0**2 - 220.0**2), rel=0.01)]
-    assert [path.get_extents().width / 2 for path in outlines.get_paths()] == [pytest.approx(250.0, rel=0.001)] * 2
+    layers = flight_map(scenario, **ALL, track=None, verdict=None).panel.layers
+    radii = {
+        role: [np.ptp(layer.x) / 2 for layer in layers if layer.role == role] for role in ("missile-reach", "missile")
+    }
+    assert radii["missile-reach"] == [pytest.approx(np.sqrt(250.0**2 - 220.0**2), rel=0.01)]
+    assert radii["missile"] == [pytest.approx(250.0, rel=0.001)] * 2
 
 
 def test_map_shows_the_track_where_it_was_flown() -> None:
     track = make_track()
-    figure = draw_map(make_scenario(), **ALL, track=track, verdict=None)
+    figure = drawn_map(make_scenario(), **ALL, track=track, verdict=None)
     (line,) = [line for line in figure.axes[0].lines if line.get_label() == "flown track"]
-    assert line.get_color() == FLOWN
+    assert line.get_color() == theme.colour("flown")
     np.testing.assert_allclose(line.get_xydata()[0], track.position[0, :2])
     np.testing.assert_allclose(line.get_xydata()[-1], track.position[-1, :2])
     assert figure.axes[0].get_aspect() == 1.0
@@ -171,7 +176,7 @@ def test_map_shows_the_track_where_it_was_flown() -> None:
 def test_map_widens_to_a_flight_that_left_the_area() -> None:
     outside = ROUTE.copy()
     outside[2] = [3000.0, 900.0, 400.0]
-    figure = draw_map(
+    figure = drawn_map(
         make_scenario(), plan_waypoints=ROUTE, route_waypoints=ROUTE, track=make_track(outside), verdict=None
     )
     axes = figure.axes[0]
@@ -182,8 +187,25 @@ def test_map_widens_to_a_flight_that_left_the_area() -> None:
 
 def test_zones_are_drawn_and_named() -> None:
     zones = [{"name": "town", "kind": "exclusion", "east_m": 0, "north_m": -500, "radius_m": 150}]
-    figure = draw_map(make_scenario(zones=zones), **ALL, track=None, verdict=None)
-    boxes = [path.get_extents() for item in figure.axes[0].collections for path in item.get_paths()]
-    assert any((box.x0, box.x1, box.y0, box.y1) == pytest.approx((-150, 150, -650, -350)) for box in boxes)
+    figure = drawn_map(make_scenario(zones=zones), **ALL, track=None, verdict=None)
+    boxes = [patch.get_path().get_extents() for patch in figure.axes[0].patches]
+    assert any((box.x0, box.x1, box.y0, box.y1) == pytest.approx((-150, 150, -650, -350), rel=0.02) for box in boxes)
     assert "town" in {text.get_text() for text in figure.axes[0].texts}
     assert "zone to keep out of" in {text.get_text() for text in figure.legends[0].get_texts()}
+
+
+def test_a_plan_is_told_from_a_route_that_differs_by_over_a_metre() -> None:
+    def paths(plan: np.ndarray | None) -> list[str]:
+        chart = flight_map(make_scenario(), plan_waypoints=plan, route_waypoints=ROUTE, track=None, verdict=None)
+        return [layer.name for layer in chart.panel.layers if layer.role in ("planned", "searched")]
+
+    assert paths(None) == ["route of the mission"]
+    assert paths(ROUTE + np.array([0.0, 0.5, 0.0])) == ["planned path"]
+    assert paths(ROUTE + np.array([0.0, 2.0, 0.0])) == ["plan as searched", "route of the mission"]
+
+
+def test_the_page_has_the_flights_moments_instead_of_its_points() -> None:
+    made = map_json(flight_map(make_scenario(), **ALL, track=make_track(), verdict=None))
+    flown = [layer for layer in made["layers"] if "flight" in layer]
+    assert [(layer["role"], layer["flight"], "x" in layer) for layer in flown] == [("flown", 0, False)]
+    assert [label[0] for label in made["labels"]] == ["0 start", "3 destination", "1", "2"]

@@ -3,35 +3,98 @@
 import numpy as np
 import pytest
 
-from logs.views.figures import draw_profile
-from tests.logs.views.figure_data import ALL, ROUTE, make_scenario, make_track
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.findings import Verdict
+from logs.verdict.places import Place
+from logs.views.charts import Chart, Layer
+from logs.views.profile import profile_chart
+from tests.logs.views.figure_data import ALL, ROUTE, drawn_profile, make_scenario, make_track, make_verdict
+from tests.logs.views.report.report_data import EVIL
+from tests.logs.views.report.report_data import make_setup as report_setup
+from tests.logs.views.report.report_data import make_track as report_track
 
 
 def test_profile_shows_ground_and_heights_along_the_route() -> None:
     scenario = make_scenario()
     track = make_track()
-    axes = draw_profile(scenario, **ALL, track=track, verdict=None).axes[0]
-    plan, flown = (
-        next(line for line in axes.lines if line.get_label() == label) for label in ("planned heights", "flown heights")
-    )
-    np.testing.assert_allclose(plan.get_xydata(), np.column_stack([[0.0, 1.0, 1.8, 2.4], ROUTE[:, 2]]))
+    axes = drawn_profile(scenario, **ALL, track=track, verdict=None).axes[0]
+    plan, flown = (next(line for line in axes.lines if line.get_label() == label) for label in ("planned", "flown"))
+    np.testing.assert_allclose(np.interp([0.0, 1.0, 1.8, 2.4], *plan.get_xydata().T), ROUTE[:, 2])
     # The track lies on the route, so both heights agree everywhere.
     np.testing.assert_allclose(
         flown.get_ydata(), np.interp(flown.get_xdata(), [0.0, 1.0, 1.8, 2.4], ROUTE[:, 2]), atol=1e-6
     )
-    ground = next(line for line in axes.lines if line.get_color() == "#6b5a3a")
-    middle = np.argmin(np.abs(ground.get_xdata() - 1.4))  # at (100, 0): 250 exp(-100^2 / (2 400^2)) m
-    assert ground.get_ydata()[middle] == pytest.approx(250.0 * np.exp(-(0.25**2) / 2), abs=0.3)
+    (terrain,) = [
+        layer
+        for layer in profile_chart(scenario, **ALL, track=None, verdict=None).panels[0].layers
+        if layer.name == "terrain"
+    ]
+    # At (100, 0).
+    assert np.interp(1.4, terrain.x, terrain.y) == pytest.approx(250.0 * np.exp(-(0.25**2) / 2), abs=0.3)
 
 
 def test_the_greatest_height_follows_the_ground_and_a_zone_takes_its_band() -> None:
     square = [[-300, -900], [300, -900], [300, 900], [-300, 900]]
     zone = {"name": "town", "kind": "exclusion", "polygon_m": square, "floor_agl_m": 400}
     limits = {"min_clearance_m": 10, "max_height_m": 350}
-    figure = draw_profile(make_scenario(zones=[zone], limits=limits), **ALL, track=None, verdict=None)
+    scenario = make_scenario(zones=[zone], limits=limits)
+    figure = drawn_profile(scenario, **ALL, track=None, verdict=None)
     axes = figure.axes[0]
     most = next(line for line in axes.lines if line.get_label() == "greatest height, 350 m above ground")
-    ground = next(line for line in axes.lines if line.get_color() == "#6b5a3a")
-    np.testing.assert_allclose(most.get_ydata() - ground.get_ydata(), 350.0)
+    (terrain,) = [
+        layer
+        for layer in profile_chart(scenario, **ALL, track=None, verdict=None).panels[0].layers
+        if layer.name == "terrain"
+    ]
+    np.testing.assert_allclose(most.get_ydata() - terrain.y, 350.0)
     assert "zone to keep out of" in {text.get_text() for text in figure.legends[0].get_texts()}
     assert axes.get_ylim()[1] >= most.get_ydata().max()
+
+
+# Over level ground, along a path that passes beside a missile.
+
+
+def of(setup: FlightSetup, track: Track | None, verdict: Verdict | None = None) -> Chart:
+    paths = {"plan_waypoints": None, "route_waypoints": setup.route.waypoints}
+    return profile_chart(setup.scenario, **paths, track=track, verdict=verdict)
+
+
+def layers(chart: Chart) -> dict[str, Layer]:
+    return {layer.name: layer for layer in chart.panels[0].layers}
+
+
+def test_heights_ground_and_clearance_are_those_of_plan_flight_and_terrain() -> None:
+    setup = report_setup()
+    chart = of(setup, report_track())
+    found = layers(chart)
+    # 1000, 800 and 600 m along; 300, 340, 380, 360 m high; level ground at 200 m.
+    assert found["waypoint, numbered"].x == pytest.approx([0.0, 1.0, 1.8, 2.4])
+    assert np.interp([0.5, 2.1], found["flown"].x, found["flown"].y) == pytest.approx([320.0, 370.0], abs=0.5)
+    assert found["terrain"].y == pytest.approx(200.0)
+    required = setup.scenario.limits.min_clearance_m
+    (clearance,) = (layer for name, layer in found.items() if name.startswith("required clearance"))
+    assert clearance.low == pytest.approx(200.0)
+    assert clearance.y == pytest.approx(200.0 + required)
+    assert [mark for _, mark in chart.marks] == ["leg 0", "leg 1", "leg 2"]
+
+
+def test_a_sphere_is_cut_where_the_path_runs_through_its_column_of_air() -> None:
+    found = layers(of(report_setup(), None))
+    sphere = found[f"{EVIL[:40]} (missile)"]
+    over = np.isfinite(sphere.y)
+    # 250 m about (300, 0) on the ground at 200 m; the second leg goes north at 100 m east, 200 m beside it.
+    assert sphere.x[over].min() == pytest.approx(1.4 - 0.15, abs=0.01)
+    assert sphere.x[over].max() == pytest.approx(1.4 + 0.15, abs=0.01)
+    assert np.nanmax(sphere.y) == pytest.approx(200.0 + 150.0, abs=1.0)
+    assert sphere.legend == "missile's sphere over the path"
+
+
+def test_what_fails_and_zones_are_marked() -> None:
+    zone = {"name": "town", "kind": "exclusion", "east_m": 100, "north_m": 0, "radius_m": 200, "ceiling_amsl_m": 400}
+    found = layers(of(report_setup(zones=[zone]), None, make_verdict(("slope", Place("leg", 2)))))
+    assert found["leg that fails a rule"].x == pytest.approx([1.8, 2.4])
+    (town,) = (layer for name, layer in found.items() if name.startswith("town"))
+    inside = town.x[np.isfinite(town.y)]
+    assert (inside.min(), inside.max()) == pytest.approx((1.2, 1.6), abs=0.01)
+    assert np.nanmax(town.y) == pytest.approx(400.0)

@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from logs import theme
 from logs.verdict.places import Place
-from logs.views.drawing import ZONE, png_bytes
-from logs.views.scene import Projection, draw_scene
+from logs.views.draw_scene import Projection, draw_scene
+from logs.views.drawing import png_bytes
+from logs.views.failures import failures
+from logs.views.scene import SceneView
 from tests.logs.views.figure_data import make_verdict
 from tests.logs.views.report.report_data import make_setup, make_track
 
@@ -40,19 +43,23 @@ def test_a_step_to_the_viewer_stays_on_its_spot_and_comes_nearer(azimuth: float,
     assert math.hypot(*projection.toward[:2]) == pytest.approx(1.0)
 
 
+def drawn(setup: Any, track: Any, verdict: Any) -> Any:
+    return draw_scene(SceneView(setup, track, failures(verdict, len(setup.route.waypoints))))
+
+
 def legend(figure: Any) -> set[str]:
     return {text.get_text() for text in figure.legends[0].get_texts()}
 
 
 def test_what_is_there_is_drawn_and_named() -> None:
-    flown = draw_scene(make_setup(), make_track(), make_verdict(("slope", Place("leg", 1))))
+    flown = drawn(make_setup(), make_track(), make_verdict(("slope", Place("leg", 1))))
     # From (-900, -400) to (700, 400): seen from the south-south-east, the nearest of eight names of which is the south.
     assert flown.axes[0].get_title(loc="left").startswith("small: seen from the south")
     assert {"planned path", "flown track", "missile's reach", "waypoint above the ground"} <= legend(flown)
     assert "leg that fails a rule" in legend(flown)
     names = {text.get_text() for text in flown.axes[0].texts}
     assert {"start", "destination", "1", "2"} <= names
-    planned = draw_scene(make_setup(terrain={"kind": "none"}, threats=[]), None, None)
+    planned = drawn(make_setup(terrain={"kind": "none"}, threats=[]), None, None)
     assert "no terrain: level at mid height" in legend(planned)
     assert not {"flown track", "missile's reach", "leg that fails a rule"} & legend(planned)
     assert png_bytes(planned).startswith(b"\x89PNG")
@@ -63,7 +70,7 @@ def test_a_path_behind_a_ridge_is_drawn_dashed() -> None:
     ridge = [{"east_m": east, "north_m": -900, "height_m": 400, "sigma_m": 200} for east in range(-1200, 1201, 150)]
 
     def dashed(setup: Any) -> int:
-        lines = draw_scene(setup, None, None).axes[0].lines
+        lines = drawn(setup, None, None).axes[0].lines
         thin = [line for line in lines if line.get_linewidth() == pytest.approx(1.8)]
         return sum(int(np.isfinite(line.get_ydata()).sum()) for line in thin)
 
@@ -80,8 +87,8 @@ def test_zones_are_bodies_from_the_ground_up() -> None:
     square = [[-300, -300], [300, -300], [300, 300], [-300, 300]]
     zone = {"name": "town", "kind": "exclusion", "polygon_m": square, "ceiling_amsl_m": 500}
     setup = make_setup(zones=[zone], terrain={"kind": "flat", "amsl_m": 40})
-    figure = draw_scene(setup, None, None)
-    edges = [line for line in figure.axes[0].lines if line.get_color() == ZONE]
+    figure = drawn(setup, None, None)
+    edges = [line for line in figure.axes[0].lines if line.get_color() == theme.colour("zone")]
     assert len(edges) == 2
     lower, upper = (line.get_ydata() for line in edges)
     # All of it is 460 m high, seen from 36 degrees above; the title says how much heights are stretched.
@@ -106,7 +113,7 @@ def test_a_long_and_narrow_scene_is_no_strip() -> None:
     straight = np.array([[-2000.0, 0.0, 300.0], [0.0, 0.0, 300.0], [2000.0, 0.0, 300.0]])
     straight = np.vstack([straight, [[2050.0, 0.0, 300.0]]])
     setup = replace(setup, route=replace(setup.route, waypoints=straight))
-    figure = draw_scene(setup, None, None)
+    figure = drawn(setup, None, None)
     west_south, east_south, east_north, _ = ground_corners(figure)
     # Seen from 45 degrees round: each metre east is cos 45 degrees to the right, each metre north as much to the right.
     turned = math.sqrt(0.5)
@@ -118,7 +125,7 @@ def test_a_long_and_narrow_scene_is_no_strip() -> None:
 
 def test_entered_missiles_are_outlined_and_named() -> None:
     def outlined(*bad: tuple[str, Place]) -> int:
-        figure = draw_scene(make_setup(), make_track(), make_verdict(*bad))
+        figure = drawn(make_setup(), make_track(), make_verdict(*bad))
         return sum(patch.get_linewidth() == 2.2 for patch in figure.axes[0].patches)
 
     assert outlined(("slope", Place("leg", 1))) == 0

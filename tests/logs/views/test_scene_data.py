@@ -11,6 +11,7 @@ from logs.views.failures import Failures
 from logs.views.scene import (
     MAX_GROUND,
     MISSING,
+    SceneView,
     drawn_rows,
     exaggeration,
     ground_grid,
@@ -80,7 +81,7 @@ def test_the_track_is_thinned_to_both_its_ends() -> None:
 def test_the_text_holds_the_scene_and_ends_no_script() -> None:
     evil = "</script><b>&"
     setup = replace(SETUP, scenario=replace(SETUP.scenario, name=evil))
-    text = script_json(scene_data(setup, make_track(), Failures({1: ("slope",)}, {2: ("turn",)})))
+    text = script_json(scene_data(SceneView(setup, make_track(), Failures({1: ("slope",)}, {2: ("turn",)}))))
     assert not set("<>&") & set(text)
     scene = json.loads(text)
     assert scene["name"] == evil
@@ -101,14 +102,14 @@ def test_the_text_holds_the_scene_and_ends_no_script() -> None:
 
 def test_a_scene_without_terrain_has_no_ground() -> None:
     bare = replace(SETUP, scenario=replace(SETUP.scenario, terrain=None, external=True))
-    assert scene_data(bare, None, NOTHING)["ground"] is None
+    assert scene_data(SceneView(bare, None, NOTHING))["ground"] is None
 
 
 def test_zones_stand_in_the_scene_where_there_are_any() -> None:
-    assert "zones" not in scene_data(SETUP, None, NOTHING)
+    assert "zones" not in scene_data(SceneView(SETUP, None, NOTHING))
     zone = {"name": "</script>", "kind": "exclusion", "east_m": 0, "north_m": 0, "radius_m": 200, "ceiling_amsl_m": 900}
     setup = make_setup(zones=[zone], terrain={"kind": "flat", "amsl_m": 40})
-    text = script_json(scene_data(setup, None, NOTHING))
+    text = script_json(scene_data(SceneView(setup, None, NOTHING)))
     assert "<" not in text
     (found,) = json.loads(text)["zones"]
     ring = np.array(found["rings"][0])

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 
+from logs import theme
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import FLIGHT, Place
-from logs.views.drawing import FAIL, FLOWN
-from logs.views.turns import draw_turns, place_values
+from logs.views.drawing import draw_chart
+from logs.views.turns import place_values, turn_chart
 
 
 def slope(leg: int, planned: float, flown: float | None, ok: bool | None) -> Finding:
@@ -35,18 +36,18 @@ def test_values_are_in_the_order_of_their_places_and_the_flights_own_are_left_ou
 
 
 def test_bars_dots_and_dashes_stand_at_the_findings_numbers() -> None:
-    figure = draw_turns("a flight", Verdict(FINDINGS, False, True, ("not flyable",), "flown"))
+    figure = draw_chart(turn_chart("a flight", Verdict(FINDINGS, False, True, ("not flyable",), "flown")))
     turn, slopes = figure.axes
     assert (turn.get_xlabel(), slopes.get_xlabel()) == ("waypoint", "leg")
     heights = {round(bar.get_x() + bar.get_width() / 2.0): bar.get_height() for bar in slopes.patches}
     assert heights == {0: 4.0, 1: 6.0, 2: 7.0}
-    dots = next(line for line in slopes.lines if line.get_color() == FLOWN)
+    dots = next(line for line in slopes.lines if line.get_color() == theme.colour("flown"))
     np.testing.assert_array_equal(dots.get_xydata(), [[0.0, 4.5], [1.0, 9.0], [2.0, np.nan]])
-    dashes = slopes.collections[0].get_segments()
+    (dashes,) = [item.get_segments() for item in slopes.collections if hasattr(item, "get_segments")]
     assert [segment[0][1] for segment in dashes] == [8.0, 8.0, 8.0]
-    ring = next(line for line in slopes.lines if line.get_markeredgecolor() == FAIL)
+    ring = next(line for line in slopes.lines if line.get_markeredgecolor() == theme.colour("fail"))
     np.testing.assert_array_equal(ring.get_xydata(), [[1.0, 9.0]])
-    red = [label.get_text() for label in slopes.get_xticklabels() if label.get_color() == FAIL]
+    red = [label.get_text() for label in slopes.get_xticklabels() if label.get_color() == theme.colour("fail")]
     assert red == ["1"]
     assert "fails" in [text.get_text() for text in figure.legends[0].get_texts()]
 
@@ -61,13 +62,13 @@ def test_the_highest_bar_dot_and_ring_are_whole() -> None:
         Finding("turn", Place("waypoint", 1), 134.0, 134.0, 15.0, "aircraft", 0.1, -1.0, "deg", "fit", False, ""),
         Finding("slope", Place("leg", 0), -20.0, -21.0, -8.0, "aircraft", 0.1, -1.0, "deg", "fit", False, ""),
     ]
-    figure = draw_turns("a flight", Verdict(tuple(found), False, True, ("not flyable",), "flown"))
+    figure = draw_chart(turn_chart("a flight", Verdict(tuple(found), False, True, ("not flyable",), "flown")))
     figure.canvas.draw()
     turn, slopes, clearance = figure.axes
     for axes, value in ((turn, 134.0), (slopes, -21.0)):
         _, at = axes.transData.transform((0.0, value))
         # The ring's radius: half its size and its edge, in points of 150/72 pixels.
-        radius = (0.5 * 12.5 + 1.0) * 150.0 / 72.0
+        radius = (0.5 * 12.0 + 1.1) * 150.0 / 72.0
         assert axes.bbox.y0 <= at - radius
         assert at + radius <= axes.bbox.y1
     assert clearance.get_ylim()[1] > 1800.0
@@ -77,14 +78,16 @@ def test_the_highest_bar_dot_and_ring_are_whole() -> None:
 def test_limits_far_above_all_turns_are_named_instead() -> None:
     far = Finding("turn", Place("waypoint", 1), 10.0, 10.0, 152.0, "aircraft", 0.1, 1.0, "deg", "fit", True, "")
     near = Finding("turn", Place("waypoint", 2), 10.0, 12.0, 45.0, "aircraft", 0.1, 1.0, "deg", "fit", True, "")
-    (axes,) = draw_turns("a flight", Verdict((far, near), True, True, ("flyable",), "flown")).axes
+    (axes,) = draw_chart(turn_chart("a flight", Verdict((far, near), True, True, ("flyable",), "flown"))).axes
     assert 45.0 < axes.get_ylim()[1] < 60.0
     assert [text.get_text() for text in axes.texts] == ["other limits from 152°"]
 
 
 def test_nothing_is_ringed_where_nothing_fails() -> None:
-    figure = draw_turns("a flight", Verdict(FINDINGS[:4], True, True, ("flyable",), "flown"))
+    figure = draw_chart(turn_chart("a flight", Verdict(FINDINGS[:4], True, True, ("flyable",), "flown")))
     assert "fails" not in [text.get_text() for text in figure.legends[0].get_texts()]
     for axes in figure.axes:
-        assert all(not len(line.get_xdata()) for line in axes.lines if line.get_markeredgecolor() == FAIL)
-    assert draw_turns("nothing", Verdict((), True, True, ("flyable",), "flown")).axes == []
+        assert all(
+            not len(line.get_xdata()) for line in axes.lines if line.get_markeredgecolor() == theme.colour("fail")
+        )
+    assert draw_chart(turn_chart("nothing", Verdict((), True, True, ("flyable",), "flown"))).axes == []

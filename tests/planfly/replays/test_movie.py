@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageColor
 
+from logs import theme
 from logs.recording.reader import FlightLog, read_log
 from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.cli import main
@@ -41,7 +42,8 @@ def test_a_gif_holds_the_frames(
     # 255 colours instead of all: near everywhere, and the trail is where it was.
     assert np.abs(last - wanted[-1]).mean() < 4.0
     # What is drawn keeps its colour to the bit: aircraft, trail, path, start and destination, radars.
-    for colour in ("#B0408A", "#000000", "#56B4E9", "#F0E442"):
+    for name in ("aircraft", "flown", "planned", "highlight"):
+        colour = theme.colour(name)
         there = (wanted[-1] == ImageColor.getrgb(colour)).all(axis=2)
         assert there.sum() > 20, colour
         np.testing.assert_array_equal(last[there], wanted[-1][there])

@@ -6,8 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logs import theme
 from logs.recording.reader import FlightLog, read_log
 from logs.views.replay.movie_frames import MovieFrames, signed_number
+
+AIRCRAFT = [round(255 * part) for part in theme.rgb(theme.colour("aircraft"))]
 
 
 @pytest.mark.parametrize(
@@ -35,7 +38,7 @@ def test_the_aircraft_moves_over_a_map_that_stands_still(log: FlightLog) -> None
     # The aircraft's colour moves from the lower left to the upper right, as the waypoints do.
     middles = []
     for frame in frames:
-        rows, columns = np.nonzero(np.abs(frame.astype(int) - [0xB0, 0x40, 0x8A]).max(axis=2) < 8)
+        rows, columns = np.nonzero(np.abs(frame.astype(int) - AIRCRAFT).max(axis=2) < 8)
         middles.append((columns.mean(), -rows.mean()))
     assert all(a[0] < b[0] and a[1] < b[1] for a, b in itertools.pairwise(middles))
     again = list(film.frames())

@@ -11,7 +11,15 @@ import pytest
 
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
-from logs.views.report.compare import Comparison, compare_logs, difference_lines, write_comparison
+from logs.views.compare import NamedFlight
+from logs.views.report.compare import (
+    Comparison,
+    compare_logs,
+    comparison_data,
+    comparison_views,
+    difference_lines,
+    write_comparison,
+)
 
 
 def compared(first: FlightLog, second: FlightLog) -> tuple[Comparison, dict[str, Any]]:
@@ -71,3 +79,22 @@ def test_pictures_and_page_are_whole_and_the_same_bytes_each_time(
     assert page.count("data:image/png;base64,") == 2
     assert 'src="compare' not in page
     assert [file.read_bytes() for file in write_comparison(tmp_path / "out", found, svg=True)] == first
+
+
+def test_the_page_has_both_flights_and_a_map_where_they_share_an_origin(log_file: Path) -> None:
+    log = read_log(log_file)
+    first = NamedFlight("a.mcap", log.setup, log.track)
+
+    def data(second: NamedFlight) -> dict[str, Any]:
+        return comparison_data((first, second), comparison_views((first, second)))
+
+    made = data(replace(first, name="b.mcap"))
+    assert [(one["name"], one["role"]) for one in made["flight"]["flights"]] == [
+        ("a.mcap", "flown"),
+        ("b.mcap", "other"),
+    ]
+    assert [layer["name"] for layer in made["charts"]["along"]["panels"][0]["layers"]] == ["a.mcap", "b.mcap"]
+    origin = log.setup.scenario.origin
+    away = replace(log.setup.scenario, origin=replace(origin, lat_deg=origin.lat_deg + 1.0))
+    apart = data(replace(first, setup=replace(log.setup, scenario=away)))
+    assert (apart["scene"], "map" in apart["charts"]) == (None, False)

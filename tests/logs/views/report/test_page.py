@@ -5,24 +5,26 @@ import gzip
 import hashlib
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from plotly.offline import get_plotlyjs
 
 import logs.views.figures
-from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track
 from logs.verdict.findings import Verdict
 from logs.verdict.places import Place
-from logs.views.figures import FIGURE_FILES
+from logs.views.figures import FIGURES, View, figure_views, subject_of
 from logs.views.report.page import (
     CHART_SCRIPTS,
     VIEW_SCRIPTS,
+    page_charts,
     page_library,
+    report_flight,
     report_pictures,
     script_text,
     style_text,
@@ -42,12 +44,14 @@ from tests.logs.views.report.report_data import (
 )
 from tests.soak import SOAK
 
-NAMES = (*FIGURE_FILES, "time", "exposure", "controls", "energy")
+NAMES = [entry.name for entry in FIGURES]
+FILES = [entry.name for entry in FIGURES if entry.file]
+FLOWN = subject_of(make_setup(), make_track(), VERDICT)
 DRAWN = {f"{name}.png": name.encode() for name in NAMES}
 
 
 def test_every_picture_that_is_drawn_has_its_caption_and_its_bytes() -> None:
-    pictures = report_pictures(make_setup(), True, DRAWN)
+    pictures = report_pictures(FLOWN, DRAWN)
     assert sorted(picture.identifier for picture in pictures) == sorted(NAMES)
     for picture in pictures:
         head, _, data = picture.data.partition(",")
@@ -61,22 +65,39 @@ def test_every_picture_that_is_drawn_has_its_caption_and_its_bytes() -> None:
 
 
 def test_what_was_not_drawn_is_left_out_in_the_same_order() -> None:
-    whole = [picture.identifier for picture in report_pictures(make_setup(), True, DRAWN)]
+    whole = [picture.identifier for picture in report_pictures(FLOWN, DRAWN)]
     some = {name: data for name, data in DRAWN.items() if name not in ("scene.png", "time.png")}
-    left = [picture.identifier for picture in report_pictures(make_setup(), True, some)]
+    left = [picture.identifier for picture in report_pictures(FLOWN, some)]
     assert left == [name for name in whole if name not in ("scene", "time")]
-    assert report_pictures(make_setup(), True, {}) == []
+    assert report_pictures(FLOWN, {}) == []
 
 
 def test_a_plan_alone_is_not_said_to_have_been_flown() -> None:
     setup = make_setup(terrain={"kind": "none"}, threats=[])
     drawn = {name: DRAWN[name] for name in ("map.png", "profile.png", "scene.png")}
-    flown, planned = report_pictures(make_setup(), True, drawn), report_pictures(setup, False, drawn)
+    flown, planned = report_pictures(FLOWN, drawn), report_pictures(subject_of(setup, None, VERDICT), drawn)
     assert all("flown" in picture.alternative for picture in flown)
     assert not any("flown" in picture.alternative for picture in planned)
     # Three legs and one unit over terrain; the other has neither.
     assert "shaded terrain, 1 threats, the planned path of 3 legs" in flown[0].alternative
     assert "no terrain, 0 threats, the planned path of 3 legs." in planned[0].alternative
+
+
+def test_there_is_a_chart_for_every_figure_with_data() -> None:
+    charts = page_charts(figure_views(FLOWN))
+    # The flight is exposed to nothing.
+    assert set(charts) == {"map", "profile", "scene", "turns", "envelope", "time", "controls", "energy"}
+    json.dumps(charts, allow_nan=False)
+    planned = page_charts(figure_views(subject_of(make_setup(), None, VERDICT)))
+    assert set(planned) == {"map", "profile", "scene", "turns", "envelope"}
+
+
+def test_a_flight_without_a_known_place_is_none_to_show() -> None:
+    setup, track = make_setup(), make_track()
+    assert len(report_flight(setup, track)["flights"]) == 1
+    assert report_flight(setup, None)["flights"] == []
+    lost = replace(track, position=np.full_like(track.position, np.nan))
+    assert report_flight(setup, lost)["flights"] == []
 
 
 # ----------------------------------------------------------------------
@@ -115,11 +136,11 @@ def test_every_script_stands_in_the_page_once_and_none_is_long() -> None:
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave pictures undrawn: they cost most of a second, and most tests here read text."""
 
-    def draw(
-        setup: FlightSetup, track: Track | None, verdict: Verdict | None, *, svg: bool = False
-    ) -> dict[str, bytes]:
-        flown = ("time", "exposure", "controls", "energy") if track is not None and len(track) else ()
-        return {f"{name}.png": PNG for name in (*FIGURE_FILES, *flown)}
+    def draw(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
+        return {
+            f"{name}.png": PNG
+            for name in (*FILES, *(("time", "exposure", "controls", "energy") if "time" in views else ()))
+        }
 
     monkeypatch.setattr(logs.views.figures, "draw_pictures", draw)
 
@@ -217,7 +238,7 @@ def test_a_plan_that_was_not_flown_has_a_report() -> None:
 def test_pictures_are_drawn_into_page_and_files(tmp_path: Path) -> None:
     out = tmp_path / "made" / "here"
     paths = write_report(out, make_setup(), make_track(), VERDICT, **ARGUMENTS)
-    assert [path.name for path in paths] == [*(f"{name}.png" for name in FIGURE_FILES), "report.html"]
+    assert [path.name for path in paths] == [*(f"{name}.png" for name in FILES), "report.html"]
     assert {path.name for path in out.iterdir()} == {path.name for path in paths}
     html = paths[-1].read_text(encoding="utf-8")
     assert len(html) < 8e6
@@ -229,7 +250,7 @@ def test_pictures_are_drawn_into_page_and_files(tmp_path: Path) -> None:
     more = write_report(out, make_setup(), make_track(), VERDICT, svg=True, **ARGUMENTS)
     assert {path.name: path.read_bytes() for path in paths} == before
     drawn = [path for path in more if path.suffix == ".svg"]
-    assert [path.stem for path in drawn] == list(FIGURE_FILES)
+    assert [path.stem for path in drawn] == list(FILES)
     first = [path.read_bytes() for path in drawn]
     assert all(ElementTree.fromstring(data).tag.endswith("svg") for data in first)
     if SOAK:

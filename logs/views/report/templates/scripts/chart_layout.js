@@ -23,7 +23,7 @@ function chartLayout(theme, width, names) {
   const narrow = isNarrow(width), rows = legendRows(names, width - 20), touch = window.matchMedia("(pointer: coarse)").matches;
   return {
     width,
-    paper_bgcolor: "rgba(0,0,0,0)",
+    paper_bgcolor: theme.clear,
     plot_bgcolor: theme.colour("plot"),
     font: { family: CHART_FONT, size: narrow ? 11 : 12, color: theme.colour("ink") },
     hoverlabel: {
@@ -35,10 +35,10 @@ function chartLayout(theme, width, names) {
     showlegend: names.length > 0,
     legend: {
       orientation: "h", x: 0, xanchor: "left", y: 1, yanchor: "top", yref: "container", xref: "container",
-      font: { size: narrow ? 11 : 12 }, bgcolor: "rgba(0,0,0,0)", itemsizing: "constant", tracegroupgap: 0,
+      font: { size: narrow ? 11 : 12 }, bgcolor: theme.clear, itemsizing: "constant", tracegroupgap: 0,
     },
     modebar: {
-      orientation: "h", bgcolor: "rgba(0,0,0,0)", color: theme.colour("quiet"), activecolor: theme.colour("ink"),
+      orientation: "h", bgcolor: theme.clear, color: theme.colour("quiet"), activecolor: theme.colour("ink"),
     },
     // A finger scrolls the page; with the buttons it zooms.
     dragmode: touch ? false : "zoom",

@@ -1,33 +1,12 @@
 // The map: ground in relief, threats, zones, plan and flights from above, in km.
 
-function mapFigure(map, { scene, ground, flights }, theme, width) {
-  const km = (metres) => (metres === null ? null : metres / 1000);
-  const traces = [], images = [];
-  function add(points, look, more) {
-    traces.push({
-      type: "scatter", mode: "lines", x: points.map((point) => point && km(point[0])), y: points.map((point) => point && km(point[1])),
-      line: { color: theme.colour(look), width: 1.5 }, hoverinfo: "skip", showlegend: true, legendgroup: more.name, ...more,
-    });
-  }
-  if (ground) groundOfMap(ground, theme, traces, images, km);
-  if (map.area) add(ring(map.area), "quiet", { name: "edge of the area", line: { color: theme.colour("quiet"), width: 1, dash: "10px,4px" } });
-  threatsOfMap(scene.threats, map.reach, map.entered, theme, add);
-  for (const zone of scene.zones || []) for (const walls of zone.rings) add(walls.map((corner) => corner[1]), "zone", {
-    name: zone.keep_out ? "zone to keep out of" : "edge of a zone to stay in", line: { color: theme.colour("zone"), width: zone.keep_out ? 1.5 : 3 },
-    fill: zone.keep_out ? "toself" : "none", fillcolor: theme.faint("zone", 0.18), text: plainName(zone.name), hoverinfo: "text", hoveron: "points+fills",
-  });
-  for (const leg of scene.failing.legs) add([scene.plan[leg], scene.plan[leg + 1]], "fail", {
-    name: "leg that fails", line: { color: theme.colour("fail"), width: 11 },
-  });
-  if (map.searched) add(map.searched, "quiet", { name: "plan as searched", line: { color: theme.colour("quiet"), width: 1.5, dash: "dashdot" } });
-  add(scene.plan, "planned", { name: map.routeName, line: { color: theme.colour("planned"), width: 4 } });
-  for (const flight of flights) add(flight.east.map((east, k) => [east, flight.north[k]]), flight.look, {
-    name: plainName(flight.name), text: flight.time.map((_, k) => flownWords(flight, k)), hoverinfo: "text",
-    line: { color: theme.colour(flight.look), width: 1.8, dash: flight.dashed ? "6px,3px" : "solid" },
-  });
-  waypointsOfMap(scene, map, theme, add, width);
+function mapFigure(map, { ground, flights }, theme, width) {
+  const traces = [], images = [], axes = { xaxis: "x", yaxis: "y" };
+  if (ground) groundOfMap(ground, theme, traces, images);
+  for (const layer of map.layers) traces.push(...layerTraces(layer, axes, "", theme, 0.001, flights));
+  traces.push(...labelTraces(map.labels, axes, theme, width, 0.001));
   const names = nameOnce(traces), layout = chartLayout(theme, width, names);
-  const [[west, east], [south, north]] = map.shown.map((side) => side.map(km));
+  const [[west, east], [south, north]] = [map.east, map.north].map((side) => side.map(km));
   const inner = width - layout.margin.l - layout.margin.r, aspect = (north - south) / (east - west);
   const tall = Math.min(Math.max(inner * aspect, 160), 780);
   layout.margin.t -= 28;
@@ -41,9 +20,9 @@ function mapFigure(map, { scene, ground, flights }, theme, width) {
   return { traces, layout };
 }
 
-function ring([[west, east], [south, north]]) { return [[west, south], [east, south], [east, north], [west, north], [west, south]]; }
+function km(metres) { return metres / 1000; }
 
-function groundOfMap(ground, theme, traces, images, km) {
+function groundOfMap(ground, theme, traces, images) {
   const { columns, rows, west, south, pitchEast, pitchNorth, low, high } = ground;
   images.push({
     source: reliefPicture(ground, theme), xref: "x", yref: "y", layer: "below", sizing: "stretch",
@@ -68,44 +47,6 @@ function groundOfMap(ground, theme, traces, images, km) {
     type: "contour", x, y, z, showscale: false, hoverinfo: "skip", name: `contours every ${size} m AMSL`, showlegend: true,
     legendgroup: `contours every ${size} m AMSL`, line: { width: 0.6, color: theme.colour("contour") },
     contours: { coloring: "none", start: Math.ceil(low / size) * size, end: high, size, showlabels: true, labelfont: { size: 9, color: theme.colour("contour") } },
-  });
-}
-
-function circle([east, north], radius) {
-  return Array.from({ length: 73 }, (_, k) => [east + radius * Math.cos(k * Math.PI / 36), north + radius * Math.sin(k * Math.PI / 36)]);
-}
-
-function threatsOfMap(threats, reach, entered, theme, add) {
-  threats.forEach((threat, k) => {
-    const words = `${plainName(threat.name)}${threat.kill > 0 ? `<br>missile: ${numberText(threat.kill, 0)} m` : ""}` +
-      `${threat.detection > 0 ? `<br>radar: ${numberText(threat.detection, 0)} m` : ""}`;
-    const seen = { text: words, hoverinfo: "text", hoveron: "points+fills" };
-    if (threat.detection > 0) add(circle(threat.at, threat.detection), "radar", {
-      name: "radar: sphere's radius", line: { color: theme.colour("radar"), width: 1.3, dash: "5px,4px" },
-    });
-    if (reach[k] > 0) add(circle(threat.at, reach[k]), "missile", {
-      name: "missile: its reach at path height", line: { width: 0, color: theme.colour("missile") }, fill: "toself", fillcolor: theme.faint("missile", 0.3), ...seen,
-    });
-    if (threat.kill > 0) add(circle(threat.at, threat.kill), entered.includes(k) ? "fail" : "missile", entered.includes(k) ?
-      { name: "threat entered", line: { color: theme.colour("fail"), width: 3 } } :
-      { name: "missile: sphere's radius", line: { color: theme.colour("missile"), width: 1.3 } });
-    add([threat.at], "ink", { name: "", showlegend: false, mode: "markers", marker: { symbol: "x-thin", size: 6, line: { width: 1, color: theme.colour("ink") } }, ...seen });
-  });
-}
-
-function waypointsOfMap(scene, map, theme, add, width) {
-  const step = Math.max(1, Math.ceil(scene.plan.length / (isNarrow(width) ? 15 : 40)));
-  const failing = new Set(scene.failing.waypoints), dot = { size: 7, color: theme.colour("paper"), line: { width: 1.5, color: theme.colour("second") } };
-  add(scene.plan, "second", {
-    name: "waypoint, numbered", mode: "markers+text", marker: dot, hovertext: map.waypoints, hoverinfo: "text",
-    text: scene.plan.map((_, k) => (k % step === 0 || failing.has(k) ? `<b>${k}</b>` : "")), textposition: "top right",
-    textfont: { size: 11, color: theme.colour("second") },
-  });
-  if (failing.size) add([...failing].map((k) => scene.plan[k]), "fail", {
-    name: "waypoint that fails", mode: "markers", marker: { symbol: "circle-open", size: 16, color: theme.colour("fail"), line: { width: 2.5 } },
-  });
-  for (const [name, symbol, size] of [["start", "triangle-up", 14], ["destination", "star", 17]]) add([map[name]], "ink", {
-    name, mode: "markers", marker: { symbol, size, color: theme.colour("marker"), line: { width: 1, color: "#000000" } }, text: name, hoverinfo: "text",
   });
 }
 

@@ -1,84 +1,12 @@
-// Charts of panels: what `logs.views.report.charts` describes, as traces and layout of plotly.js.
+// Charts of panels: what `logs.views.charts` describes, as traces and layout of plotly.js.
 
 const PANEL_GAP = 26, PANEL_GAP_OWN_AXIS = 60;
-
-// Traces of one layer; axes: names of its level and upright axis, template: what the read-out says of a value.
-function layerTraces(given, axes, template, theme) {
-  const layer = { ...given, name: plainName(given.name), legend: plainName(given.legend || given.name) };
-  const colour = theme.colour(layer.look), shown = layer.name !== "";
-  const common = {
-    type: "scatter", x: layer.x, y: layer.y, ...axes, name: layer.name, legendgroup: layer.legend,
-    showlegend: shown, connectgaps: false,
-  };
-  const readable = shown && !layer.quiet ? { hovertemplate: template } : { hoverinfo: "skip" };
-  const unseen = { showlegend: false, opacity: 0, mode: "markers", marker: { color: colour, size: 8 } };
-  const stroke = { color: colour, width: layer.width, dash: layer.dashed ? "6px,4px" : "solid" };
-  switch (layer.kind) {
-    case "band": {
-      const [x, y] = bandOutline(layer), weight = layer.look === "terrain" ? 1 : layer.dashed ? 0.06 : 0.22;
-      const body = { x, y, mode: "lines", fill: "toself", fillcolor: theme.faint(layer.look, weight), line: stroke };
-      return [
-        { ...common, ...body, hoverinfo: "skip" },
-        ...(layer.quiet ? [] : [{ ...common, ...unseen, mode: "lines", line: { color: colour }, hovertemplate: template }]),
-      ];
-    }
-    case "bars":
-      return [{ ...common, ...readable, type: "bar", width: 0.62, marker: { color: colour } }];
-    case "dots":
-      return [{ ...common, ...readable, mode: "markers", marker: dotLook(layer, colour, theme) }];
-    case "rings":
-      return [{ ...common, ...readable, mode: "markers", marker: { color: colour, size: 15, symbol: "circle-open", line: { width: 2.5 } } }];
-    case "dashes": {
-      const x = layer.x.flatMap((value) => [value - 0.42, value + 0.42, null]);
-      const y = layer.y.flatMap((value) => [value, value, null]);
-      return [
-        { ...common, x, y, mode: "lines", line: { color: colour, width: 2.5 }, hoverinfo: "skip" },
-        { ...common, ...readable, ...unseen },
-      ];
-    }
-    default:
-      return [{ ...common, ...readable, mode: "lines", line: stroke }];
-  }
-}
-
-function dotLook(layer, colour, theme) {
-  const size = layer.width < 2 ? 7 : layer.width;
-  const rim = layer.look === "planned" ? { width: 1, color: theme.colour("ink") } : { width: 0 };
-  return { color: colour, size, line: rim, opacity: layer.width > 2 && layer.width < 5 ? 0.45 : 1 };
-}
-
-// Once around each part of a band that has values, one after the other.
-function bandOutline({ x, y, low }) {
-  const outX = [], outY = [];
-  for (let k = 0; k < x.length; k++) {
-    if (y[k] === null || low[k] === null) continue;
-    let end = k;
-    while (end + 1 < x.length && y[end + 1] !== null && low[end + 1] !== null) end += 1;
-    for (let j = k; j <= end; j++) { outX.push(x[j]); outY.push(y[j]); }
-    for (let j = end; j >= k; j--) { outX.push(x[j]); outY.push(low[j]); }
-    outX.push(x[k], null); outY.push(y[k], null);
-    k = end;
-  }
-  return [outX, outY];
-}
 
 function limitTrace([name, value], x, axes, theme) {
   return {
     type: "scatter", mode: "lines", x, y: [value, value], ...axes, name, showlegend: name !== "", legendgroup: name,
-    hoverinfo: "skip", line: { color: theme.colour("missile"), width: 1.5, dash: "6px,4px" },
+    hoverinfo: "skip", line: theme.line("limit"),
   };
-}
-
-// The first of the traces of one name stands in the legend for all.
-function nameOnce(traces) {
-  const seen = new Set();
-  for (const trace of traces) {
-    if (!trace.showlegend) continue;
-    trace.name = trace.legendgroup;
-    trace.showlegend = !seen.has(trace.legendgroup);
-    seen.add(trace.legendgroup);
-  }
-  return [...seen];
 }
 
 function panelFigure(chart, theme, width) {
@@ -91,6 +19,7 @@ function panelFigure(chart, theme, width) {
       const where = chart.along || !layer.name ? "" : `${panel.along} %{x}<br>${layer.name}: `;
       traces.push(...layerTraces(layer, on, where + template + (chart.shared && chart.panels.length > 0 ? "" : "<extra></extra>"), theme));
     }
+    traces.push(...labelTraces(panel.labels, on, theme, width));
     const all = panel.layers.flatMap((layer) => layer.x).filter((value) => value !== null);
     const ends = [Math.min(...all), Math.max(...all)];
     traces.push(...panel.limits.map((limit) => limitTrace(limit, ends, on, theme)));

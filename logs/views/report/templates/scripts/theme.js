@@ -1,21 +1,26 @@
-// Colours by their words, from the page's style: one set for light, one for dark; charts and view ask here.
+// Colours by their roles, from the page's style, one set for light and one for dark; widths and dashes are in LOOKS.
 
 function makeTheme() {
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const listeners = [];
-  function colour(word) {
-    return getComputedStyle(document.documentElement).getPropertyValue("--" + word).trim();
+  function colour(role) {
+    return getComputedStyle(document.documentElement).getPropertyValue("--" + role).trim();
   }
-  // Red, green and blue from 0 to 1; the style writes colours as #rrggbb.
-  function shares(word) {
-    const text = colour(word);
+  // Red, green and blue from 0 to 1; the style writes colours as six hexadecimal digits.
+  function shares(role) {
+    const text = colour(role);
     return [1, 3, 5].map((at) => parseInt(text.slice(at, at + 2), 16) / 255);
   }
-  function faint(word, alpha) {
-    return `rgba(${shares(word).map((share) => Math.round(255 * share)).join(",")},${alpha})`;
+  // The colour with an opacity, its eighth and seventh digit.
+  function faint(role, opacity) {
+    return colour(role) + Math.round(255 * opacity).toString(16).padStart(2, "0");
+  }
+  function line(role, dashed) {
+    const look = LOOKS[role];
+    return { color: colour(role), width: look.width, dash: dashed && look.dash === "solid" ? "10px,4px" : look.dash };
   }
   dark.addEventListener("change", () => listeners.forEach((tell) => tell()));
-  return { colour, shares, faint, onChange: (tell) => listeners.push(tell) };
+  return { colour, shares, faint, line, clear: "transparent", onChange: (tell) => listeners.push(tell) };
 }
 
 // Colours of the ground from its lowest to its highest place, each [red, green, blue] from 0 to 1.

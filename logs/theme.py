@@ -1,0 +1,214 @@
+"""Every colour, line width and dash of planfly's pictures, pages and scenes: the one file that holds any.
+
+A role ("missile", "planned") has one look, in a light and a dark variant.  PNG and SVG, which are printed, use the
+light one; the pages switch between both by the reader's preference; the scenes of Foxglove and Rerun, on black, use the
+dark one.  Charts name roles, never colours.
+
+Colours of the data are those of Okabe and Ito, "Color Universal Design" (2008), which people with any of the common
+colour vision deficiencies tell apart, and ColorBrewer's violet for limits; dashes, markers or hatches make each
+distinction a second time.
+"""
+
+from dataclasses import dataclass
+
+# Wong's names of Okabe and Ito's palette.
+_SKY, _BLUE, _ORANGE, _VERMILLION, _YELLOW = "#56b4e9", "#0072b2", "#e69f00", "#d55e00", "#f0e442"
+_GREEN = "#007a5a"  # bluish green, darkened for thin dashes on pale ground
+_PURPLE = "#b0408a"  # reddish purple, darkened for text
+_VIOLET = "#5e3c99"  # ColorBrewer's PuOr
+_BROWN = "#7a1f1f"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a role is drawn.
+
+    light, dark: colour on light and on dark ground, "#rrggbb".
+    width: of its lines, points; on a page 1.25 pixels stand for a point.
+    dash: lengths of strokes and gaps in the same unit, () for a solid line.
+    fill: opacity of its areas.
+    size: of its dots; 0 where it has none.
+    face: role of the colour inside its dots, "" for its own.
+    edge: role of the colour about its areas, "" for its own.
+    marker: shape of its dots: "circle", "triangle", "star" or "cross".
+    hatch: of its areas in print, in matplotlib's terms.
+    halo: whether print draws a pale rim about its lines, which lie on coloured ground.
+    """
+
+    light: str
+    dark: str
+    width: float = 1.2
+    dash: tuple[float, ...] = ()
+    fill: float = 0.22
+    size: float = 5.5
+    face: str = ""
+    edge: str = ""
+    marker: str = "circle"
+    hatch: str = ""
+    halo: bool = False
+
+
+_MISSILE = Look(_VERMILLION, "#ff8033")
+_RADAR = Look(_GREEN, "#2fc79a", dash=(5.0, 3.0), fill=0.05)
+_PLANNED = Look(_SKY, _SKY, width=3.6, halo=True)
+_FLOWN = Look("#000000", "#f4f4f4", width=1.1)
+_FAIL = Look(_PURPLE, "#e87cc4", width=2.2, size=12.0)
+_ZONE = Look(_BROWN, "#e89090", fill=0.14, hatch="////")
+_SECOND = Look(_BLUE, "#7cc0f5", width=1.8)
+
+# What data stands for, by its role.
+LOOKS = {
+    "missile": _MISSILE,
+    "missile-reach": Look(_MISSILE.light, _MISSILE.dark, width=0.0, fill=0.3),
+    "radar": _RADAR,
+    "limit": Look(_VIOLET, "#b9a2ec", width=1.4, dash=(6.0, 2.5)),
+    "steady-limit": Look(_VIOLET, "#b9a2ec", width=1.8),
+    "planned": _PLANNED,
+    "planned-leg": Look("#1d1d1f", "#e8e8ea", width=0.8, size=7.0, face="planned"),
+    "searched": Look("#555555", "#a9adb5", width=1.2, dash=(6.0, 2.0, 1.5, 2.0)),
+    "flown": _FLOWN,
+    "moment": Look(_FLOWN.light, _FLOWN.dark, size=2.4, fill=0.3),
+    "commanded": Look(_ORANGE, "#ffb938", width=2.0),
+    "second": _SECOND,
+    "other": Look(_VERMILLION, "#ff8033", width=1.4, dash=(5.0, 2.0)),
+    "difference": Look("#6b6b6b", "#a9adb5", width=1.0, fill=0.25),
+    "waypoint": Look(_BLUE, "#7cc0f5", width=1.0, size=4.6, face="paper"),
+    "waypoint-small": Look(_BLUE, "#7cc0f5", width=0.5, size=1.6, face="paper"),
+    "start": Look("#000000", "#000000", width=1.0, size=9.0, face="highlight", marker="triangle"),
+    "destination": Look("#000000", "#000000", width=1.0, size=13.0, face="highlight", marker="star"),
+    "unit": Look("#333333", "#e8e8ea", width=0.8, size=3.5, marker="cross"),
+    "fail": _FAIL,
+    "failing-leg": Look(_FAIL.light, _FAIL.dark, width=9.5, fill=0.9),
+    "inside": Look(_FAIL.light, _FAIL.dark, width=3.6),
+    "entered": Look(_FAIL.light, _FAIL.dark, width=1.8, fill=0.16),
+    "held": Look(_FAIL.light, _FAIL.dark, width=0.0, fill=0.25),
+    "zone": _ZONE,
+    "stay-in": Look(_ZONE.light, _ZONE.dark, width=2.2),
+    "terrain": Look("#cdbf9f", "#6e6447", width=0.9, fill=1.0, edge="contour"),
+    "contour": Look("#6b5a3a", "#c9b994", width=0.6),
+    "clearance": Look("#f8dfa6", "#4d3d1d", width=0.0, fill=1.0, edge="commanded", hatch="////"),
+    "area": Look("#555555", "#a9adb5", width=0.9, dash=(8.0, 3.0)),
+    "pole": Look("#555555", "#a9adb5", width=0.7),
+    "level-ground": Look("#8b8b92", "#7d838d", width=0.8, fill=0.1),
+    "aircraft": Look("#c8102e", "#ff5a6e", width=2.0),
+}
+
+# What stands around the data, by its use: light and dark.
+PAGE = {
+    "paper": ("#ffffff", "#16181c"),
+    "plot": ("#ffffff", "#1d2026"),
+    "sky": ("#edf2f7", "#10141a"),
+    "unknown": ("#f4f4f4", "#22252b"),
+    "ink": ("#1d1d1f", "#e8e8ea"),
+    "quiet": ("#5c5c61", "#a9adb5"),
+    "grid": ("#e2e2e2", "#383c44"),
+    "rule": ("#d9d9de", "#383c44"),
+    "rim": ("#8b8b92", "#7d838d"),
+    "link": ("#00568f", "#7cc4ff"),
+    "code": ("#f4f4f6", "#22252b"),
+    "highlight": (_YELLOW, _YELLOW),
+    "good": ("#006b4f", "#4cc9a0"),
+    "good-back": ("#eef8f4", "#12291f"),
+    "bad": ("#a3260b", "#ff9a84"),
+    "bad-back": ("#fdf2ef", "#331a14"),
+    "unjudged-back": ("#f6f6f7", "#22252b"),
+    "on-badge": ("#ffffff", "#16181c"),
+}
+
+# Points of a written name by its rank, and pixels between it and its place.
+LABELS = {"fail": (7.0, 16.0), "end": (8.0, 12.0), "number": (7.5, 8.0), "name": (6.2, 4.0)}
+
+# Rises in lightness from valley to summit, so that height reads without colour.
+GROUND = ("#9fbfa5", "#cfd8b0", "#efe7c8", "#f6efe2", "#ffffff")
+GROUND_DARK = ("#2b3a31", "#3f4737", "#565341", "#6d6758", "#8c877f")
+
+# From dark to light, low to high, slow to fast: several lines of one kind.
+SHADES = (_FLOWN.light, _BLUE, _GREEN, _ORANGE, _PURPLE)
+# One for each algorithm of a figure of the paper.
+SERIES = (_BLUE, _PURPLE, "#1d1d1f", _ORANGE, _SKY, "#5c5c61")
+# One for each mode of an aircraft's motion: short period, phugoid, Dutch roll, roll-spiral, roll, spiral.
+MODES = (_BLUE, _VERMILLION, _GREEN, "#1d1d1f", _PURPLE, _ORANGE)
+# The aircraft's model in 3-D scenes: body, left wing and right wing, with the colours of navigation lights.
+AIRCRAFT_PARTS = ("#ebebe0", "#d91a1a", "#1a9933")
+
+
+def colour(name: str, *, dark: bool = False) -> str:
+    """The colour of a role, or of what stands around the data.  Raises KeyError.
+
+    >>> colour("flown"), colour("paper", dark=True)
+    ('#000000', '#16181c')
+    """
+    look = LOOKS.get(name)
+    light, night = (look.light, look.dark) if look is not None else PAGE[name]
+    return night if dark else light
+
+
+def rgb(text: str) -> tuple[float, float, float]:
+    """Red, green and blue, 0 to 1.
+
+    >>> rgb("#ff0033")
+    (1.0, 0.0, 0.2)
+    """
+    red, green, blue = (int(text[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
+    return red, green, blue
+
+
+def rgba(name: str, opacity: float = 1.0, *, dark: bool = False) -> tuple[float, float, float, float]:
+    """Red, green, blue and opacity of a role, 0 to 1.
+
+    >>> rgba("flown", 0.5)
+    (0.0, 0.0, 0.0, 0.5)
+    """
+    return (*rgb(colour(name, dark=dark)), opacity)
+
+
+def drawn_colours() -> tuple[str, ...]:
+    """What a picture of few colours keeps as it is: each role's, and paper and ink.
+
+    >>> colour("missile") in drawn_colours()
+    True
+    """
+    return tuple(
+        dict.fromkeys([*(look.light for look in LOOKS.values()), colour("paper"), colour("ink"), colour("highlight")])
+    )
+
+
+def css_variables() -> str:
+    """The colours as CSS variables (``--missile``), light, and dark on a screen whose reader prefers it.
+
+    >>> "--missile: #" in css_variables()
+    True
+    """
+    rules = []
+    for dark in (False, True):
+        names = {name: colour(name, dark=dark) for name in (*PAGE, *LOOKS)}
+        names |= {f"ground-{k}": text for k, text in enumerate(GROUND_DARK if dark else GROUND)}
+        values = " ".join(f"--{name}: {text};" for name, text in names.items())
+        rules.append(f":root {{ color-scheme: {'dark' if dark else 'light'}; {values} }}")
+    light, night = rules
+    return f"{light}\n@media screen and (prefers-color-scheme: dark) {{ {night} }}\n"
+
+
+# Pixels of a page to a point of print, and plotly.js' names of markers.
+_PIXELS = 1.25
+_SYMBOLS = {"circle": "circle", "triangle": "triangle-up", "star": "star", "cross": "x-thin"}
+
+
+def page_looks() -> dict[str, dict[str, object]]:
+    """Widths, dashes, opacities and sizes by role, for the page's script; colours are in `css_variables`.
+
+    >>> page_looks()["missile"]["dash"]
+    'solid'
+    """
+    return {
+        name: {
+            "width": round(_PIXELS * look.width, 2),
+            "dash": ",".join(f"{_PIXELS * part:g}px" for part in look.dash) or "solid",
+            "fill": look.fill,
+            "size": round(_PIXELS * look.size, 2),
+            "face": look.face or name,
+            "edge": look.edge or name,
+            "symbol": _SYMBOLS[look.marker],
+        }
+        for name, look in LOOKS.items()
+    }

@@ -1,0 +1,323 @@
+"""A chart as plain data: panels of lines, bands, bars and dots with names, units and roles.
+
+Both renderers draw what is described here: `logs.views.drawing` with matplotlib, for PNG, SVG and paper, and the page's
+script with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") that `logs.theme` gives a look.
+"""
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Json = dict[str, Any]
+
+LayerKind = Literal["line", "band", "area", "bars", "dots", "rings", "dashes"]
+LabelRank = Literal["fail", "end", "number", "name"]
+# Blocks that a series is thinned to; each keeps its lowest and highest row.
+BLOCKS = 600
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """One thing that a panel shows.
+
+    kind: "band" is filled from `low` up to `y`, "area" is the inside of closed outlines, "dashes" are short level
+    strokes, "rings" mark what fails.
+    name: in legend and read-out; "" leaves it out of both.
+    role: what it stands for, which `logs.theme` gives its look.
+    x, y: (n,) in the panel's units; NaN parts a line or an outline.
+    low: (n,) lower edge of a band.
+    dashed: the second of two lines of one role.
+    quiet: in the legend, and not in the page's read-out.
+    legend: what the legend calls several layers together; "" for the name.
+    words: what the page says of each point, or of the whole where it is one; none for its values.
+    flight: of a map, number of the flight whose moments are the points; the page has them already.
+    """
+
+    kind: LayerKind
+    name: str
+    role: str
+    x: Floats
+    y: Floats
+    low: Floats | None = None
+    dashed: bool = False
+    quiet: bool = False
+    legend: str = ""
+    words: tuple[str, ...] = ()
+    flight: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A name written at a place of a panel, moved aside where others stand; a "name" is left out where none is free.
+
+    rank: "fail" is framed, "end" and "number" are bold; the page writes those two and tells the rest when pointed at.
+    prefer: direction that is tried first, (0, 0) for its middle.
+    """
+
+    text: str
+    x: float
+    y: float
+    rank: LabelRank
+    role: str = "ink"
+    prefer: tuple[int, int] = (1, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """Layers over one pair of axes.
+
+    title, unit: of what is shown upwards; unit "" for none.
+    layers: from the lowest.
+    limits: level lines, label and value.
+    min_span: the smallest range of values that it shows where `span` is not given.
+    span: the range shown upwards, (low, high); None for what layers and limits need.
+    along: of the level axis where the panels share none, else "".
+    note: what the panel does not show; "" for nothing.
+    labels: the most important first.
+    """
+
+    title: str
+    unit: str
+    layers: tuple[Layer, ...]
+    limits: tuple[tuple[str, float], ...] = ()
+    min_span: float = 1.0
+    span: tuple[float, float] | None = None
+    along: str = ""
+    note: str = ""
+    labels: tuple[Label, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Title and unit."""
+        return f"{self.title} ({self.unit})" if self.unit else self.title
+
+    def has_values(self) -> bool:
+        """Whether any layer has a finite value."""
+        return any(np.isfinite(layer.y).any() for layer in self.layers)
+
+    def shown_span(self) -> tuple[float, float]:
+        """`span`, or the range of values and limits, at least `min_span` wide, with an 8 % margin."""
+        if self.span is not None:
+            return self.span
+        values = [value for _, value in self.limits if math.isfinite(value)]
+        for layer in self.layers:
+            for edge in (layer.y, layer.low):
+                finite = edge[np.isfinite(edge)] if edge is not None else np.zeros(0)
+                values += [float(finite.min()), float(finite.max())] if finite.size else []
+        low, high = (min(values), max(values)) if values else (0.0, 1.0)
+        widening = max(0.0, self.min_span - (high - low)) / 2
+        margin = 0.08 * (high - low + 2 * widening)
+        return low - widening - margin, high + widening + margin
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """Panels one above the other, or side by side.
+
+    title: of a picture; a page has headings of its own.
+    along, unit: what the level axis shows, and its unit, of panels that share one.
+    reach: range of that axis; None for what the layers need.
+    shared: whether the panels share the level axis: zoomed and read out together.
+    marks: where legs begin, as value along the axis and words.
+    timed: whether the level axis is the time of flight, so that a click on it can move the aircraft there.
+    tall: height of a panel on a page, pixels.
+    inches: height of a panel in print.
+    widths: of panels that stand side by side in print, as shares of its width; none where they are stacked.
+    legend: in print, right of each panel (once above all where they share it), or below all.
+    scaled: whether print says how many times heights are stretched against distances.
+    """
+
+    title: str
+    along: str
+    unit: str
+    panels: tuple[Panel, ...]
+    reach: tuple[float, float] | None = None
+    shared: bool = True
+    marks: tuple[tuple[float, str], ...] = ()
+    timed: bool = False
+    tall: int = 120
+    inches: float = 1.12
+    widths: tuple[float, ...] = ()
+    legend: Literal["beside", "below"] = "beside"
+    scaled: bool = False
+
+    def shown_panels(self) -> tuple[Panel, ...]:
+        """The panels that have a value; the first where none has any."""
+        return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
+
+    def shown_reach(self) -> tuple[float, float]:
+        """`reach`, or from the first to the last value along the axis."""
+        if self.reach is not None:
+            return self.reach
+        finite = [layer.x[np.isfinite(layer.x)] for panel in self.panels for layer in panel.layers]
+        values = np.concatenate([*finite, np.zeros(0)])
+        return (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
+
+
+def series(name: str, role: str, along: Floats, values: ArrayLike, **more: Any) -> Layer:
+    """A line over a long axis, thinned without losing a peak.
+
+    along, values: (t,).
+    """
+    column = np.asarray(values, dtype=np.float64)
+    rows = outline_rows(column, BLOCKS)
+    return Layer("line", name, role, along[rows], column[rows], **more)
+
+
+def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Layer:
+    """As `series`, filled from zero."""
+    column = np.asarray(values, dtype=np.float64)
+    rows = outline_rows(column, BLOCKS)
+    return Layer("band", name, role, along[rows], column[rows], np.zeros(len(rows)))
+
+
+def held_band(held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
+    """Stretches of a long axis (t,) that a panel shades over all its height."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(np.int8)))
+    starts, ends = along[edges[::2]], along[edges[1::2] - 1]
+    gap = np.full(len(starts), np.nan)
+    x = np.column_stack([starts, ends, ends]).ravel()
+    y = np.column_stack([np.full(len(starts), span[1]), np.full(len(starts), span[1]), gap]).ravel()
+    return Layer("band", "held at its limit", "held", x, y, np.full(len(x), span[0]), quiet=True)
+
+
+def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...]:
+    """Where each leg begins along an axis (t,), and its name.  legs: (t,) number of each row's leg."""
+    starts = [0, *(np.flatnonzero(np.diff(legs)) + 1).tolist()]
+    return tuple((float(along[row]), f"leg {legs[row]}") for row in starts)
+
+
+def outline_rows(values: ArrayLike, count: int) -> Indices:
+    """Rows that keep the outline of a long series: lowest and highest of each of `count` equal blocks, in order.
+
+    values: (t,); rows that are NaN are left out unless a block has nothing else.  Short series come back in full.
+    """
+    column = np.asarray(values, dtype=np.float64)
+    if column.size <= 2 * count:
+        return np.arange(column.size)
+    edges = np.linspace(0, column.size, count + 1).astype(int)
+    kept = {0, column.size - 1}
+    for low, high in itertools.pairwise(edges):
+        block = column[low:high]
+        good = np.flatnonzero(np.isfinite(block))
+        if good.size == 0:
+            kept.add(int(low))
+            continue
+        kept.update((int(low + good[np.argmin(block[good])]), int(low + good[np.argmax(block[good])])))
+    return np.array(sorted(kept), dtype=np.intp)
+
+
+def nice_step(span: float, parts: int) -> float:
+    """Find the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `parts` pieces."""
+    raw = max(span, 1e-9) / parts
+    power = 10.0 ** np.floor(np.log10(raw))
+    for factor in (1.0, 2.0, 5.0, 10.0):
+        if factor * power >= raw * (1 - 1e-9):
+            return float(factor * power)
+    return float(10.0 * power)
+
+
+def shorten(text: str, length: int) -> str:
+    """Cut the text with an ellipsis to at most `length` characters.
+
+    >>> shorten("clearance, leg 12", 12)
+    'clearance,…'
+    """
+    return text if len(text) <= length else text[: length - 1].rstrip() + "…"
+
+
+def numbers(values: Iterable[float], digits: int) -> list[float | None]:
+    """Numbers for JSON: rounded, None for what is not finite.
+
+    >>> numbers([1.26, math.nan], 1)
+    [1.3, None]
+    """
+    rounded = np.round(np.asarray(values, dtype=np.float64), digits) + 0.0
+    return [value if math.isfinite(value) else None for value in rounded.tolist()]
+
+
+def telling_digits(values: Floats) -> int:
+    """Decimals that show a ten-thousandth of the range of values: as fine as a screen can.
+
+    >>> telling_digits(np.array([0.0, 90.0])), telling_digits(np.array([0.001, 0.002]))
+    (3, 7)
+    """
+    finite = values[np.isfinite(values)]
+    span = float(np.ptp(finite)) if finite.size else 0.0
+    span = span or (float(abs(finite[0])) if finite.size else 0.0) or 1.0
+    return max(0, min(9, 4 - math.floor(math.log10(span) + 1e-9)))
+
+
+def chart_json(chart: Chart) -> Json:
+    """The chart as what JSON can hold.
+
+    >>> line = Layer("line", "flown", "flown", np.array([0.0, 1.0]), np.array([2.0, np.nan]))
+    >>> made = chart_json(Chart("a flight", "time", "s", (Panel("bank", "°", (line,)),)))
+    >>> made["panels"][0]["layers"][0]["y"]
+    [2.0, None]
+    """
+    return {
+        "along": chart.along,
+        "unit": chart.unit,
+        "shared": chart.shared,
+        "timed": chart.timed,
+        "tall": chart.tall,
+        "marks": [[round(value, 3), words] for value, words in chart.marks],
+        "panels": [panel_json(panel) for panel in chart.shown_panels()],
+    }
+
+
+def panel_json(panel: Panel) -> Json:
+    """A panel as what JSON can hold; layers without a value and limits that are NaN are left out."""
+    labels = [label for label in panel.labels if label.rank in ("end", "number")]
+    return {
+        "title": panel.title,
+        "unit": panel.unit,
+        "along": panel.along,
+        "note": panel.note,
+        "limits": [[label, round(value, 4)] for label, value in panel.limits if math.isfinite(value)],
+        "layers": [_layer_json(layer) for layer in panel.layers if np.isfinite(layer.y).any()],
+        "labels": [[label.text, *numbers((label.x, label.y), 3), label.role] for label in labels],
+        "span": numbers(panel.shown_span(), 4),
+    }
+
+
+def _layer_json(layer: Layer) -> Json:
+    found: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
+    if layer.flight is None:
+        found |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}
+    if layer.low is not None:
+        found["low"] = numbers(layer.low, telling_digits(layer.low))
+    rarer: Json = {"dashed": layer.dashed, "quiet": layer.quiet, "legend": layer.legend, "words": list(layer.words)}
+    rarer = {word: value for word, value in rarer.items() if value}
+    return found | rarer | ({} if layer.flight is None else {"flight": layer.flight})
+
+
+@dataclass(frozen=True, slots=True)
+class LegendEntry:
+    """One line of a legend: its text and the layers that it stands for, of which one is drawn."""
+
+    text: str
+    layers: tuple[Layer, ...] = field(default=())
+
+
+def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
+    """Each name of the panels' layers once, in their order; limits last, as lines without values."""
+    found: dict[str, list[Layer]] = {}
+    for panel in panels:
+        for layer in panel.layers:
+            if layer.name and np.isfinite(layer.y).any():
+                found.setdefault(layer.legend or layer.name, []).append(layer)
+    for panel in panels:
+        for label, _ in panel.limits:
+            if label:
+                none = np.zeros(0)
+                found.setdefault(label, []).append(Layer("line", label, "limit", none, none))
+    return tuple(LegendEntry(text, tuple(layers)) for text, layers in found.items())

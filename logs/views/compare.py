@@ -1,0 +1,141 @@
+"""Two flights in one chart: over the first one's map, over the distance flown, and as flown and simulated."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.imported.model_comparison import Reflight
+from logs.verdict.measures.route_requirements import with_fence_zones
+from logs.views.charts import Chart, Floats, Layer, Panel, filled_series, leg_marks, series, shorten
+from logs.views.map import DrawnTrack, MapChart, NamedWind, map_chart
+from logs.views.time_series import doubles
+
+# Roles of the first and the second flight.
+ROLES = ("flown", "other")
+_POINTS = 3000
+
+
+@dataclass(frozen=True, slots=True)
+class NamedFlight:
+    """A flight to draw, and the name that its lines have in the legend."""
+
+    name: str
+    setup: FlightSetup
+    track: Track
+
+
+def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
+    """The first flight's map and route with both tracks over it, and both winds where they differ."""
+    first, _ = flights
+    winds = [
+        NamedWind(flight.setup.scenario.wind, flight.name, role) for flight, role in zip(flights, ROLES, strict=True)
+    ]
+    a, b = (replace(named.wind, seed=None) for named in winds)
+    return map_chart(
+        with_fence_zones(first.setup).scenario,
+        "two flights from above",
+        plan_waypoints=None,
+        route_waypoints=first.setup.route.waypoints,
+        tracks=[
+            DrawnTrack(shorten(flight.name, 40), flight.track, role, k)
+            for k, (flight, role) in enumerate(zip(flights, ROLES, strict=True))
+        ],
+        winds=[NamedWind(a)] if a == b else winds,
+        verdict=None,
+    )
+
+
+def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
+    """Height, height above ground, airspeed, bank, cross-track and throttle of both over the distance flown.
+
+    Without terrain, that of the height above it is left out.
+    """
+    flown = [_distance(flight.track) for flight in flights]
+    along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)
+
+    def both(values: list[Floats]) -> tuple[Layer, ...]:
+        return tuple(
+            series(shorten(flight.name, 22), role, along / 1e3, np.interp(along, distance, value, right=np.nan))
+            for flight, role, distance, value in zip(flights, ROLES, flown, values, strict=True)
+        )
+
+    tracks = [flight.track for flight in flights]
+    panels = (
+        Panel("height", "m AMSL", both([track.position[:, 2] for track in tracks])),
+        Panel("height above ground", "m", both([_above(flight) for flight in flights])),
+        Panel("airspeed", "m/s", both([doubles(track.airspeed) for track in tracks]), min_span=4.0),
+        Panel("bank, right +", "°", both([np.degrees(doubles(_roll(track))) for track in tracks])),
+        Panel("cross-track, right +", "m", both([doubles(track.cross_track) for track in tracks]), min_span=0.1),
+        Panel("throttle", "%", both([100.0 * doubles(_throttle(track)) for track in tracks])),
+    )
+    return Chart("Two flights along their way", "distance flown over the ground", "km", panels)
+
+
+def _roll(track: Track) -> NDArray[np.float32]:
+    roll: NDArray[np.float32]
+    roll, _, _ = track.attitude.T
+    return roll
+
+
+def _throttle(track: Track) -> NDArray[np.float32]:
+    throttle: NDArray[np.float32]
+    _, _, _, throttle = track.controls.T
+    return throttle
+
+
+def _distance(track: Track) -> Floats:
+    steps = np.nan_to_num(np.hypot(*np.diff(track.position[:, :2], axis=0).T))
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _above(flight: NamedFlight) -> Floats:
+    terrain, position = flight.setup.scenario.terrain, flight.track.position
+    if terrain is None:
+        return np.full(len(position), np.nan)
+    return np.asarray(position[:, 2] - terrain.height(position[:, 0], position[:, 1]))
+
+
+# A flight of the field and the model's of the same mission: a chart for each quantity, over the way.
+
+# File name, field of a profile, title, unit, factor, smallest range that is shown.
+_REFLOWN = (
+    ("refly-cross-track.png", "cross_track", "right of the legs", "m", 1.0, 4.0),
+    ("refly-height.png", "height_error", "above the legs", "m", 1.0, 4.0),
+    ("refly-ground-speed.png", "ground_speed", "ground speed", "m/s", 1.0, 4.0),
+    ("refly-bank.png", "bank", "bank, right +", "°", 180.0 / np.pi, 10.0),
+    ("refly-energy.png", "energy", "energy used", "Wh", 1.0, 1.0),
+)
+
+
+def refly_charts(again: Reflight) -> dict[str, Chart]:
+    """Each quantity over the way, as flown and as simulated, by the name of its PNG; only what the log holds.
+
+    >>> from flight.simulation.setup import MissionStretch
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.verdict.imported.flown_legs import flown_legs
+    >>> from logs.verdict.imported.model_comparison import compare_with_model
+    >>> log = example_log()
+    >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
+    >>> again = compare_with_model(log.setup, flown, log.track, "completed")
+    >>> list(refly_charts(again))[:2]
+    ['refly-cross-track.png', 'refly-height.png']
+    """
+    along = again.distance / 1e3
+    marks = leg_marks(again.first + np.searchsorted(again.ends, again.distance, side="right"), along)
+    charts = {}
+    for file, name, title, unit, factor, span in _REFLOWN:
+        flown, model = factor * getattr(again.flown, name), factor * getattr(again.model, name)
+        if not np.isfinite(flown).any():
+            continue
+        both = (series("flown", "flown", along, flown), series("simulated", "other", along, model))
+        difference = (filled_series("flown less simulated", "difference", along, flown - model),)
+        panels = (
+            Panel(title, unit, both, min_span=span),
+            Panel("difference", unit, difference, limits=(("", 0.0),), min_span=0.5 * span),
+        )
+        heading = f"{shorten(again.setup.scenario.name, 40)}: flown, and by the model {again.setup.aircraft}"
+        charts[file] = Chart(heading, "along the legs", "km", panels, marks=marks)
+    return charts

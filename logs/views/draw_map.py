@@ -1,0 +1,161 @@
+"""The map as PNG and SVG: relief with contours, what the description puts on it, compass, colour bar and legend."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.ticker import FuncFormatter, MultipleLocator
+
+from logs import theme
+from logs.views.charts import Floats, legend_entries, nice_step, shorten
+from logs.views.drawing import WIDTH, clean_style, draw_layers, draw_legend, legend_handle, new_figure, write_labels
+from logs.views.map import MapChart, NamedWind
+from world.terrain import Terrain
+
+# Inches: the map's own width, what stands around it, its legend, and the column beside it.
+_LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND, _COLUMN = 0.72, 7.72, 0.5, 0.55, 1.0, 8.72
+_MIN_HEIGHT = 3.6
+# Inches from a line of the wind's note to the next.
+_LINE = 0.145
+
+
+def draw_map(chart: MapChart) -> Figure:
+    """Top view, north up, equal scales, axes in m labelled in km from the scenario's origin."""
+    with clean_style():
+        figure, axes = map_frame(chart.east, chart.north, _LEGEND)
+        axes.set_xlabel(f"east of {chart.origin} (km)")
+        axes.set_ylabel("north (km)")
+        axes.set_title(chart.title, fontweight="bold")
+        around = draw_ground(figure, axes, chart.terrain, _COLUMN, _TOP)
+        draw_layers(axes, chart.panel)
+        write_labels(axes, chart.panel)
+        draw_compass(figure, chart.winds, _COLUMN)
+        handles = [legend_handle(entry) for entry in legend_entries([chart.panel])]
+        draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
+    return figure
+
+
+def map_frame(east: tuple[float, float], north: tuple[float, float], legend: float) -> tuple[Figure, Any]:
+    """Figure and axes of a map of these ranges (m).  legend: inches below it."""
+    height = _MAP_WIDTH * (north[1] - north[0]) / (east[1] - east[0])
+    tall = max(height, _MIN_HEIGHT)
+    total = _TOP + tall + _BOTTOM + legend
+    figure = new_figure(total)
+    base = legend + _BOTTOM + 0.5 * (tall - height)
+    axes = figure.add_axes((_LEFT / WIDTH, base / total, _MAP_WIDTH / WIDTH, height / total))
+    axes.set(xlim=east, ylim=north, aspect="equal", facecolor=theme.colour("unknown"))
+    step = nice_step(max(east[1] - east[0], north[1] - north[0]), 14)
+    kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MultipleLocator(step))
+        axis.set_major_formatter(kilometres)
+    return figure, axes
+
+
+def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: float, top: float) -> list[Any]:
+    """Shaded heights with labelled contours and a colour bar, or a note where there is no terrain.
+
+    column: left edge (inches) of the column beside the map.  top: inches above it.  Returns what the legend shows.
+    """
+    note: dict[str, Any] = {"x": column / WIDTH, "y": 0.6, "color": theme.colour("quiet")}
+    east_range, north_range = axes.get_xlim(), axes.get_ylim()
+    if terrain is None:
+        figure.text(s="no terrain\nwas given", **note)
+        return []
+    pitch = max(terrain.spacing * 0.5, np.ptp(east_range) / 900.0)
+    east = np.linspace(east_range[0], east_range[1], 2 + int(np.ptp(east_range) / pitch))
+    north = np.linspace(north_range[0], north_range[1], 2 + int(np.ptp(north_range) / pitch))
+    heights = terrain.height(east[None, :], north[:, None])
+    if not np.isfinite(heights).any():
+        figure.text(s="no terrain\nhere", **note)
+        return []
+    low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
+    flat = high - low < 1.0
+    colours = LinearSegmentedColormap.from_list("ground", theme.GROUND)
+    norm = Normalize(low - 0.5, high + 0.5) if flat else Normalize(low, high)
+    picture = colours(norm(heights))
+    picture[..., :3] *= 1.0 if flat else _shade(heights, float(north[1] - north[0]), high - low)[..., None]
+    picture[np.isnan(heights)] = theme.rgba("unknown")
+    extent = (*east_range, *north_range)
+    axes.imshow(picture, extent=extent, origin="lower", interpolation="bilinear", zorder=1, aspect="equal")
+    if flat:
+        figure.text(s=f"level ground,\n{low:.0f} m AMSL", **note)
+        return []
+    step = nice_step(high - low, 10)
+    levels = np.arange(np.ceil(low / step) * step, high, step)
+    lines = axes.contour(
+        east, north, heights, levels=levels, colors=theme.colour("contour"), linewidths=0.45, alpha=0.75, zorder=2
+    )
+    axes.clabel(
+        lines, levels[1::2], fmt="%.0f", fontsize=5.5, colors=theme.colour("contour"), inline_spacing=1, zorder=2.1
+    )
+    _colour_bar(figure, colours, norm, levels, column, top)
+    return [Line2D([], [], color=theme.colour("contour"), linewidth=0.8, label=f"contours every {step:g} m AMSL")]
+
+
+def _shade(heights: Floats, pitch: float, span: float) -> Floats:
+    """Brightness under light from the north-west, about 0.75 to 1.1 clipped at 1; level ground where unknown."""
+    filled = np.where(np.isfinite(heights), heights, np.nanmean(heights))
+    up_north, up_east = np.gradient(filled, pitch)
+    # Gentle country is exaggerated, so that its ridges show.
+    gain = float(np.clip(600.0 / span, 0.5, 4.0))
+    slope_e, slope_n = gain * up_east, gain * up_north
+    lit = (0.5 * slope_e - 0.5 * slope_n + 0.707) / np.sqrt(1.0 + slope_e**2 + slope_n**2)
+    return np.asarray(np.clip(0.96 + 0.42 * (lit - 0.707), 0.55, 1.0))
+
+
+def _colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:
+    total = float(figure.get_figheight())
+    tall = min(2.6, total - 3.4)
+    frame = (column / WIDTH, (total - top - tall - 0.25) / total, 0.16 / WIDTH, tall / total)
+    bar = figure.colorbar(ScalarMappable(norm, colours), cax=figure.add_axes(frame))
+    bar.set_ticks(levels[:: max(1, len(levels) // 8)].tolist())
+    bar.set_label("ground height (m AMSL)", fontsize=8)
+    bar.ax.tick_params(labelsize=7.5)
+
+
+def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float) -> None:
+    """Show north, and where each wind blows to, in the column (its left edge in inches) beside the map."""
+    total = float(figure.get_figheight())
+    side = 1.0
+    notes = [
+        (_wind_text(named), theme.colour(named.role) if len(winds) > 1 else theme.colour("ink")) for named in winds
+    ]
+    lines = sum(text.count("\n") + 1 for text, _ in notes)
+    base = max(1.35, 0.2 + _LINE * (lines + len(notes) - 1))
+    dial = figure.add_axes((column / WIDTH - 0.01, base / total, side / WIDTH, side / total))
+    dial.set(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25), aspect="equal")
+    dial.axis("off")
+    dial.add_patch(Circle((0, 0), 1.0, fill=False, edgecolor=theme.colour("rim"), linewidth=0.8))
+    dial.text(0, 1.05, "N", ha="center", va="bottom", fontsize=8.5, fontweight="bold")
+    dial.plot([0, 0], [0.82, 1.0], color=theme.colour("ink"), linewidth=1.2)
+    blowing = [named for named in winds if named.wind.speed > 0.0]
+    for k, named in enumerate(blowing):
+        east, north = np.sin(named.wind.from_course), np.cos(named.wind.from_course)
+        # A second arrow is dashed and shorter, so that both show where they lie on each other.
+        arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
+        arrow |= {"color": theme.colour(named.role), "linestyle": (0, (3, 1.5)) if k else "-"}
+        length = 0.8 - 0.25 * k
+        dial.annotate("", (-length * east, -length * north), (length * east, length * north), arrowprops=arrow)
+    if not blowing:
+        dial.text(0, 0, "calm", ha="center", va="center", fontsize=7.5, color=theme.colour("quiet"))
+    top = base - 0.02
+    for text, colour in notes:
+        look: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 7.5, "color": colour}
+        figure.text((column + 0.4) / WIDTH, top / total, text, **look)
+        top -= _LINE * (text.count("\n") + 2)
+
+
+def _wind_text(named: NamedWind) -> str:
+    wind = named.wind
+    note = f"{shorten(named.name, 22)}:\n" if named.name else ""
+    if wind.speed > 0.0:
+        note += f"wind {wind.speed:.1f} m/s\nfrom {round(np.degrees(wind.from_course)) % 360:03d}°"
+    else:
+        note += "no mean wind"
+    return note + (f"\n{wind.turbulence} turbulence" if wind.turbulence != "none" else "")

@@ -1,0 +1,338 @@
+"""The 3-D picture: ground, threats, plan and flight from aside, for paper and for where no script runs."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from numpy.typing import NDArray
+
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs import theme
+from logs.views.charts import Floats, Label, LabelRank, Layer, LayerKind, LegendEntry, shorten
+from logs.views.drawing import WIDTH, clean_style, draw_legend, legend_handle, new_figure, write_label
+from logs.views.failures import Failures, route_distance, route_samples
+from logs.views.labels import LabelPlacer
+from logs.views.scene import GroundGrid, SceneView, drawn_rows, exaggeration, ground_grid, scene_bounds
+from world.airspace.zones_on_map import zone_walls
+from world.terrain import Terrain
+
+_LEFT, _RIGHT, _TOP, _BOTTOM = 0.15, 0.15, 0.5, 0.8
+_ELEVATION = math.radians(36.0)
+_MAX_CELLS, _MAX_TRACK = 130, 1600
+# Of the ground drawn, the shorter side of the longer one, at least; what is narrower is seen from this much further
+# round, rad.
+_MIN_SIDE, _ASLANT = 0.3, math.radians(45.0)
+_MAX_NUMBERS, _MAX_NAMES = 40, 30
+
+
+@dataclass(frozen=True, slots=True)
+class Projection:
+    """A parallel projection.
+
+    azimuth: rad, from east to north, of the direction from the middle to the viewer.  middle: (3,) m.  stretch: of
+    heights.
+    """
+
+    azimuth: float
+    middle: Floats
+    stretch: float
+
+    def project(self, points: Floats) -> Floats:
+        """Picture coordinates in m and, as the third, depth towards the viewer: (..., 3) from (..., 3)."""
+        e, n, u = np.moveaxis(points - self.middle, -1, 0)
+        out, side = math.cos(self.azimuth), math.sin(self.azimuth)
+        across = -side * e + out * n
+        toward = out * e + side * n
+        high = self.stretch * u
+        sin, cos = math.sin(_ELEVATION), math.cos(_ELEVATION)
+        return np.stack([across, cos * high - sin * toward, sin * high + cos * toward], axis=-1)
+
+    @property
+    def toward(self) -> Floats:
+        """Step in world axes, 1 m on the ground, that leads to the viewer."""
+        return np.array([math.cos(self.azimuth), math.sin(self.azimuth), math.tan(_ELEVATION) / self.stretch])
+
+
+def draw_scene(view: SceneView) -> Figure:
+    """Draw the scene from aside of the line from start to destination, heights stretched by the factor in the title.
+
+    Lines are dashed and thin behind a ridge.  A long and narrow scene is seen more from its end, with ground about it,
+    so that it is no strip.
+    """
+    setup, track, failed = view.setup, view.track, view.failed
+    all_of_it = scene_bounds(setup, track)
+    bounds = _widened(all_of_it)
+    narrow = not np.array_equal(bounds, all_of_it)
+    terrain = setup.scenario.terrain
+    grid = ground_grid(terrain, bounds, _MAX_CELLS)
+    route = setup.route.waypoints
+    projection = _projection(route, bounds, exaggeration(setup, bounds, grid), narrow)
+    with clean_style():
+        figure, axes = _frame(setup, projection, bounds, grid)
+        handles = _ground_surface(axes, projection, grid, bounds)
+        handles += _threats(axes, projection, setup, failed)
+        handles += _zones(axes, projection, setup)
+        placer = LabelPlacer(axes)
+        handles += _paths(axes, projection, terrain, route, track, failed, placer)
+        _labels(setup, projection, route, failed, placer)
+        name = shorten(setup.scenario.name, 60)
+        times = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
+        side = _direction(projection.azimuth)
+        axes.set_title(f"{name}: seen from the {side}, {times}", fontweight="bold")
+        draw_legend(figure, handles, _LEFT + 0.1, (_BOTTOM - 0.08) / float(figure.get_figheight()))
+    return figure
+
+
+def _widened(bounds: Floats) -> Floats:
+    """Ground about a narrow scene, (2, 2) m: no side is less than a share of the other."""
+    sides = np.ptp(bounds, axis=1)
+    more = 0.5 * np.maximum(_MIN_SIDE * sides.max() - sides, 0.0)
+    return np.asarray(bounds + np.stack([-more, more], axis=1))
+
+
+def _projection(route: Floats, bounds: Floats, stretch: float, narrow: bool) -> Projection:
+    step = route[-1] - route[0]
+    azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
+    if math.sin(azimuth) > 0.0:
+        azimuth += math.pi
+    azimuth += _ASLANT if narrow else 0.0
+    return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
+
+
+def _direction(azimuth: float) -> str:
+    names = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
+    return names[round(azimuth / (math.pi / 4.0)) % 8]
+
+
+def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None) -> tuple[Figure, Any]:
+    low = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
+    corners = np.array([[e, n, low] for e in bounds[0] for n in bounds[1]])
+    threats = setup.scenario.threats
+    tops = threats.position + np.maximum(threats.kill_radius, threats.detection_radius)[:, None] * np.array([0, 0, 1.0])
+    drawn = [projection.project(corners), projection.project(setup.route.waypoints), projection.project(tops)]
+    if grid is not None:
+        e, n = np.meshgrid(grid.east, grid.north)
+        surface = projection.project(np.stack([e, n, grid.heights], axis=-1)).reshape(-1, 3)
+        drawn.append(surface[np.isfinite(surface).all(axis=1)])
+    together = np.vstack(drawn)[:, :2]
+    least, most = together.min(axis=0), together.max(axis=0)
+    padding = 0.03 * float((most - least).max())
+    least, most = least - padding, most + padding
+    wide = WIDTH - _LEFT - _RIGHT
+    # A flat scene gets air above and below it.
+    short = max(0.0, 3.0 / wide * (most[0] - least[0]) - (most[1] - least[1]))
+    least[1], most[1] = least[1] - 0.5 * short, most[1] + 0.5 * short
+    tall = float(np.clip(wide * (most[1] - least[1]) / (most[0] - least[0]), 3.0, 8.0))
+    total = tall + _TOP + _BOTTOM
+    figure = new_figure(total)
+    axes = figure.add_axes((_LEFT / WIDTH, _BOTTOM / total, wide / WIDTH, tall / total))
+    axes.set(xlim=(least[0], most[0]), ylim=(least[1], most[1]), facecolor=theme.colour("sky"))
+    axes.set_aspect("equal", adjustable="box")
+    axes.set(xticks=[], yticks=[])
+    for spine in axes.spines.values():
+        spine.set_color(theme.colour("rule"))
+    return figure, axes
+
+
+def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
+    """Cells from the farthest to the nearest, shaded by light from the north-west."""
+    if grid is None:
+        base = float(projection.middle[2])
+        corners = np.array(
+            [[e, n, base] for e, n in zip(bounds[0][[0, 1, 1, 0]], bounds[1][[0, 0, 1, 1]], strict=True)]
+        )
+        axes.add_collection(
+            PolyCollection(
+                [projection.project(corners)[:, :2]],
+                facecolor=theme.colour("unknown"),
+                edgecolor=theme.colour("rim"),
+                zorder=1,
+            )
+        )
+        return [_handle("band", "level-ground", "no terrain: level at mid height")]
+    e, n = np.meshgrid(grid.east, grid.north)
+    corners = projection.project(np.stack([e, n, grid.heights], axis=-1))
+    cells = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=2).reshape(-1, 4, 3)
+    up_north, up_east = np.gradient(
+        np.nan_to_num(grid.heights, nan=float(np.nanmin(grid.heights))), grid.north, grid.east
+    )
+    slope_e, slope_n = projection.stretch * up_east, projection.stretch * up_north
+    lit = (0.5 * slope_e - 0.5 * slope_n + 0.8) / np.sqrt(1.14 * (1.0 + slope_e**2 + slope_n**2))
+    low, high = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
+    colours = LinearSegmentedColormap.from_list("ground", theme.GROUND)((grid.heights - low) / max(high - low, 1.0))
+    colours[..., :3] *= np.clip(0.55 + 0.5 * lit, 0.35, 1.0)[..., None]
+    faces = 0.25 * (colours[:-1, :-1] + colours[:-1, 1:] + colours[1:, 1:] + colours[1:, :-1]).reshape(-1, 4)
+    good = np.isfinite(cells).all(axis=(1, 2))
+    order = np.flatnonzero(good)[np.argsort(cells[good][:, :, 2].mean(axis=1), kind="stable")]
+    # Edges in the cells' own colour close the seams that antialiasing leaves.
+    axes.add_collection(
+        PolyCollection(
+            list(cells[order][:, :, :2]),
+            facecolor=faces[order],
+            edgecolor=faces[order],
+            linewidth=0.4,
+            zorder=1,
+            rasterized=True,
+        )
+    )
+    return []
+
+
+def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
+    """Outlines of the spheres' upper halves, on the height of their centres; broad where they are entered."""
+    threats = setup.scenario.threats
+    handles: list[Any] = []
+    # A stretched dome of radius 1: the far half of its outline, and the near half of its foot.
+    tall = math.hypot(math.sin(_ELEVATION), projection.stretch * math.cos(_ELEVATION))
+    round_it = np.linspace(0.0, 2.0 * math.pi, 97)
+    high = np.where(round_it < math.pi, tall, math.sin(_ELEVATION)) * np.sin(round_it)
+    shape = np.column_stack([np.cos(round_it), high])
+    looks: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
+        ("missile", threats.kill_radius, {"facecolor": theme.rgba("missile", theme.LOOKS["missile"].fill)}),
+        ("radar", threats.detection_radius, {"facecolor": "none", "linestyle": (0, (4, 2.5))}),
+    )
+    for kind, radii, look in looks:
+        look |= {"edgecolor": theme.colour(kind)}
+        some = np.flatnonzero(radii > 0.0)
+        for k in some:
+            dome = projection.project(threats.position[k])[:2] + float(radii[k]) * shape
+            axes.add_patch(Polygon(dome, linewidth=0.9, zorder=3, **look))
+        for entered in (place.index or 0 for place in failed.threats if place.kind == kind):
+            dome = projection.project(threats.position[entered])[:2] + float(radii[entered]) * shape
+            axes.add_patch(Polygon(dome, fill=False, edgecolor=theme.colour("fail"), linewidth=2.2, zorder=4.6))
+        if some.size:
+            handles.append(_handle("band", kind, f"{kind}'s reach"))
+    return handles
+
+
+def _zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
+    """Walls of the zones, from ground or floor to the ceiling, or to above the path."""
+    zones, route = setup.scenario.zones, setup.route.waypoints
+    low, top = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
+    for zone in zones:
+        fill = theme.rgba("zone", 0.10 if zone.kind == "exclusion" else 0.03)
+        for wall in zone_walls(zone, setup.scenario.terrain, low, top):
+            drawn = projection.project(wall)[:, :, :2]
+            sides = np.concatenate([drawn[:-1], drawn[1:, ::-1]], axis=1)
+            axes.add_collection(PolyCollection(list(sides), facecolor=fill, edgecolor="none", zorder=3.2))
+            width = 1.1 if zone.kind == "exclusion" else 2.0
+            for edge in (0, 1):
+                axes.plot(
+                    *drawn[:, edge].T, color=theme.colour("zone"), linewidth=width, alpha=0.4 + 0.6 * edge, zorder=3.3
+                )
+    kinds = {zone.kind for zone in zones}
+    handles = [_handle("area", "zone", "zone to keep out of")] if "exclusion" in kinds else []
+    return handles + ([_handle("line", "stay-in", "edge of a zone to stay in")] if "inclusion" in kinds else [])
+
+
+def _handle(kind: LayerKind, role: str, text: str) -> Any:
+    """A line of the legend."""
+    none = np.zeros(0)
+    return legend_handle(LegendEntry(text, (Layer(kind, text, role, none, none),)))
+
+
+def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
+    """Whether the ground stands between each point (n, 3) and the viewer."""
+    hidden = np.zeros(len(points), dtype=bool)
+    if terrain is None:
+        return hidden
+    for distance in np.geomspace(2.0 * terrain.spacing, 15_000.0, 70):
+        there = points + distance * projection.toward
+        hidden |= terrain.height(there[:, 0], there[:, 1]) > there[:, 2]
+    return hidden
+
+
+def _paths(
+    axes: Any,
+    projection: Projection,
+    terrain: Terrain | None,
+    route: Floats,
+    track: Track | None,
+    failed: Failures,
+    placer: LabelPlacer,
+) -> list[Any]:
+    _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
+    if terrain is not None:
+        under = terrain.height(route[:, 0], route[:, 1])
+        feet = np.column_stack([route[:, :2], np.where(np.isfinite(under), under, route[:, 2])])
+        poles = np.stack([projection.project(route)[:, :2], projection.project(feet)[:, :2]], axis=1)
+        axes.add_collection(LineCollection(list(poles), colors=theme.colour("pole"), linewidths=0.7, zorder=4))
+    for leg in failed.legs:
+        ends = projection.project(route[leg : leg + 2])
+        axes.plot(
+            ends[:, 0],
+            ends[:, 1],
+            color=theme.colour("fail"),
+            linewidth=9.0,
+            alpha=0.9,
+            zorder=4.5,
+            solid_capstyle="butt",
+        )
+    _line(axes, projection, terrain, samples, theme.colour("planned"), 3.6, 5)
+    handles: list[Any] = [_handle("line", "planned", "planned path")]
+    if track is not None:
+        _line(axes, projection, terrain, track.position[drawn_rows(track, _MAX_TRACK)], theme.colour("flown"), 1.2, 6)
+        handles.append(_handle("line", "flown", "flown track"))
+    corners = projection.project(route)
+    placer.avoid(*projection.project(samples)[:, :2].T)
+    axes.plot(
+        corners[:, 0],
+        corners[:, 1],
+        "o",
+        color=theme.colour("paper"),
+        markeredgecolor=theme.colour("second"),
+        markersize=3.8,
+        zorder=7,
+    )
+    for waypoint in failed.waypoints:
+        axes.plot(*corners[waypoint, :2], "o", markersize=12, mfc="none", mec=theme.colour("fail"), mew=2.2, zorder=7.5)
+    if terrain is not None:
+        handles.append(_handle("line", "pole", "waypoint above the ground"))
+    marks: tuple[tuple[object, LayerKind, str, str], ...] = (
+        (failed.legs, "line", "failing-leg", "leg that fails a rule"),
+        (failed.waypoints, "rings", "fail", "waypoint that fails a rule"),
+        (failed.threats, "line", "fail", "threat that is entered"),
+    )
+    return handles + [_handle(kind, role, text) for some, kind, role, text in marks if some]
+
+
+def _line(
+    axes: Any, projection: Projection, terrain: Terrain | None, points: Floats, colour: str, width: float, order: float
+) -> None:
+    """Draw a path, thin and dashed where the ground hides it."""
+    projected = projection.project(points)
+    hidden = _hidden(projection, terrain, points)
+    open_part = np.where(hidden[:, None], np.nan, projected[:, :2])
+    # The hidden rows and their neighbours, so that the two parts meet.
+    near = hidden | np.roll(hidden, 1) | np.roll(hidden, -1)
+    shut_part = np.where(near[:, None], projected[:, :2], np.nan)
+    axes.plot(*open_part.T, color=colour, linewidth=width, zorder=order, solid_capstyle="round")
+    axes.plot(*shut_part.T, color=colour, linewidth=0.5 * width, alpha=0.6, linestyle=(0, (2, 1.5)), zorder=order)
+
+
+def _labels(setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
+    corners = projection.project(route)
+    last = len(route) - 1
+
+    def write(text: str, point: Floats, rank: LabelRank, role: str = "ink") -> None:
+        write_label(placer, Label(text, float(point[0]), float(point[1]), rank, role))
+
+    write("start", corners[0], "end")
+    write("destination", corners[last], "end")
+    step = max(1, -(-len(route) // _MAX_NUMBERS))
+    for k in range(1, last):
+        if k % step == 0 or k in failed.waypoints:
+            write(str(k), corners[k], "number", "fail" if k in failed.waypoints else "waypoint")
+    threats = setup.scenario.threats
+    entered = failed.threat_names()
+    named = list(zip(threats.names, projection.project(threats.position), strict=True))
+    # Entered ones first: they have the best places.
+    for k in sorted(range(min(len(named), _MAX_NAMES)), key=lambda k: k not in entered):
+        name, point = named[k]
+        write(shorten(name, 20), point, "number" if k in entered else "name", "fail" if k in entered else "ink")

@@ -1,0 +1,86 @@
+"""The flight moment by moment: what the page's slider, read-out and map say of it, and the aircraft's model."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.foxglove_scene import SPAN, model_colours, model_corners
+from logs.verdict.places import Place
+from logs.verdict.wording import place_text
+from logs.views.charts import numbers
+from logs.views.scene import drawn_rows
+
+MAX_MOMENTS = 2000
+
+
+def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", role: str = "flown") -> dict[str, Any]:
+    """Columns of at most `MAX_MOMENTS` rows of a flight, from its first to its last known place.
+
+    time (s); east, north, up (m AMSL), above (m above ground, null without terrain); airspeed, climb (m/s); bank (right
+    positive), pitch, heading (°); leg.  What is not a number is null.  Beside them legs: what each leg is called.
+    name, role: of its line.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> moments = flight_moments(log.setup, log.track)
+    >>> len(moments["time"]) == len(moments["leg"]), moments["name"]
+    (True, 'flown')
+    """
+    rows = drawn_rows(track, MAX_MOMENTS)
+    position, terrain = track.position[rows], setup.scenario.terrain
+    east, north, up = position.T
+    above = np.full(len(rows), np.nan) if terrain is None else up - terrain.height(east, north)
+    roll, pitch, yaw = np.degrees(track.attitude[rows].astype(np.float64)).T
+    _, _, climb = track.velocity[rows].T
+    return {
+        "name": name,
+        "role": role,
+        "time": numbers(track.time[rows], 2),
+        "east": numbers(east, 1),
+        "north": numbers(north, 1),
+        "up": numbers(up, 1),
+        "above": numbers(above, 1),
+        "airspeed": numbers(track.airspeed[rows], 2),
+        "climb": numbers(climb, 2),
+        "bank": numbers(roll, 1),
+        "pitch": numbers(pitch, 1),
+        "heading": numbers(yaw % 360.0, 1),
+        "leg": track.leg[rows].tolist(),
+        "legs": leg_names(setup),
+    }
+
+
+def leg_names(setup: FlightSetup) -> list[str]:
+    """What each leg is called, with the mission item that it leads to.
+
+    >>> from logs.recording.example_log import example_log
+    >>> leg_names(example_log().setup)[0]
+    'leg 0, to item 2'
+    """
+    items = setup.route.items.tolist()
+    return [place_text(Place("leg", k, to_item=_known(items[k + 1]))) for k in range(setup.route.legs)]
+
+
+def waypoint_names(setup: FlightSetup) -> list[str]:
+    """What each waypoint is called, with its mission item and height."""
+    heights = setup.route.waypoints[:, 2].tolist()
+    return [
+        f"{place_text(Place('waypoint', k, item=_known(item)))}\n{heights[k]:.0f} m AMSL"
+        for k, item in enumerate(setup.route.items.tolist())
+    ]
+
+
+def _known(item: int) -> int | None:
+    return item if item >= 0 else None
+
+
+def aircraft_model() -> dict[str, Any]:
+    """The log's aircraft: corners of its triangles, forward, left and up, one unit wide, and each one's colour."""
+
+    def rounded(values: NDArray[np.float32]) -> Any:
+        return np.round(values.astype(np.float64), 4).tolist()
+
+    return {"corners": rounded(model_corners() / SPAN), "colours": rounded(model_colours()[:, :3])}
