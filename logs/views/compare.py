@@ -98,7 +98,7 @@ def _above(flight: NamedFlight) -> Floats:
     return np.asarray(position[:, 2] - terrain.height(position[:, 0], position[:, 1]))
 
 
-# A flight of the field and the model's of the same mission: a chart for each quantity, over the way.
+# An imported flight and the model's of the same mission: a chart for each quantity, over the way.
 
 # File name, field of a profile, title, unit, factor, smallest range that is shown.
 _REFLOWN = (

@@ -229,8 +229,10 @@ def view_json(view: View) -> dict[str, Any]:
 
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, "Figure"]:
-    """Draw all figures by name; what has no data is left out."""
-    return {name: draw(view) for name, view in figure_views(subject_of(setup, track, verdict)).items()}
+    """Draw all figures by name, those that are files first; what has no data is left out."""
+    views = figure_views(subject_of(setup, track, verdict))
+    order = sorted(FIGURES, key=lambda entry: not entry.file)
+    return {entry.name: draw(views[entry.name]) for entry in order if entry.name in views}
 
 
 def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
