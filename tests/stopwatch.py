@@ -10,15 +10,16 @@ import threading
 import time
 from pathlib import Path
 
-_LOOK = 0.01
+_LOOK = 0.02
 
 
 class Stopwatch:
-    """Of this process and, if there is one, of every process of a session; runs while it is entered."""
+    """Of the thread that enters it and, if there is one, of every process of a session; runs while it is entered."""
 
     def __init__(self, session: int | None = None) -> None:
         self.seconds = 0.0
         self._session = session
+        self._own = Path(f"/proc/{os.getpid()}/task/{threading.get_native_id()}/schedstat")
         self._over = threading.Event()
         self._waited = 0.0
 
@@ -49,12 +50,13 @@ class Stopwatch:
     def _waits(self) -> dict[str, float]:
         """Seconds for which each thread has waited for a core, by its number."""
         found = {}
-        for process in (os.getpid(), *(processes_of(self._session) if self._session is not None else ())):
-            for task in Path(f"/proc/{process}/task").glob("*/schedstat"):
-                try:
-                    found[task.parent.name] = int(task.read_text(encoding="ascii").split()[1]) * 1e-9
-                except (OSError, IndexError):
-                    continue
+        session = [] if self._session is None else processes_of(self._session)
+        # Not of the thread that looks: it waits for a core of itself.
+        for task in (self._own, *(one for k in session for one in Path(f"/proc/{k}/task").glob("*/schedstat"))):
+            try:
+                found[task.parent.name] = int(task.read_text(encoding="ascii").split()[1]) * 1e-9
+            except (OSError, IndexError):
+                continue
         return found
 
 
