@@ -20,9 +20,9 @@ TURNS = np.radians(np.linspace(0.0, 150.0, 11))
 # Ground speeds of the tables, as shares of the airspeed: from a headwind of 40 % to a tailwind of 80 % of it.
 SPEED_SHARES = np.linspace(0.6, 1.8, 4)
 _KNOTS = (TURNS.size, SPEED_SHARES.size)
-# `TrackingError` for compiled code; `strays` is False for an autopilot without tracking error.
+# `TrackingError` for compiled code; `has_error` is False for an autopilot without tracking error.
 TRACKING = record_dtype(
-    ("strays", np.bool_),
+    ("has_error", np.bool_),
     "airspeed",
     ("excursion", np.float64, _KNOTS),
     ("before", np.float64, _KNOTS),
@@ -66,7 +66,7 @@ class TrackingError:
     def __post_init__(self) -> None:
         """Make the record of the tables."""
         record = np.zeros(1, TRACKING)
-        record["strays"] = True
+        record["has_error"] = True
         for name in ("excursion", "before", "after"):
             record[name] = getattr(self, name)
         for name in ("airspeed", "across", "up", "lag", "step"):
@@ -82,7 +82,7 @@ class TrackingError:
 def no_tracking() -> Record:
     """The record of an autopilot that follows its path exactly.
 
-    >>> bool(no_tracking().strays)
+    >>> bool(no_tracking().has_error)
     False
     """
     record = np.zeros(1, TRACKING)
@@ -108,7 +108,7 @@ def _density_factor(amsl: float) -> float:  # pragma: no cover - compiled
 
 
 @inlined
-def faster_by(tracking: Record, amsl: float) -> float:  # pragma: no cover - compiled
+def true_airspeed_excess(tracking: Record, amsl: float) -> float:  # pragma: no cover - compiled
     """Excess of the true airspeed over the nominal airspeed at an altitude, m/s."""
     faster: float = tracking.airspeed * (_density_factor(amsl) - 1.0)
     return faster
@@ -129,7 +129,7 @@ def _between(table: Floats, airspeed: float, turn: float, ground_speed: float) -
 
 
 @inlined
-def corner_room(
+def corner_deviation(
     tracking: Record, turn: float, ground_speed: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Largest distance from the legs at a corner, and lengths of the legs before and after it that are affected, m.

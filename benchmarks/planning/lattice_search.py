@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from benchmarks.task import Task, is_safe, scalar
 from planner.evaluation.encoding import rotated_frame, rotated_vectors
 from planner.seeding.pattern_search import search_patterns
-from planner.seeding.waypoint_chains import open_places
+from planner.seeding.waypoint_chains import free_points
 from planner.seeding.waypoint_fitting import fit_waypoints, tighten
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ def make_lattice(task: Task) -> Lattice:
         indexing="ij",
     )
     places = np.stack([east, north, up], axis=-1)
-    free = open_places(data, places.reshape(-1, 3)).reshape(places.shape[:3])
+    free = free_points(data, places.reshape(-1, 3)).reshape(places.shape[:3])
     return Lattice(free, data.west, data.south, bottom)
 
 

@@ -12,7 +12,7 @@ _WORLD = (
 _PROBLEM = (
     *_WORLD,
     "world.terrain.steepest_slopes",
-    "planner.airspace.zone_limits._give_way",
+    "planner.airspace.zone_limits._reduce_margins",
     "planner.evaluation.threat_index._fill_cells",
     "planner.evaluation.threat_index._lists",
 )
@@ -42,7 +42,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "shortening": (
         *_PROBLEM,
         "planner.seeding.shortening.begin_shortening",
-        "planner.seeding.shortening.shorten_on",
+        "planner.seeding.shortening.continue_shortening",
     ),
     "routes": (
         *_PROBLEM,

@@ -27,36 +27,36 @@ Heights = NDArray[np.float32]
 
 # Margins of one zone, m: beside its outline, and below its floor or above its ceiling (for an inclusion, inside them).
 # number: of the zone in the scenario. furthest_east: of this exclusion and of all before it, m.
-KEPT = record_dtype(("number", np.int64), "beside", "beyond", "furthest_east")
+REQUIRED_MARGINS = record_dtype(("number", np.int64), "horizontal", "vertical", "furthest_east")
 
 
 @by_reference
-class KeptZones(NamedTuple):
+class ZonesWithMargins(NamedTuple):
     """Zones in the order in which kernels visit them: the inclusions, then the exclusions from west to east.
 
-    records: the zones. kept: `KEPT` records (z,) with their margins.
+    records: the zones. required: `REQUIRED_MARGINS` records (z,) with their margins.
     inclusions: number of inclusions.
-    beside: largest horizontal margin, m.
+    max_horizontal: largest horizontal margin, m.
     """
 
     records: ZoneRecords
-    kept: Records
+    required: Records
     inclusions: int
-    beside: float
+    max_horizontal: float
 
 
 class ZoneMargins(NamedTuple):
-    """Margins of a path to zones, m: beside and beyond as in `KEPT`.
+    """Margins of a path to zones, m: horizontal and vertical as in `REQUIRED_MARGINS`.
 
     share: where a fixed end is within a margin, the share of its distance that becomes the margin.
     """
 
-    beside: float
-    beyond: float
+    horizontal: float
+    vertical: float
     share: float
 
 
-def keep_zones(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> KeptZones:
+def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
     """Zones with these margins, reduced for zones within whose margin a fixed end is.
 
     ends: (k, 3) m. An end inside an exclusion, or outside an inclusion, makes its margin 0.
@@ -64,52 +64,52 @@ def keep_zones(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, mar
     >>> from world.airspace.zones import Cylinder
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> ends = np.array([[0.0, 700.0 + 8.0, 60.0], [0.0, 3000.0, 60.0]])
-    >>> kept = keep_zones([zone], ends, None, ZoneMargins(20.0, 10.0, 0.5)).kept
-    >>> float(kept["beside"][0]), float(kept["beyond"][0])
+    >>> required = add_margins([zone], ends, None, ZoneMargins(20.0, 10.0, 0.5)).required
+    >>> float(required["horizontal"][0]), float(required["vertical"][0])
     (4.0, 10.0)
     """
     given = zone_records(zones)
     order = np.lexsort((given.zones["west"], given.zones["exclusion"]))
     records = ZoneRecords(given.zones[order], given.edges)
-    kept: Records = np.zeros(len(order), KEPT)
-    kept["number"], kept["beside"], kept["beyond"] = order, margins.beside, margins.beyond
+    required: Records = np.zeros(len(order), REQUIRED_MARGINS)
+    required["number"], required["horizontal"], required["vertical"] = order, margins.horizontal, margins.vertical
     inclusions = int((~records.zones["exclusion"]).sum())
-    kept["furthest_east"][inclusions:] = np.maximum.accumulate(records.zones["east"][inclusions:])
+    required["furthest_east"][inclusions:] = np.maximum.accumulate(records.zones["east"][inclusions:])
     grounds = np.full(len(ends), np.nan) if terrain is None else terrain.height(ends[:, 0], ends[:, 1])
-    _give_way(records, np.ascontiguousarray(ends), np.ascontiguousarray(grounds), margins.share, kept)
-    for array in (records.zones, kept):
+    _reduce_margins(records, np.ascontiguousarray(ends), np.ascontiguousarray(grounds), margins.share, required)
+    for array in (records.zones, required):
         array.setflags(write=False)
-    return KeptZones(records, kept, inclusions, margins.beside)
+    return ZonesWithMargins(records, required, inclusions, margins.horizontal)
 
 
 @compiled
-def _give_way(
-    records: ZoneRecords, ends: Floats, grounds: Floats, share: float, kept: Records
+def _reduce_margins(
+    records: ZoneRecords, ends: Floats, grounds: Floats, share: float, required: Records
 ) -> None:  # pragma: no cover - compiled
     """Reduce margins to a share of the distances of the ends (k, 3); grounds: (k,) ground heights there, m."""
-    for z in range(kept.shape[0]):
-        zone, keeps = records.zones[z], kept[z]
+    for z in range(required.shape[0]):
+        zone, need = records.zones[z], required[z]
         for k in range(ends.shape[0]):
             away = edge_distance(records, z, ends[k, 0], ends[k, 1])
             over = outside_band(zone, ends[k, 2], grounds[k])
             if not zone.exclusion:
-                keeps.beside = min(keeps.beside, max(0.0, -share * away))
-                keeps.beyond = min(keeps.beyond, max(0.0, -share * over))
-            elif away < keeps.beside and not over >= keeps.beyond:
+                need.horizontal = min(need.horizontal, max(0.0, -share * away))
+                need.vertical = min(need.vertical, max(0.0, -share * over))
+            elif away < need.horizontal and not over >= need.vertical:
                 # Reduce the margin of which the larger part is available.
-                if away * keeps.beyond >= over * keeps.beside or math.isnan(over):
-                    keeps.beside = max(0.0, share * away)
+                if away * need.vertical >= over * need.horizontal or math.isnan(over):
+                    need.horizontal = max(0.0, share * away)
                 else:
-                    keeps.beyond = max(0.0, share * over)
+                    need.vertical = max(0.0, share * over)
 
 
 @compiled
-def first_near(zones: KeptZones, west: float) -> int:  # pragma: no cover - compiled
+def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:  # pragma: no cover - compiled
     """Index of the first exclusion that may reach as far east as `west` (m)."""
-    low, high = zones.inclusions, zones.kept.shape[0]
+    low, high = zones.inclusions, zones.required.shape[0]
     while low < high:
         middle = (low + high) // 2
-        if zones.kept[middle].furthest_east < west:
+        if zones.required[middle].furthest_east < west:
             low = middle + 1
         else:
             high = middle
@@ -120,7 +120,7 @@ def first_near(zones: KeptZones, west: float) -> int:  # pragma: no cover - comp
 
 
 @by_reference
-class KeptAirspace(NamedTuple):
+class PlannerAirspace(NamedTuple):
     """Zones and the maximum height above ground; lengths in m.
 
     zones: exclusions and inclusions with their margins.
@@ -130,7 +130,7 @@ class KeptAirspace(NamedTuple):
     ground.
     """
 
-    zones: KeptZones
+    zones: ZonesWithMargins
     max_height: float
     buffer: float
     start_buffer: float
@@ -138,19 +138,19 @@ class KeptAirspace(NamedTuple):
     depths: Heights
 
 
-def keep_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> KeptAirspace:
+def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> PlannerAirspace:
     """The airspace of a scenario with its margins.
 
     buffer: margin below the maximum height, m; at a fixed end with less, a share (`ZoneMargins.share`) of what it has.
 
     >>> from world.scenario import load_scenario
-    >>> space = keep_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)
-    >>> space.max_height, len(space.zones.kept)
+    >>> space = make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)
+    >>> space.max_height, len(space.zones.required)
     (inf, 0)
     """
     terrain, most = scenario.terrain, scenario.limits.max_height_m
     ends = np.stack([scenario.start, scenario.destination])
-    zones = keep_zones(scenario.zones, ends, terrain, margins)
+    zones = add_margins(scenario.zones, ends, terrain, margins)
     asked = most is not None or any(zone.above_ground for zone in scenario.zones)
     # Unused otherwise: a small array of the right type.
     depths = -terrain.heights if terrain is not None and asked else np.zeros((2, 2), dtype=np.float32)
@@ -159,17 +159,17 @@ def keep_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Ke
     if most is not None and terrain is not None:
         left = most - (ends[:, 2] - terrain.height(ends[:, 0], ends[:, 1])) - 0.01
         buffers = [buffer if one >= buffer else margins.share * max(0.0, float(one)) for one in left]
-    return KeptAirspace(zones, math.inf if most is None else most, buffer, buffers[0], buffers[1], depths)
+    return PlannerAirspace(zones, math.inf if most is None else most, buffer, buffers[0], buffers[1], depths)
 
 
-def is_limited(airspace: KeptAirspace) -> bool:
+def is_limited(airspace: PlannerAirspace) -> bool:
     """Whether there is a zone or a maximum height above ground.
 
     >>> from world.scenario import load_scenario
-    >>> is_limited(keep_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0))
+    >>> is_limited(make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0))
     False
     """
-    return len(airspace.zones.kept) > 0 or airspace.max_height < math.inf
+    return len(airspace.zones.required) > 0 or airspace.max_height < math.inf
 
 
 # --- A line and a zone's shape on the map ---
@@ -203,7 +203,7 @@ class ShapeView(NamedTuple):
 
 
 @inlined
-def line_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  # pragma: no cover - compiled
+def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  # pragma: no cover - compiled
     """The line from a to b; one without length points north."""
     dx, dy = bx - ax, by - ay
     run = math.sqrt(dx * dx + dy * dy)
@@ -213,14 +213,16 @@ def line_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  # p
 
 
 @compiled
-def reach_of(records: ZoneRecords, z: int, line: MapSegment, within: float) -> ShapeView:  # pragma: no cover - compiled
+def view_shape(
+    records: ZoneRecords, z: int, line: MapSegment, within: float
+) -> ShapeView:  # pragma: no cover - compiled
     """Zone z's shape as seen from a line; distances above `within` (m) may be inf."""
     zone = records.zones[z]
     if zone.round:
         off_e, off_n = zone.centre_east - line.east, zone.centre_north - line.north
         along = off_e * line.course_east + off_n * line.course_north
         off = off_n * line.course_east - off_e * line.course_north
-        return _circle_reach(along, off, zone.radius, line.run)
+        return _view_circle(along, off, zone.radius, line.run)
     inside, distance2 = False, math.inf
     right, left, first, last = math.inf, -math.inf, math.inf, -math.inf
     edges = records.edges
@@ -247,10 +249,10 @@ def reach_of(records: ZoneRecords, z: int, line: MapSegment, within: float) -> S
 
 
 @inlined
-def _circle_reach(along: float, off: float, radius: float, run: float) -> ShapeView:  # pragma: no cover - compiled
+def _view_circle(along: float, off: float, radius: float, run: float) -> ShapeView:  # pragma: no cover - compiled
     """A circle as seen from a line, given its centre in the line's axes."""
-    beside = along - min(run, max(0.0, along))
-    nearest = math.sqrt(beside * beside + off * off) - radius
+    gap = along - min(run, max(0.0, along))
+    nearest = math.sqrt(gap * gap + off * off) - radius
     furthest = math.sqrt(max(abs(along), abs(along - run)) ** 2 + off * off) - radius
     inside = along * along + off * off <= radius * radius
     # The line is outside, or inside, or crosses the outline.
@@ -263,10 +265,10 @@ def _edge_distance2(
     along: float, off: float, to_along: float, to_off: float, run: float
 ) -> float:  # pragma: no cover - compiled
     """Squared distance of the line from an edge that does not cross it: at an end of one of the two."""
-    beside = along - min(run, max(0.0, along))
-    nearest = beside * beside + off * off
-    beside = to_along - min(run, max(0.0, to_along))
-    nearest = min(nearest, beside * beside + to_off * to_off)
+    gap = along - min(run, max(0.0, along))
+    nearest = gap * gap + off * off
+    gap = to_along - min(run, max(0.0, to_along))
+    nearest = min(nearest, gap * gap + to_off * to_off)
     step, rise = to_along - along, to_off - off
     length2 = step * step + rise * rise
     # From the line's beginning, then from its end.

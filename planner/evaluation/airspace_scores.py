@@ -11,12 +11,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.airspace.zone_distances import ZONE_ROOM, measure_zone_room, zone_excess
-from planner.evaluation.certify_kernels import ENDS, STRAYED_PIECE, buffer_on, strayed_pieces
+from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zone_excess
+from planner.evaluation.certify_kernels import ENDS, TRACKED_PIECE, required_buffer, tracked_pieces
 from planner.evaluation.corners import ARC_STEP, blended_vertices, fly_by_radii, half_blend_length
 from planner.evaluation.paper_scores import POINTS
-from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_below
-from planner.evaluation.terrain_clearance import below_at, segment_pixels, terrain_excess
+from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_headroom
+from planner.evaluation.terrain_clearance import lag_at, segment_pixels, terrain_excess
 from world.kernels import Record, Records, compiled, copy_into, inlined
 from world.terrain import segment_clearance
 
@@ -33,7 +33,7 @@ AIRSPACE_PIECE = np.dtype(
     [
         ("of_corner", np.bool_),
         ("number", np.int64),
-        ("zones", ZONE_ROOM),
+        ("zones", ZONE_MARGIN),
         ("height", np.float64),
         ("buffer", np.float64),
     ],
@@ -42,26 +42,26 @@ AIRSPACE_PIECE = np.dtype(
 # Sagitta of an arc over its chord, as a share of the radius.
 _SAGITTA = 1.0 - math.cos(0.5 * ARC_STEP)
 # Maximum number of pieces of one arc.
-_MOST_PIECES = math.ceil(math.pi / ARC_STEP) + 2
+_MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
     """`AIRSPACE_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
-    pieces = strayed_pieces(data, waypoints) if data.tracking.strays else _held_pieces(data, waypoints)
+    pieces = tracked_pieces(data, waypoints) if data.tracking.has_error else _exact_pieces(data, waypoints)
     out = np.zeros(pieces.size, dtype=AIRSPACE_PIECE)
-    space, beside = data.airspace, np.zeros(2)
+    space, lateral = data.airspace, np.zeros(2)
     for k in range(pieces.size):
         piece = pieces[k]
-        beside[0], beside[1] = piece.beside_begin, piece.beside_end
-        measure_zone_room(
+        lateral[0], lateral[1] = piece.lateral_begin, piece.lateral_end
+        measure_zone_margin(
             space.zones,
             data.heights,
             space.depths,
             data.to_pixel,
             piece.begin,
             piece.end,
-            beside,
+            lateral,
             piece.below,
             piece.above,
             out[k].zones,
@@ -70,15 +70,15 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragm
         if space.max_height < math.inf:
             out[k].height = _greatest_height(data, piece)
             ends = space.start_buffer, space.destination_buffer
-            out[k].buffer = buffer_on(data, space.buffer, ends, piece.begin, piece.end)
+            out[k].buffer = required_buffer(data, space.buffer, ends, piece.begin, piece.end)
     return out
 
 
 @compiled
-def _held_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`STRAYED_PIECE` records of a path flown without tracking error: its legs, then the chords of its arcs."""
+def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
+    """`TRACKED_PIECE` records of a path flown without tracking error: its legs, then the chords of its arcs."""
     last, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
-    out = np.zeros(last + last * _MOST_PIECES, dtype=STRAYED_PIECE)
+    out = np.zeros(last + last * _MAX_PIECES, dtype=TRACKED_PIECE)
     for i in range(last):
         out[i].number = i
         copy_into(out[i].begin, waypoints[i])
@@ -98,7 +98,7 @@ def _held_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: 
             copy_into(piece.begin, low[k])
             copy_into(piece.end, low[after])
             piece.above = max(0.0, -high[k, 2] - low[k, 2], -high[after, 2] - low[after, 2])
-            piece.beside_begin, piece.beside_end = radii[i] * _SAGITTA, radii[i] * _SAGITTA
+            piece.lateral_begin, piece.lateral_end = radii[i] * _SAGITTA, radii[i] * _SAGITTA
             made += 1
     return out[:made]
 
@@ -107,16 +107,16 @@ def _held_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: 
 def _greatest_height(data: ProblemArrays, piece: Record) -> float:  # pragma: no cover - compiled
     """Greatest height above ground along a piece and on both sides of it, m; NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
-    run, most = max(1e-9, math.hypot(dx, dy)), -math.inf
+    run, greatest = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
     for side in (0.0, -1.0, 1.0):
-        for end, at, beside in ((a, piece.begin, piece.beside_begin), (b, piece.end, piece.beside_end)):
-            end[0] = at[0] + side * beside * dy / run
-            end[1] = at[1] - side * beside * dx / run
+        for end, at, lateral in ((a, piece.begin, piece.lateral_begin), (b, piece.end, piece.lateral_end)):
+            end[0] = at[0] + side * lateral * dy / run
+            end[1] = at[1] - side * lateral * dx / run
             end[2] = -(at[2] + piece.above)
-        least, _ = segment_clearance(data.airspace.depths, data.to_pixel, a, b)
-        most = math.nan if math.isnan(least) or math.isnan(most) else max(most, -least)
-    return most
+        mirrored, _ = segment_clearance(data.airspace.depths, data.to_pixel, a, b)
+        greatest = math.nan if math.isnan(mirrored) or math.isnan(greatest) else max(greatest, -mirrored)
+    return greatest
 
 
 # --- Violations for the search ---
@@ -124,7 +124,7 @@ def _greatest_height(data: ProblemArrays, piece: Record) -> float:  # pragma: no
 # Where a leg is cut because its height lags, in lag lengths.
 _LAG_CUTS = (0.0, 1.0, 2.5)
 # Lines offset from a leg by more than this (m) are tested separately.
-_BESIDE = 0.5
+_MIN_OFFSET = 0.5
 
 
 @compiled
@@ -141,24 +141,24 @@ def add_airspace_violations(
 
     legs, corners, flown, lags: measurements of the path.
     """
-    zoned, topped = data.airspace.zones.kept.shape[0] > 0, data.airspace.max_height < math.inf
-    required = required_below(data)
+    zoned, topped = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
+    required = required_headroom(data)
     a, b = np.empty(3), np.empty(3)
     last = legs.shape[0] - 1
     across = float(data.tracking.across)
     for i in range(last + 1):
         before, after = float(flown[i].fly_by_offset), float(flown[i + 1].fly_by_offset)
-        below, above = float(lags[i].most), -float(lags[i].least)
+        below, above = float(lags[i].max_below), -float(lags[i].min_below)
         if topped:
-            violations.terrain += _too_high(data, required, path[i], path[i + 1], legs[i], lags[i], across)
+            violations.terrain += _excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
         wide = max(before, after)
         if zoned and _zone_excess(data, path[i], path[i + 1], across + wide, below, above) > 0.0:
             first = min(1.0, ENDS / max(legs[i].run, 1e-6)) if i == 0 else 0.0
             final = max(first, 1.0 - ENDS / max(legs[i].run, 1e-6)) if i == last else 1.0
-            for share, until, beside in ((0.0, first, 0.0), (first, final, across), (final, 1.0, 0.0)):
+            for share, until, lateral in ((0.0, first, 0.0), (first, final, across), (final, 1.0, 0.0)):
                 if until > share:
                     _cut(path[i], path[i + 1], share, until, a, b)
-                    violations.bounds += _zone_excess(data, a, b, beside, below, above)
+                    violations.bounds += _zone_excess(data, a, b, lateral, below, above)
         else:
             wide = 0.0
         for width, length, share in ((before, corners[i].after, 0.0), (after, corners[i + 1].before, 1.0)):
@@ -169,8 +169,8 @@ def add_airspace_violations(
             if zoned and wide > 0.0:
                 violations.bounds += _zone_excess(data, a, b, across + width, below, above)
             if topped:
-                more = max(0.0, -below_at(lags[i], share), -below_at(lags[i], abs(share - part)))
-                violations.terrain += _beside_too_high(data, required, a, b, across + width, more)
+                more = max(0.0, -lag_at(lags[i], share), -lag_at(lags[i], abs(share - part)))
+                violations.terrain += _excess_height_around(data, required, a, b, across + width, more)
 
 
 @compiled
@@ -182,55 +182,55 @@ def airspace_excess(
     below, above: vertical tracking error, m.
     """
     total, across = 0.0, float(data.tracking.across)
-    if data.airspace.zones.kept.shape[0] > 0:
+    if data.airspace.zones.required.shape[0] > 0:
         total += _zone_excess(data, a, b, across, below, above)
     if data.airspace.max_height < math.inf:
-        total += _beside_too_high(data, required_below(data), a, b, across, above)
+        total += _excess_height_around(data, required_headroom(data), a, b, across, above)
     return total
 
 
 @compiled
 def _zone_excess(
-    data: ProblemArrays, a: Floats, b: Floats, beside: float, below: float, above: float
+    data: ProblemArrays, a: Floats, b: Floats, lateral: float, below: float, above: float
 ) -> float:  # pragma: no cover - compiled
     zones = data.airspace.zones
-    return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, a, b, beside, below, above)
+    return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, a, b, lateral, below, above)
 
 
 @compiled
-def _too_high(
+def _excess_height(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, leg: Record, lag: Record, across: float
 ) -> float:  # pragma: no cover - compiled
     """Excess over the maximum height above ground along a leg, with its height lag: m x km."""
-    if not data.tracking.strays:
-        return _beside_too_high(data, required, a, b, 0.0, 0.0)
+    if not data.tracking.has_error:
+        return _excess_height_around(data, required, a, b, 0.0, 0.0)
     total, one, two = 0.0, np.empty(3), np.empty(3)
     for k in range(len(_LAG_CUTS)):
         share = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
         until = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
         if until > share:
             _cut(a, b, share, until, one, two)
-            above = max(0.0, -below_at(lag, share), -below_at(lag, until))
-            total += _beside_too_high(data, required, one, two, across, above)
+            above = max(0.0, -lag_at(lag, share), -lag_at(lag, until))
+            total += _excess_height_around(data, required, one, two, across, above)
     return total
 
 
 @compiled
-def _beside_too_high(
-    data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, beside: float, above: float
+def _excess_height_around(
+    data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float
 ) -> float:  # pragma: no cover - compiled
     """Largest excess over the maximum height above ground of a line and the lines offset to both sides: m x km."""
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
-    east, north = beside * (b[1] - a[1]) / run, -beside * (b[0] - a[0]) / run
-    most = 0.0
+    east, north = lateral * (b[1] - a[1]) / run, -lateral * (b[0] - a[0]) / run
+    largest = 0.0
     for side in (0.0, -1.0, 1.0):
-        if side != 0.0 and beside < _BESIDE:
+        if side != 0.0 and lateral < _MIN_OFFSET:
             break
         x, y, x2, y2 = a[0] + side * east, a[1] + side * north, b[0] + side * east, b[1] + side * north
         ends = segment_pixels(data.to_pixel, x, y, x2, y2)
         depths, bounds = data.airspace.depths, data.slope_bounds
-        most = max(most, terrain_excess(depths, bounds, required, above, ends, x, y, -a[2], x2, y2, -b[2]))
-    return most
+        largest = max(largest, terrain_excess(depths, bounds, required, above, ends, x, y, -a[2], x2, y2, -b[2]))
+    return largest
 
 
 @inlined

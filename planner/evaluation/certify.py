@@ -63,8 +63,8 @@ def _turns(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float
     margins = allowed - turning_angles(with_courses(data, waypoints))
     for i, margin in enumerate(margins):
         if margin < wanted - _EPSILON:
-            turned, most = math.degrees(allowed - margin), math.degrees(allowed - wanted)
-            problems.append(f"waypoint {i}: turns {turned:.1f} deg, allowed {most:.1f} deg")
+            turned, largest = math.degrees(allowed - margin), math.degrees(allowed - wanted)
+            problems.append(f"waypoint {i}: turns {turned:.1f} deg, allowed {largest:.1f} deg")
     return float(margins.min(initial=math.inf))
 
 
@@ -73,26 +73,26 @@ def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -
     for i, run in enumerate(leg_runs(waypoints)):
         if run < CERTIFIED_LEG:
             problems.append(f"leg {i}: {run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
-    least = math.inf
+    smallest = math.inf
     if not data.legs_hold_turns:
-        return least
+        return smallest
     lengths = turn_and_roll_lengths(data, waypoints)
     for i, (run, need, roll) in enumerate(zip(leg_runs(waypoints), *lengths, strict=True)):
         if need == 0.0:
             continue
-        least = min(least, float(run - need - roll))
+        smallest = min(smallest, float(run - need - roll))
         settle = settling_length(float(need), float(run)) + roll
         if need + settle > run + _EPSILON:
             problems.append(f"leg {i}: {run:.0f} m long, its turns need {need:.0f} m and {settle:.0f} m to settle")
-    return least
+    return smallest
 
 
 def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Smallest slope margin along the arcs, which are shorter and hence steeper than the legs they replace, rad."""
-    least = math.inf
+    smallest = math.inf
     by_numbers = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
     if not data.legs_hold_turns or data.fly_over or by_numbers:
-        return least
+        return smallest
     radii, tangents = fly_by_radii(data, waypoints), turn_tangents(data.aircraft, waypoints)
     rises = np.tan(leg_slopes(waypoints))
     for i in range(1, len(waypoints) - 1):
@@ -104,23 +104,23 @@ def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> 
             step = np.append((waypoints[after] - waypoints[before])[:2], waypoints[i, 2])
             climb, dive = slope_limits(data, flat, step)
             inside = min(climb - slope, dive + slope)
-            least = min(least, inside + data.angle_margin)
+            smallest = min(smallest, inside + data.angle_margin)
             if inside < -_EPSILON:
                 problems.append(f"turn at waypoint {i}: {_too_steep(slope, climb, dive, ' along its arc')}")
                 break
-    return least
+    return smallest
 
 
 def _leg_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Smallest slope margin of the legs, rad."""
-    least = math.inf
+    smallest = math.inf
     limits = leg_slope_limits(data, waypoints)
     for i, (slope, climb, dive) in enumerate(zip(leg_slopes(waypoints), *limits, strict=True)):
         inside = min(climb - slope, dive + slope)
-        least = min(least, inside + data.angle_margin)
+        smallest = min(smallest, inside + data.angle_margin)
         if inside < -_EPSILON:
             problems.append(f"leg {i}: {_too_steep(slope, climb, dive)}")
-    return least
+    return smallest
 
 
 def _too_steep(slope: float, climb: float, dive: float, where: str = "") -> str:
@@ -130,11 +130,11 @@ def _too_steep(slope: float, climb: float, dive: float, where: str = "") -> str:
 
 def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Smallest height above the required clearance, m; NaN where the path leaves the terrain."""
-    least = math.inf
+    smallest = math.inf
     low: dict[str, float] = {}
     for piece in heights_above_ground(data, waypoints):
         margin = float(piece["height"]) - data.clearance
-        least = math.nan if math.isnan(margin) or math.isnan(least) else min(least, margin)
+        smallest = math.nan if math.isnan(margin) or math.isnan(smallest) else min(smallest, margin)
         if margin >= float(piece["buffer"]) - _EPSILON:
             continue
         name = f"turn at waypoint {piece['number']}" if piece["of_arc"] else f"leg {piece['number']}"
@@ -146,7 +146,7 @@ def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> f
         else:
             wanted = f"{data.clearance:g} m and {data.buffer:g} m in reserve wanted"
             problems.append(f"{name}: {margin + data.clearance:.1f} m above ground at its lowest, {wanted}")
-    return least
+    return smallest
 
 
 def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
@@ -172,9 +172,9 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
     high: dict[str, float] = {}
     for piece in pieces:
         name = f"turn at waypoint {piece['number']}" if piece["of_corner"] else f"leg {piece['number']}"
-        room, left = piece["zones"], float(space.max_height - piece["height"])
-        if not room["kept"]:
-            near[name] = min(near.get(name, (math.inf, 0)), (float(room["nearest"]), int(room["zone"])))
+        zone_margin, left = piece["zones"], float(space.max_height - piece["height"])
+        if not zone_margin["satisfied"]:
+            near[name] = min(near.get(name, (math.inf, 0)), (float(zone_margin["nearest"]), int(zone_margin["zone"])))
         # NaN off the terrain is reported by the clearance.
         if left < float(piece["buffer"]) - _EPSILON:
             high[name] = min(high.get(name, math.inf), left)
@@ -188,9 +188,10 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
 
 def _too_near(problem: Problem, distance: float, z: int) -> str:
     """Message for a piece at this distance (m) from zone z, in the kernels' numbering."""
-    kept = problem.certified.airspace.zones.kept[z]
-    zone = problem.scenario.zones[int(kept["number"])]
+    required = problem.certified.airspace.zones.required[z]
+    zone = problem.scenario.zones[int(required["number"])]
     if distance < 0.0:
         return f"{-distance:.1f} m {'inside' if zone.kind == 'exclusion' else 'outside'} {zone.name}"
     where = "from" if zone.kind == "exclusion" else "inside the edge of"
-    return f"{distance:.1f} m {where} {zone.name}, {kept['beside']:g} m or {kept['beyond']:g} m in height wanted"
+    wanted = f"{required['horizontal']:g} m or {required['vertical']:g} m in height wanted"
+    return f"{distance:.1f} m {where} {zone.name}, {wanted}"

@@ -25,7 +25,7 @@ from planner.evaluation.corners import (
 )
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import BUFFER_GROWTH, ProblemArrays
-from planner.evaluation.terrain_clearance import HEIGHT_LAG, below_at, measure_lags
+from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags
 from world.kernels import Record, Records, compiled, copy_into
 from world.terrain import segment_clearance
 
@@ -37,15 +37,15 @@ Floats = NDArray[np.float64]
 
 # A piece of a leg, or of a leg near the corner at a waypoint, with its number: its ends; the lateral deviation of the
 # flight at both ends and its maximum; and the largest deviation below and above, m.
-STRAYED_PIECE = np.dtype(
+TRACKED_PIECE = np.dtype(
     [
         ("of_corner", np.bool_),
         ("number", np.int64),
         ("begin", np.float64, (3,)),
         ("end", np.float64, (3,)),
-        ("beside_begin", np.float64),
-        ("beside_end", np.float64),
-        ("beside", np.float64),
+        ("lateral_begin", np.float64),
+        ("lateral_end", np.float64),
+        ("lateral", np.float64),
         ("below", np.float64),
         ("above", np.float64),
     ],
@@ -58,15 +58,15 @@ ENDS = 100.0
 
 
 @compiled
-def strayed_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`STRAYED_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
+def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
+    """`TRACKED_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind(data.aircraft), data.tracking.across
     measure_legs(waypoints, legs)
     measure_corners(data, wind, waypoints, legs, corners)
     measure_lags(data.tracking, data.aircraft, wind, waypoints, legs, lags)
-    out = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=STRAYED_PIECE)
+    out = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=TRACKED_PIECE)
     made = 0
     for i in range(count - 1):
         cuts, share = _cuts(lags[i].decay, legs[i].run), 0.0
@@ -76,9 +76,12 @@ def strayed_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma
             piece = out[made]
             _cut(waypoints[i], waypoints[i + 1], share, after, piece)
             piece.number = i
-            piece.beside_begin, piece.beside_end = _beside(data, piece.begin, across), _beside(data, piece.end, across)
+            piece.lateral_begin, piece.lateral_end = (
+                _lateral_deviation(data, piece.begin, across),
+                _lateral_deviation(data, piece.end, across),
+            )
             _set_below(lags[i], share, after, piece)
-            piece.beside = max(piece.beside_begin, piece.beside_end)
+            piece.lateral = max(piece.lateral_begin, piece.lateral_end)
             share = after
             made += 1
     for i in range(1, count - 1):
@@ -90,7 +93,7 @@ def strayed_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma
             piece = out[made]
             _cut(about[k], about[k + 1], 0.0, 1.0, piece)
             piece.of_corner, piece.number = True, i
-            piece.beside_begin, piece.beside_end, piece.beside = wide, wide, wide
+            piece.lateral_begin, piece.lateral_end, piece.lateral = wide, wide, wide
             if k == 0:
                 share = 1.0 - min(1.0, corners[i].before / max(1e-6, legs[i - 1].run))
                 _set_below(lags[i - 1], share, 1.0, piece)
@@ -122,12 +125,12 @@ def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> Non
 @compiled
 def _set_below(lag: Record, share: float, after: float, piece: Record) -> None:  # pragma: no cover - compiled
     """Fill the deviations below and above of the piece between two fractions of a leg."""
-    one, two = below_at(lag, share), below_at(lag, after)
+    one, two = lag_at(lag, share), lag_at(lag, after)
     piece.below, piece.above = max(0.0, one, two), max(0.0, -one, -two)
 
 
 @compiled
-def _beside(data: ProblemArrays, place: Floats, across: float) -> float:  # pragma: no cover - compiled
+def _lateral_deviation(data: ProblemArrays, place: Floats, across: float) -> float:  # pragma: no cover - compiled
     """Lateral deviation of the flight at a point of the path, m: reduced near the fixed ends."""
     away = min(
         math.hypot(place[0] - data.start[0], place[1] - data.start[1]),
@@ -144,7 +147,7 @@ CERTIFIED_PIECE = np.dtype(
     [("of_arc", np.bool_), ("number", np.int64), ("height", np.float64), ("buffer", np.float64)], align=True
 )
 # Maximum number of pieces of one arc: its chords and one on either leg.
-_MOST_PIECES = math.ceil(math.pi / ARC_STEP) + 2
+_MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 
 @compiled
@@ -154,12 +157,12 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma
     The flight is on the legs and arcs, or within the tracking error of them.
     """
     nearest = math.inf
-    if data.tracking.strays:
-        for piece in strayed_pieces(data, waypoints):
+    if data.tracking.has_error:
+        for piece in tracked_pieces(data, waypoints):
             a, b = piece.begin.copy(), piece.end.copy()
             for shift in (0.0, -piece.below, piece.above):
                 a[2], b[2] = piece.begin[2] + shift, piece.end[2] + shift
-                nearest = min(nearest, _segment_distance(data.threats, a, b, math.inf) - piece.beside)
+                nearest = min(nearest, _segment_distance(data.threats, a, b, math.inf) - piece.lateral)
         return nearest
     last = waypoints.shape[0] - 1
     for i in range(last):
@@ -244,11 +247,11 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
     """`CERTIFIED_PIECE` records of the legs of a path (w, 3), followed by those of its fly-by arcs or corners."""
-    if data.tracking.strays:
-        return _strayed_heights(data, strayed_pieces(data, waypoints))
+    if data.tracking.has_error:
+        return _tracked_heights(data, tracked_pieces(data, waypoints))
     last = waypoints.shape[0] - 1
     radii = fly_by_radii(data, waypoints)
-    out = np.zeros(last + last * _MOST_PIECES, dtype=CERTIFIED_PIECE)
+    out = np.zeros(last + last * _MAX_PIECES, dtype=CERTIFIED_PIECE)
     for i in range(last):
         _measure_piece(data, waypoints[i], waypoints[i + 1], False, i, out[i])
     count = last
@@ -261,25 +264,25 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # 
 
 
 @compiled
-def _strayed_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma: no cover - compiled
-    """`CERTIFIED_PIECE` records of `STRAYED_PIECE` records: smallest heights along them and to both sides."""
+def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma: no cover - compiled
+    """`CERTIFIED_PIECE` records of `TRACKED_PIECE` records: smallest heights along them and to both sides."""
     out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
     for k in range(pieces.size):
         piece = pieces[k]
         dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
         run = max(1e-9, math.hypot(dx, dy))
-        least = math.inf
+        smallest = math.inf
         for side in (0.0, -1.0, 1.0):
             a, b = piece.begin.copy(), piece.end.copy()
-            for end, beside in ((a, piece.beside_begin), (b, piece.beside_end)):
-                end[0] += side * beside * dy / run
-                end[1] -= side * beside * dx / run
+            for end, lateral in ((a, piece.lateral_begin), (b, piece.lateral_end)):
+                end[0] += side * lateral * dy / run
+                end[1] -= side * lateral * dx / run
                 end[2] -= piece.below
             height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
-            least = math.nan if math.isnan(height) or math.isnan(least) else min(least, height)
-        out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, least
+            smallest = math.nan if math.isnan(height) or math.isnan(smallest) else min(smallest, height)
+        out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, smallest
         ends = data.start_buffer, data.destination_buffer
-        out[k].buffer = buffer_on(data, data.buffer, ends, piece.begin, piece.end)
+        out[k].buffer = required_buffer(data, data.buffer, ends, piece.begin, piece.end)
     return out
 
 
@@ -289,11 +292,11 @@ def _measure_piece(
 ) -> None:  # pragma: no cover - compiled
     height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
     out.of_arc, out.number, out.height = of_arc, number, height
-    out.buffer = buffer_on(data, data.buffer, (data.start_buffer, data.destination_buffer), a, b)
+    out.buffer = required_buffer(data, data.buffer, (data.start_buffer, data.destination_buffer), a, b)
 
 
 @compiled
-def buffer_on(
+def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:  # pragma: no cover - compiled
     """Buffer required on a piece, m: smaller near a fixed end, growing with the distance from it.

@@ -20,7 +20,7 @@ from aircraft.path_limits import (
     turn_tangents,
     wind_speed_at,
 )
-from aircraft.tracking import corner_room, faster_by
+from aircraft.tracking import corner_deviation, true_airspeed_excess
 from planner.evaluation.problem import ProblemArrays
 from world.geometry import turning_angle
 from world.kernels import Record, Records, compiled, copy_into, inlined
@@ -66,12 +66,12 @@ def measure_corners(
     last: int = legs.shape[0]
     for i in range(1, last):
         ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
-        some = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
-        measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
-    for i, asked in ((0, data.start_course), (last, data.destination_course)):
+        turning = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
+        measure_corner(aircraft, tracking, wind, turning, ux, uy, vx, vy, path[i, 2], corners[i])
+    for i, prescribed in ((0, data.start_course), (last, data.destination_course)):
         ux, uy, vx, vy = courses_at(data, legs, i)
-        some = not math.isnan(asked) and legs[min(i, last - 1)].run > 0.0
-        measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
+        turning = not math.isnan(prescribed) and legs[min(i, last - 1)].run > 0.0
+        measure_corner(aircraft, tracking, wind, turning, ux, uy, vx, vy, path[i, 2], corners[i])
 
 
 @compiled
@@ -79,7 +79,7 @@ def measure_corner(
     aircraft: PerformanceTable,
     tracking: Record,
     wind: Wind,
-    some: bool,
+    turning: bool,
     ux: float,
     uy: float,
     vx: float,
@@ -87,17 +87,17 @@ def measure_corner(
     amsl: float,
     corner: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the `CORNER` record of a turn between the unit courses u and v; zeros if `some` is false (no turn)."""
+    """Fill the `CORNER` record of a turn between the unit courses u and v; zeros if `turning` is false (no turn)."""
     tangent, radius, excursion = 0.0, 0.0, 0.0
-    if some:
+    if turning:
         tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, amsl, wind[0], wind[1])
     before, after = tangent, tangent
-    if tracking.strays and 0.0 < tangent < math.inf:
+    if tracking.has_error and 0.0 < tangent < math.inf:
         turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
         # The highest ground speed in the turn, for which the radius of the arc was computed.
-        speed = math.sqrt(radius * GRAVITY * aircraft.tan_max_bank) + faster_by(tracking, amsl)
-        excursion, room_before, room_after = corner_room(tracking, turn, speed)
-        before, after = max(tangent, room_before), max(tangent, room_after)
+        speed = math.sqrt(radius * GRAVITY * aircraft.tan_max_bank) + true_airspeed_excess(tracking, amsl)
+        excursion, length_before, length_after = corner_deviation(tracking, turn, speed)
+        before, after = max(tangent, length_before), max(tangent, length_after)
     corner.tangent, corner.radius = tangent, radius
     corner.before, corner.after, corner.excursion = before, after, excursion
 
@@ -205,8 +205,8 @@ def blended_vertices(
     low, high = at[2] - tangent * slope_in, at[2] + tangent * slope_out
     slope = (high - low) / arc if chords > 0 else slope_out
     available_in, available_out = 0.5 * (run_before - tangent), 0.5 * (run_after - tangent)
-    beside = 0.5 * arc if chords > 0 else min(available_in, available_out)
-    available_in, available_out = min(available_in, beside), min(available_out, beside)
+    half_limit = 0.5 * arc if chords > 0 else min(available_in, available_out)
+    available_in, available_out = min(available_in, half_limit), min(available_out, half_limit)
     half_in = min(abs(slope_in - slope) * blend, available_in)
     half_out = min(abs(slope - slope_out) * blend, available_out) if chords > 0 else half_in
     deviation_in = 0.25 * max(0.0, slope_in - slope) * half_in

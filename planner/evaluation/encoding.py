@@ -94,10 +94,10 @@ def straight_frames(east: float, north: float, cosine: float, sine: float, edges
     return WaypointFrames(east * one, north * one, cosine * one, sine * one, edges)
 
 
-def spread_over(route: Floats, count: int) -> tuple[Floats, Floats]:
+def sample_route(route: Floats, count: int) -> tuple[Floats, Floats]:
     """Points (count, 3) at equal distances along a route (k, 3), and their distances along it on the map (count,), m.
 
-    >>> points, along = spread_over(np.array([[0.0, 0.0, 10.0], [30.0, 0.0, 10.0], [30.0, 10.0, 10.0]]), 5)
+    >>> points, along = sample_route(np.array([[0.0, 0.0, 10.0], [30.0, 0.0, 10.0], [30.0, 10.0, 10.0]]), 5)
     >>> along.tolist(), points[:, 0].tolist(), points[:, 1].tolist()
     ([0.0, 10.0, 20.0, 30.0, 40.0], [0.0, 10.0, 20.0, 30.0, 30.0], [0.0, 0.0, 0.0, 0.0, 10.0])
     """
@@ -112,7 +112,7 @@ def spread_over(route: Floats, count: int) -> tuple[Floats, Floats]:
 # Shortest polar step, as a share of the mean leg: a step of 0 has no direction.
 _SHORTEST = 0.05
 # Half-width of the box along a route, in lengths of its pieces.
-ASIDE = 2.0
+HALF_WIDTH = 2.0
 
 
 @by_reference
@@ -230,14 +230,14 @@ def rotated(space: Space, waypoints: int) -> Encoding:
     return Encoding("rotated", waypoints, lower.ravel(), upper.ravel(), decode, frames)
 
 
-def along_route(space: Space, route: Floats) -> Encoding:
+def route_encoding(space: Space, route: Floats) -> Encoding:
     """Like `rotated`, with a route (w - 1, 2) on the map as its axis, which may turn back.
 
-    Inner waypoint i lies along the i-th piece of the route, and across within `ASIDE` lengths of a piece.
+    Inner waypoint i lies along the i-th piece of the route, and across within `HALF_WIDTH` lengths of a piece.
     """
     frames = frames_along(route)
     waypoints = len(route) + 1
-    aside = ASIDE * float(frames.edges[-1]) / (waypoints - 2)
+    aside = HALF_WIDTH * float(frames.edges[-1]) / (waypoints - 2)
     lower = np.column_stack([frames.edges[:-1], np.full(waypoints - 2, -aside), np.full(waypoints - 2, space.up[0])])
     upper = np.column_stack([frames.edges[1:], np.full(waypoints - 2, aside), np.full(waypoints - 2, space.up[1])])
 

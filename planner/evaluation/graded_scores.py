@@ -29,7 +29,7 @@ from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays, Re
 from planner.evaluation.terrain_clearance import (
     HEIGHT_LAG,
     TERRAIN_LEG,
-    below_at,
+    lag_at,
     measure_lags,
     sample_terrain,
     segment_pixels,
@@ -113,17 +113,17 @@ def score_path(
     bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
     legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
     terrain_legs, gaps, lags = scratch.terrain_legs, scratch.gaps, scratch.lags
-    strays = data.tracking.strays
+    has_error = data.tracking.has_error
     count = path.shape[0]
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
     graded = count > 0  # no literal: numba would compile what takes it for each
     add_leg_violations(data, limits, path, legs, corners, graded, violations)
-    if strays:
+    if has_error:
         measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
-        _measure_strayed(corners, flown, extents)
+        _measure_tracked(corners, flown, extents)
     else:
-        _measure_flown(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
+        _measure_exact(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
     sample_terrain(heights, bounds, to_pixel, required, path, legs, extents, lags, terrain_legs, scratch.unfinished)
     length, kill = 0.0, 0.0
     for i in range(count - 1):
@@ -131,7 +131,19 @@ def score_path(
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
         within = max(flown[i].missile_distance, flown[i + 1].missile_distance)
         dose, at_beginning, at_end = kill_density(
-            missiles, margin, within, x, y, z, x2, y2, z2, extents[i], extents[i + 1], lags[i].most, -lags[i].least
+            missiles,
+            margin,
+            within,
+            x,
+            y,
+            z,
+            x2,
+            y2,
+            z2,
+            extents[i],
+            extents[i + 1],
+            lags[i].max_below,
+            -lags[i].min_below,
         )
         gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
         violations.terrain += terrain_legs[i].depth
@@ -144,7 +156,7 @@ def score_path(
         close = drop + aside > CORNER_TOLERANCE or min(gaps[i - 1].at_end, gaps[i].at_beginning) < drop + aside
         if drop + aside < 0.01 or not (low or close):
             continue
-        if strays:
+        if has_error:
             vertices = legs_about(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
             below, above = _lag_about(lags[i], legs[i], corners[i])
             more, spare = below + bounds.steepest * aside, margin + aside
@@ -155,7 +167,7 @@ def score_path(
             violations.terrain += _corner_depth(heights, bounds, to_pixel, required, more, vertices)
         if close:
             kill += _corner_kill(missiles, spare, vertices, below, above)
-    if data.airspace.zones.kept.shape[0] > 0 or data.airspace.max_height < math.inf:
+    if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         add_airspace_violations(data, path, legs, corners, flown, lags, violations)
     objectives.length_ratio = length / limits.straight_distance
     objectives.kill_exposure = kill * POINTS * (count - 1) / length
@@ -203,7 +215,7 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
 
 
 @compiled
-def _measure_flown(
+def _measure_exact(
     aircraft: PerformanceTable,
     legs_hold_turns: bool,
     fly_over: bool,
@@ -238,12 +250,12 @@ def _measure_flown(
 @inlined
 def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:  # pragma: no cover - compiled
     """Largest deviation of the flight below and above the legs near a corner, m; lag, leg: of the leg after it."""
-    here, settled = below_at(lag, 0.0), below_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
+    here, settled = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, here, settled), max(0.0, -here, -settled)
 
 
 @inlined
-def _measure_strayed(corners: Records, flown: Records, extents: Floats) -> None:  # pragma: no cover - compiled
+def _measure_tracked(corners: Records, flown: Records, extents: Floats) -> None:  # pragma: no cover - compiled
     """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path with tracking error."""
     for i in range(1, corners.shape[0] - 1):
         aside = corners[i].excursion

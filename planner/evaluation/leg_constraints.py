@@ -32,7 +32,7 @@ def _rows(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generi
 
 
 # One point of each path: position (m) and pixel.
-_PLACE = np.dtype(_rows(np.float64, "east", "north", "up", "column", "row"), align=True)
+_POINT = np.dtype(_rows(np.float64, "east", "north", "up", "column", "row"), align=True)
 # Sums along each path.
 _SUMS = np.dtype(
     _rows(np.float64, "below", "height", "kill", "detection", "turns", "slopes", "outside", "length"), align=True
@@ -40,10 +40,10 @@ _SUMS = np.dtype(
 BLOCK_SCRATCH = np.dtype(
     [
         # Both ends of a leg, the step between them, and a point on it.
-        ("begin", _PLACE),
-        ("end", _PLACE),
-        ("step", _PLACE),
-        ("point", _PLACE),
+        ("begin", _POINT),
+        ("end", _POINT),
+        ("step", _POINT),
+        ("point", _POINT),
         # A leg's run, and the east, north and run of the previous leg, m.
         *_rows(np.float64, "run", "east_before", "north_before", "run_before"),
         ("sums", _SUMS),
@@ -54,7 +54,7 @@ BLOCK_SCRATCH = np.dtype(
         # Heights of the four pixels around a point.
         *_rows(np.float32, "top_left", "top_right", "low_left", "low_right"),
         # Index of a pixel or cell; first entry and number of entries of a cell's units; paths still to be processed.
-        *_rows(np.int64, "index", "first", "count", "asked"),
+        *_rows(np.int64, "index", "first", "count", "active"),
     ],
     align=True,
 )
@@ -69,7 +69,7 @@ def clear_sums(sums: Record) -> None:  # pragma: no cover - compiled
 
 
 @inlined
-def copy_place(place: Record, out: Record, size: int) -> None:  # pragma: no cover - compiled
+def copy_point(place: Record, out: Record, size: int) -> None:  # pragma: no cover - compiled
     """Copy one point of each path to another."""
     for b in range(size):
         out.east[b], out.north[b], out.up[b] = place.east[b], place.north[b], place.up[b]
@@ -77,7 +77,7 @@ def copy_place(place: Record, out: Record, size: int) -> None:  # pragma: no cov
 
 
 @inlined
-def subtract_places(end: Record, begin: Record, size: int, out: Record) -> None:  # pragma: no cover - compiled
+def subtract_points(end: Record, begin: Record, size: int, out: Record) -> None:  # pragma: no cover - compiled
     """Fill the step from one point of each path to another."""
     for b in range(size):
         out.east[b] = end.east[b] - begin.east[b]
@@ -140,9 +140,9 @@ def _horner(
 # --- Limits and violations of one path ---
 
 # Upper bound on the length of any roll between two turns, m: at 60 degrees of bank and 90 m/s over the ground.
-MOST_ROLL = 50.0
+MAX_ROLL = 50.0
 # Shortest leg without a violation, in the graded scores and in the certificate, m.
-LEAST_LEG, CERTIFIED_LEG = 10.0, 5.0
+MIN_LEG, CERTIFIED_LEG = 10.0, 5.0
 
 
 class PrecomputedLimits(NamedTuple):
@@ -290,7 +290,7 @@ def add_leg_violations(
         _add_turn_lengths(data, limits, path, legs, corners, graded, violations)
     for i in range(legs.shape[0]):
         # Coincident waypoints have no course between them, and would hide two sharp turns.
-        violations.turn += max(0.0, LEAST_LEG - legs[i].run) / 100.0 if graded else 0.0
+        violations.turn += max(0.0, MIN_LEG - legs[i].run) / 100.0 if graded else 0.0
         rise, run = path[i + 1, 2] - path[i, 2], legs[i].run
         over = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run) / max(run, 1.0)
         if limits.slopes_by_aircraft:
@@ -310,8 +310,8 @@ def _add_turns(
     for i in range(1, last):
         ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
         violations.turn += _violation(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
-    for i, asked in ((0, data.start_course), (last, data.destination_course)):
-        if not math.isnan(asked):
+    for i, prescribed in ((0, data.start_course), (last, data.destination_course)):
+        if not math.isnan(prescribed):
             ux, uy, vx, vy = courses_at(data, legs, i)
             violations.turn += _violation(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
 
@@ -345,7 +345,7 @@ def _add_turn_lengths(
     for i in range(legs.shape[0]):
         need, run = turn_length(data.fly_over, corners, i), legs[i].run
         short = need + settling_length(need, run) - run if need > 0.0 else 0.0
-        if short > -MOST_ROLL and not data.fly_over:
+        if short > -MAX_ROLL and not data.fly_over:
             up = min(path[i, 2], path[i + 1, 2])
             short += roll_length(data.aircraft, legs, corners, i, up, limits.wind)
         violations.turn += _violation(min(10.0, max(0.0, short / 100.0)), graded)

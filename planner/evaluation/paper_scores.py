@@ -21,11 +21,11 @@ from planner.evaluation.leg_constraints import (
     PrecomputedLimits,
     add_leg_violations,
     clear_sums,
-    copy_place,
+    copy_point,
     divide_legs,
     load_waypoints,
     precompute_limits,
-    subtract_places,
+    subtract_points,
 )
 from planner.evaluation.problem import (
     OBJECTIVES,
@@ -120,10 +120,10 @@ def _score_block(
     load_waypoints(data.to_pixel, paths, begin, 0, size, block)
     _add_outside(data, size, block.end, block.sums)
     for i in range(last):
-        copy_place(block.end, block.begin, size)
+        copy_point(block.end, block.begin, size)
         load_waypoints(data.to_pixel, paths, begin, i + 1, size, block)
         _add_outside(data, size, block.end, block.sums)
-        subtract_places(block.end, block.begin, size, block.step)
+        subtract_points(block.end, block.begin, size, block.step)
         _add_leg(limits, size, i == 0, block)
         # Departure from the paper: eq. 6 never reaches the destination, which is the seventh point of the last leg
         # here.
@@ -222,18 +222,18 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection
-    first, count, asked = block.first, block.count, block.asked
+    first, count, active = block.first, block.count, block.active
     # Unsigned: numba checks signed indices for wrap-around.
     one = np.uintp(1)
     open_paths = np.uintp(0)
     for b in range(size):
-        asked[open_paths] = b
+        active[open_paths] = b
         open_paths += one if count[b] > 0 else np.uintp(0)
     turn = 0
     while open_paths > 0:
         left = np.uintp(0)
         for entry in range(open_paths):
-            lane = np.uintp(asked[np.uintp(entry)])
+            lane = np.uintp(active[np.uintp(entry)])
             sphere = spheres[np.uintp(units[np.uintp(first[lane] + turn)])]
             dx, dy = east[lane] - sphere.east, north[lane] - sphere.north
             dz = up[lane] - sphere.up
@@ -243,7 +243,7 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
             # By multiplication: a branch on the radius is unpredictable, and a misprediction costs more.
             kill[lane] += sphere.kill_scale4 * share * (1.0 if d2 <= sphere.kill_radius2 else 0.0)
             detection[lane] += sphere.detection_scale4 * share * (1.0 if d2 <= sphere.detection_radius2 else 0.0)
-            asked[left] = np.int64(lane)
+            active[left] = np.int64(lane)
             left += one if count[lane] > turn + 1 else np.uintp(0)
         open_paths = left
         turn += 1

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, PerformanceTable, derated, within_rates
 from aircraft.tracking import no_tracking
-from planner.airspace.zone_limits import KeptAirspace, ZoneMargins, keep_airspace
+from planner.airspace.zone_limits import PlannerAirspace, ZoneMargins, make_airspace
 from planner.evaluation.encoding import Space
 from planner.evaluation.threat_index import MissileIndex, ThreatCells, make_missile_index, make_threat_cells
 from planner.plan import Objective, Violation
@@ -125,7 +125,7 @@ class ProblemArrays(NamedTuple):
     missiles: MissileIndex
     slope_bounds: SlopeBounds
     tracking: Record
-    airspace: KeptAirspace
+    airspace: PlannerAirspace
 
 
 def threat_records(threats: Threats) -> Records:
@@ -199,7 +199,7 @@ def required_clearance(data: ProblemArrays) -> RequiredClearance:  # pragma: no 
 
 
 @compiled
-def required_below(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
+def required_headroom(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
     """The maximum height above ground as a required clearance, with the heights of path and ground negated."""
     space = data.airspace
     return _required(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
@@ -301,12 +301,12 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
                 scenario.name, f"limits.{name}_deg", math.degrees(value), f"{allowed}", shown=f"{math.degrees(value):g}"
             )
     certified = _certified_arrays(scenario, limits, terrain)
-    across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.strays else (0.0, 0.0)
+    across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.has_error else (0.0, 0.0)
     # Plus the rise of the ground across the tracking error; the certificate measures the ground there.
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up + across * certified.slope_bounds.steepest
     airspace = _search_airspace(scenario, certified, attempt, up)
     if airspace.max_height < math.inf:
-        buffer = min(buffer, _most_buffer(certified))
+        buffer = min(buffer, _max_buffer(certified))
     search = _inset(
         certified._replace(
             buffer=buffer,
@@ -356,26 +356,26 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
         tracking=tracking,
-        airspace=keep_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
+        airspace=make_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
     )
-    return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.strays else arrays
+    return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
 
 
-def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> KeptAirspace:
+def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> PlannerAirspace:
     """Airspace with the margins of a search."""
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
     margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer, 1.0)
-    return keep_airspace(scenario, margins, min(buffer, _most_buffer(certified)))
+    return make_airspace(scenario, margins, min(buffer, _max_buffer(certified)))
 
 
-def _zone_margins(scenario: Scenario, beside: float, beyond: float, share: float) -> ZoneMargins:
+def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, share: float) -> ZoneMargins:
     """Margins of zones, m, changed by the scenario's `zone_margin_m`; in height never reduced."""
     asked = scenario.planner.zone_margin_m
     more = 0.0 if asked is None else asked - CERTIFIED_ZONE_MARGIN
-    return ZoneMargins(beside + more, beyond + max(0.0, more), share)
+    return ZoneMargins(horizontal + more, vertical + max(0.0, more), share)
 
 
-def _most_buffer(certified: ProblemArrays) -> float:
+def _max_buffer(certified: ProblemArrays) -> float:
     """Largest margin of a search to either edge of a band of heights above ground, m; inf without a maximum height."""
     space = certified.airspace
     between = space.max_height - certified.clearance - certified.buffer - space.buffer
@@ -418,15 +418,15 @@ def _slope_bounds(terrain: Terrain) -> SlopeBounds:
     return SlopeBounds(steepest, around, TILE * terrain.spacing)
 
 
-def _inset(data: ProblemArrays, beside: float, height: float) -> ProblemArrays:
+def _inset(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
     """Arrays with map and heights shrunk by these margins (m), but never excluding the fixed ends."""
     ends = np.stack([data.start, data.destination])
     low, high = ends.min(axis=0), ends.max(axis=0)
     return data._replace(
-        west=min(data.west + beside, max(data.west, float(low[0]))),
-        south=min(data.south + beside, max(data.south, float(low[1]))),
-        east=max(data.east - beside, min(data.east, float(high[0]))),
-        north=max(data.north - beside, min(data.north, float(high[1]))),
+        west=min(data.west + lateral, max(data.west, float(low[0]))),
+        south=min(data.south + lateral, max(data.south, float(low[1]))),
+        east=max(data.east - lateral, min(data.east, float(high[0]))),
+        north=max(data.north - lateral, min(data.north, float(high[1]))),
         floor=min(data.floor + height, max(data.floor, float(low[2]))),
         ceiling=max(data.ceiling - height, min(data.ceiling, float(high[2]))),
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import ground_speed
 from aircraft.path_limits import PerformanceTable, wind_speed_at
-from aircraft.tracking import faster_by
+from aircraft.tracking import true_airspeed_excess
 from planner.evaluation.corners import Wind
 from planner.evaluation.problem import RequiredClearance, SlopeBounds, clearance_at
 from world.frames import PolyMapRecord, polymap
@@ -33,7 +33,7 @@ Heights = NDArray[np.float32]
 
 # Distance of the aircraft below a leg at the fraction f, m: steady + slant (1 - f) + rest E(f x decay), where E is the
 # decay; and the largest and smallest of it, 0 included.
-HEIGHT_LAG = np.dtype([(name, np.float64) for name in ("steady", "slant", "rest", "decay", "most", "least")])
+HEIGHT_LAG = np.dtype([(name, np.float64) for name in ("steady", "slant", "rest", "decay", "max_below", "min_below")])
 
 
 @inlined
@@ -53,7 +53,7 @@ def lag_length(
     along = ground_speed(aircraft.airspeed, speed * (east * wx + north * wy), speed * (east * wy - north * wx))
     # A course that cannot be held against the wind has no plan either.
     along = aircraft.airspeed if math.isnan(along) else along
-    length: float = tracking.lag * (along + faster_by(tracking, amsl))
+    length: float = tracking.lag * (along + true_airspeed_excess(tracking, amsl))
     return max(1e-6, length)
 
 
@@ -71,7 +71,7 @@ def set_lag(
     lag.rest = below - lag.steady - lag.slant
     lag.decay = run / length
     end: float = lag.steady + lag.rest * _left(lag.decay)
-    lag.most, lag.least = max(0.0, below, end, lag.slant), min(0.0, below, end, lag.slant)
+    lag.max_below, lag.min_below = max(0.0, below, end, lag.slant), min(0.0, below, end, lag.slant)
     return end
 
 
@@ -88,7 +88,7 @@ def measure_lags(
 
 
 @inlined
-def below_at(lag: Record, share: float) -> float:  # pragma: no cover - compiled
+def lag_at(lag: Record, share: float) -> float:  # pragma: no cover - compiled
     """Distance of the aircraft below a leg at a fraction of it, m; negative above."""
     below: float = lag.steady + lag.slant * (1.0 - share) + lag.rest * _left(share * lag.decay)
     return below
@@ -256,9 +256,9 @@ def sample_terrain(
                 need = clearance_at(required, path[k, 0] + f * dx, path[k, 1] + f * dy)
             x, y = leg.column + f * leg.column_step, leg.row + f * leg.row_step
             below, later = 0.0, 0.0
-            if lags[k].most > 0.0:
-                below = max(0.0, below_at(lags[k], f))
-                later = lags[k].most - below
+            if lags[k].max_below > 0.0:
+                below = max(0.0, lag_at(lags[k], f))
+                later = lags[k].max_below - below
             gap, ahead = _sample(
                 heights, tiles, tile_side, growth, x, y, up + f * rise, need + below, later, legs[k].run, rise, pitch
             )

@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 
 # Side of a cell as a share of the median radius, and the maximum number of cells.
 CELL_SIDE = 0.2
-MOST_THREAT_CELLS = 300_000
+MAX_THREAT_CELLS = 300_000
 # Largest height (m) that a cell stores.
 HIGHEST_METRE = 2_000_000_000
 # Extension of the grid beyond the map, as a share of the map's sides.
@@ -64,7 +64,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
     low, high = bounds[:, 0], bounds[:, 1]
     low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
     size = high - low
-    side = math.sqrt(float(size[0] * size[1]) / MOST_THREAT_CELLS)
+    side = math.sqrt(float(size[0] * size[1]) / MAX_THREAT_CELLS)
     armed = radius[radius > 0.0]
     if armed.size:
         side = min(max(side, CELL_SIDE * float(np.median(armed))), float(size.max()))
@@ -138,7 +138,7 @@ def _lists(
 
 
 # Maximum number of classes by radius, and mean number of missiles per cell.
-MOST_CLASSES = 8
+MAX_CLASSES = 8
 MISSILES_A_CELL = 2.0
 # A missile: its position, kill radius and scale, m.
 MISSILE = np.dtype([(name, np.float64) for name in ("east", "north", "up", "radius", "scale")])
@@ -182,7 +182,7 @@ def make_missile_index(threats: Records, side: float | None = None) -> MissileIn
         missiles[name] = armed[source]
     # A class spans a factor of two; the last class takes all smaller radii.
     largest = float(missiles["radius"].max(initial=1.0))
-    alike = np.minimum(MOST_CLASSES - 1, np.floor(np.log2(largest / missiles["radius"]))).astype(np.int64)
+    alike = np.minimum(MAX_CLASSES - 1, np.floor(np.log2(largest / missiles["radius"]))).astype(np.int64)
     ordered, classes, first = [missiles[:0]], [], [np.zeros(0, dtype=np.int64)]
     cells, before = 0, 0
     for number in np.unique(alike):

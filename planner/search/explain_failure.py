@@ -79,8 +79,8 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     from scipy import ndimage
 
     regions, _ = ndimage.label(cells == _OPEN)
-    beside = [ndimage.binary_dilation(regions == regions[end]) for end in ends]
-    both = [set(cells[edge].tolist()) for edge in beside]
+    adjacent = [ndimage.binary_dilation(regions == regions[end]) for end in ends]
+    both = [set(cells[edge].tolist()) for edge in adjacent]
     found = (both[0] & both[1]) or (both[0] | both[1])
     return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(found) if z >= 0), pitch)
 
@@ -139,22 +139,23 @@ def closed_bands(problem: Problem) -> list[str]:
     if lowest > space.max_height - space.buffer:
         lines.append(
             f"the band above ground is too narrow: from limits.min_clearance_m {data.clearance:g} m to"
-            f" limits.max_height_m {space.max_height:g} m a plan keeps {data.buffer:.1f} m from the lower edge and"
-            f" {space.buffer:.1f} m from the upper, {lowest + space.buffer - space.max_height:.1f} m more than there is"
+            f" limits.max_height_m {space.max_height:g} m a plan needs margins of {data.buffer:.1f} m at the lower"
+            f" edge and {space.buffer:.1f} m at the upper, {lowest + space.buffer - space.max_height:.1f} m more than"
+            " available"
         )
-    for keeps in space.zones.kept:
-        zone = problem.scenario.zones[int(keeps["number"])]
-        ceiling, floor, beyond = zone.ceiling, zone.floor, float(keeps["beyond"])
+    for need in space.zones.required:
+        zone = problem.scenario.zones[int(need["number"])]
+        ceiling, floor, margin = zone.ceiling, zone.floor, float(need["vertical"])
         if zone.kind != "inclusion" or ceiling is None:
             continue
         bottoms = {f"the clearance of {data.clearance:g} m": lowest} if ceiling.datum == "ground" else {}
         if floor is not None and floor.datum == ceiling.datum:
-            bottoms[f"its floor at {floor.height:g} m"] = floor.height + beyond
+            bottoms[f"its floor at {floor.height:g} m"] = floor.height + margin
         name, bottom = max(bottoms.items(), key=lambda item: item[1], default=("", -math.inf))
-        if bottom > ceiling.height - beyond:
+        if bottom > ceiling.height - margin:
             lines.append(
                 f"{zone.name} is too narrow a band: above {name} and below its ceiling at {ceiling.height:g} m a plan's"
-                f" reserves take {bottom + beyond - ceiling.height:.1f} m more than there is"
+                f" margins take {bottom + margin - ceiling.height:.1f} m more than available"
             )
     return lines
 
@@ -171,10 +172,10 @@ def max_altitude(problem: Problem) -> tuple[float, str]:
     """
     scenario: Scenario = problem.scenario
     tops = [(float(problem.certified.ceiling), "the ceiling")]
-    for keeps in problem.certified.airspace.zones.kept:
-        zone = scenario.zones[int(keeps["number"])]
+    for need in problem.certified.airspace.zones.required:
+        zone = scenario.zones[int(need["number"])]
         if zone.kind == "inclusion" and zone.ceiling is not None and zone.ceiling.datum == "amsl":
-            tops.append((zone.ceiling.height - float(keeps["beyond"]), f"the ceiling of {zone.name}"))
+            tops.append((zone.ceiling.height - float(need["vertical"]), f"the ceiling of {zone.name}"))
     return min(tops)
 
 
@@ -200,7 +201,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     >>> found = np.array([0, 0, 1, 1]), np.zeros(4)
     >>> plan = Plan(guarded, path, *found, certificate, 1, "umda", 60, np.zeros((0, 3)))
     >>> print(explain_failure(plan)[0])
-    terrain and missiles together close the way 65 m from the start, at every height
+    terrain and missiles together block every route 65 m from the start, at every height
     """
     scenario = plan.scenario
     chosen = ALGORITHMS.get(plan.algorithm)
@@ -211,20 +212,20 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     closed = separating_zones(scenario)
     if closed is not None:
         names = ", ".join(closed.zones[:MAX_NAMES]) + (" and more" if len(closed.zones) > MAX_NAMES else "")
-        lines.append(f"zones close the whole way (gaps narrower than {closed.pitch:.0f} m count as closed): {names}")
+        lines.append(f"zones block every route (gaps narrower than {closed.pitch:.0f} m count as closed): {names}")
     entered = violated_zones(scenario, plan.waypoints)
     if entered:
-        lines.append(f"the best path does not keep to: {', '.join(entered[:MAX_NAMES])}")
+        lines.append(f"the best path violates: {', '.join(entered[:MAX_NAMES])}")
     elif not lines:
         violated = [item.name.lower() for item in Violation if plan.violations[item]]
         if violated:
-            lines.append(f"nothing stands across the whole way; the best path fails by: {', '.join(violated)}")
+            lines.append(f"no obstacle blocks every route; the best path fails by: {', '.join(violated)}")
     if chosen is not None and chosen.encoding == "rotated" and chosen.seeded:
-        lines.append("ways that turn back, or go round to climb, were looked for too, on a coarse lattice")
+        lines.append("routes that turn back or circle to climb were searched too, on a coarse lattice")
     elif chosen is not None and chosen.encoding == "rotated":
         lines.append(
-            "paths of the rotated frame only ever get nearer to the destination along the line to it; "
-            "a way that must turn back was not looked for"
+            "paths in the rotated frame always advance along the line to the destination; "
+            "a route that must turn back was not searched"
         )
     return lines
 
@@ -241,12 +242,13 @@ def _walls(scenario: Scenario) -> list[str]:
         gaps = scenario.ceiling - lowest
         if not (gaps > 0.0).any():
             lines.append(
-                f"terrain closes the way {along:.0f} m from the start, across the whole map: its lowest place and the "
-                f"clearance take {np.nanmin(lowest):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
+                f"terrain blocks every route {along:.0f} m from the start, across the whole map: its lowest point and "
+                f"the clearance take {np.nanmin(lowest):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
             )
             break
         if not _outside_missiles(scenario, points[gaps > 0.0], lowest[gaps > 0.0]):
-            lines.append(f"terrain and missiles together close the way {along:.0f} m from the start, at every height")
+            line = f"terrain and missiles together block every route {along:.0f} m from the start, at every height"
+            lines.append(line)
             break
     return lines
 
@@ -277,8 +279,8 @@ def _margin_walls(problem: Problem) -> list[str]:
         lowest = float(np.nanmin(scenario.terrain.height(points[:, 0], points[:, 1]))) + data.clearance
         if lowest + reserve > top:
             return [
-                f"the heights left are too narrow {along:.0f} m from the start, across the whole map: its lowest place,"
-                f" the clearance and a reserve of {reserve:.1f} m take {lowest + reserve:.0f} m, {name} leaves"
+                f"too little height is left {along:.0f} m from the start, across the whole map: its lowest point, the"
+                f" clearance and a margin of {reserve:.1f} m take {lowest + reserve:.0f} m, {name} allows"
                 f" {top:.0f} m"
             ]
     return []

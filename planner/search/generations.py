@@ -27,7 +27,7 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.search.search_state import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, Search, best_first
 from planner.seeding.first_samples import bridge_basis, first_samples
-from planner.seeding.waypoint_chains import WaypointChains, open_places, waypoint_chains
+from planner.seeding.waypoint_chains import WaypointChains, free_points, waypoint_chains
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -117,7 +117,7 @@ def _stagnant(bests: list[Floats]) -> bool:
 # fewer generations of a smaller population suffice.
 MAX_GENERATIONS, SEEDED_GENERATIONS, SEEDED_SHARE = 10, 6, 0.4
 # Population of later generations, as a share of the first, and its minimum.
-LATER_SHARE, FEWEST = 0.2, 24
+LATER_SHARE, MIN_POPULATION = 0.2, 24
 # Maximum number of legs between the candidates of one generation: limits memory.
 MAX_LEGS = 6_000_000
 # Initial sampling deviations around a selected waypoint: along and across as shares of the interval, up in m; and their
@@ -147,10 +147,10 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     frame = rotated_frame(space.start, space.destination)
     lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
     data = search.problem.search
-    sampling = NicheSampling(lower, upper, lambda rows, _: open_places(data, frame.restore(rows)), search.rng)
-    seeded, most = search.algorithm.seeded, int(math.sqrt(MAX_LEGS / (inner + 1)))
-    first = max(2, min(int(population * (SEEDED_SHARE if seeded else 1.0)), most))
-    later = min(first, max(FEWEST, int(LATER_SHARE * first)))
+    sampling = NicheSampling(lower, upper, lambda rows, _: free_points(data, frame.restore(rows)), search.rng)
+    seeded, max_rows = search.algorithm.seeded, int(math.sqrt(MAX_LEGS / (inner + 1)))
+    first = max(2, min(int(population * (SEEDED_SHARE if seeded else 1.0)), max_rows))
+    later = min(first, max(MIN_POPULATION, int(LATER_SHARE * first)))
     interval = frame.length / inner
     deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
     rows = sampling.first(first, np.array([0.0, 0.0, ABOVE_CEILING]))

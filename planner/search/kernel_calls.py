@@ -14,7 +14,7 @@ from planner.evaluation.problem import Problem, make_problem
 from planner.search.search_state import best_first, score_table
 from planner.seeding.grids import GridRoute, grid_route, make_grid
 from planner.seeding.pattern_search import search_patterns
-from planner.seeding.shortening import evenly, shorten_path
+from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import fit_waypoints
 from world.scenario import Scenario
@@ -47,7 +47,7 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
     problem = make_problem(scenario, limits)
     space = problem.space
     aside = 0.5 * (space.start + space.destination) + [0.0, ASIDE, ABOVE]
-    path = evenly(np.array([space.start, aside, space.destination]), WAYPOINTS)
+    path = resample(np.array([space.start, aside, space.destination]), WAYPOINTS)
     _CALLS[part](_Task(problem, ENCODINGS["rotated"](space, WAYPOINTS), path))
 
 

@@ -137,8 +137,8 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
             scenario.name,
             "wind.speed_mps",
             scenario.wind.speed,
-            f"a path is searched for in at most {MAX_WIND:.0%} of the airspeed {airspeed:g}, to make way on every"
-            " course",
+            f"a path is searched for in at most {MAX_WIND:.0%} of the airspeed {airspeed:g}, so that every"
+            " course can be flown",
             shown=f"{scenario.wind.speed:g}",
         )
     table = scenario.planner

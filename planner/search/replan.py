@@ -21,7 +21,7 @@ from world.scenario import Scenario
 Floats = NDArray[np.float64]
 
 # Minimum number of waypoints of the path ahead: with fewer it cannot avoid anything.
-FEWEST = 8
+MIN_WAYPOINTS = 8
 
 
 def replan(
@@ -61,7 +61,7 @@ def replan(
         raise MissionError.of_option("leg", leg, f"the plan has legs 0..{count - 2}", file=scenario.name)
     same_mission(scenario, old)
     _outside(scenario, old, leg)
-    rest = with_waypoints(old.waypoints[leg:], max(FEWEST, count - leg))
+    rest = with_waypoints(old.waypoints[leg:], max(MIN_WAYPOINTS, count - leg))
     course = scenario.start_course if leg == 0 else float(leg_courses(old.waypoints)[leg - 1])
     table = scenario.planner.model_copy(update={"waypoints": len(rest)})
     ahead = replace(scenario, start=rest[0], start_course=course, planner=table)
@@ -114,7 +114,7 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
         )
     forbidden = violated_zones(scenario, old.waypoints[[leg, leg]])
     if forbidden:
-        begins = f"waypoint {leg}, where it begins, does not keep to {forbidden[0]}"
+        begins = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
         message = f"{scenario.name}: leg {leg}: {begins}: no path from there does"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)
 

@@ -22,7 +22,7 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
 from planner.seeding.pattern_search import search_patterns
-from planner.seeding.shortening import MOST_MODELS, shorten_path
+from planner.seeding.shortening import MAX_MODELS, shorten_path
 from planner.seeding.waypoint_fitting import tighten
 from world.errors import ScenarioError
 from world.geometry import path_length
@@ -208,9 +208,9 @@ class Search:
         if self.shortest is None or ratio * self._straight() < path_length(self.shortest[0]):
             self.improved(self.encoding.decode(best)[0])
 
-    def improve(self, vector: Floats, most: int) -> Floats:
+    def improve(self, vector: Floats, max_evaluations: int) -> Floats:
         """Improve a vector (d,) by a pattern search; the archive takes the result. Returns the best scores (8,)."""
-        left = min(most, self._budget() - self.evaluations)
+        left = min(max_evaluations, self._budget() - self.evaluations)
         if left < 2:
             return np.asarray(self.evaluate(vector[None])[0])
         found, made = search_patterns(self.problem.search, self.encoding, vector, int(left))
@@ -219,13 +219,13 @@ class Search:
         self.evaluations += made - len(found)
         return np.asarray(scores[0])
 
-    def tighten(self, vector: Floats, rounds: int, scale: float, most: int) -> Floats:
+    def tighten(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
         """Move all waypoints of a vector (d,) at once, then `improve` it. Returns the best scores (8,)."""
         if self._budget() - self.evaluations < TIGHTENING_EVALUATIONS:
-            return self.improve(vector, most)
+            return self.improve(vector, max_evaluations)
         moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += made
-        return self.improve(moved, most)
+        return self.improve(moved, max_evaluations)
 
     @property
     def shortens(self) -> bool:
@@ -234,11 +234,11 @@ class Search:
 
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""
-        for spare in EXTRA_MARGINS:
-            if self._budget() - self.evaluations < MOST_MODELS:
+        for extra_margin in EXTRA_MARGINS:
+            if self._budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
-            path, made = shorten_path(self.problem.search, path, spare=spare, pause=self.pause)
+            path, made = shorten_path(self.problem.search, path, extra_margin=extra_margin, pause=self.pause)
             self.evaluations += made
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight():
                 return False
@@ -288,8 +288,8 @@ class Search:
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
     def _budget(self) -> float:
-        most = self.problem.scenario.planner.budget
-        return math.inf if most is None else most
+        budget = self.problem.scenario.planner.budget
+        return math.inf if budget is None else budget
 
     def record(self) -> None:
         """Append the best path so far to the history."""
@@ -326,8 +326,8 @@ class Search:
             if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN:
                 return path, certificate
             first = first or (path, certificate)
-            least = -math.inf if exposed is None else exposed[1].kill_distance
-            if certificate.ok and certificate.kill_distance > least:
+            furthest = -math.inf if exposed is None else exposed[1].kill_distance
+            if certificate.ok and certificate.kill_distance > furthest:
                 exposed = (path, certificate)
         result = exposed or first
         if result is None:  # pragma: no cover - an archive is never empty after an attempt

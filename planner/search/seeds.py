@@ -14,15 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.airspace.zone_limits import is_limited
-from planner.evaluation.encoding import Encoding, along_route, frames_of, rotated_frame, rotated_vectors, spread_over
+from planner.evaluation.encoding import (
+    Encoding,
+    frames_of,
+    rotated_frame,
+    rotated_vectors,
+    route_encoding,
+    sample_route,
+)
 from planner.plan import Certificate
 from planner.search.search_state import Search, SearchEnded, best_first, safe
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
 from planner.seeding.lattice import lattice_route, turning_step
-from planner.seeding.shortening import evenly
+from planner.seeding.shortening import resample
 from planner.seeding.side_routes import optimistic_grid, side_routes
-from planner.seeding.waypoint_fitting import CLOSE, QUICK, fit_points, fit_waypoints
+from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
 from world.geometry import path_length
 
 Floats = NDArray[np.float64]
@@ -98,12 +105,12 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
     routes = airspace_routes if is_limited(data.airspace) else grid_routes
     for route in routes(data, frame, span, grids):
         if followed_free and search.has_safe():
-            search.shorten(evenly(frame.restore(route.points), encoding.waypoints))
+            search.shorten(resample(frame.restore(route.points), encoding.waypoints))
             if search.must_end():
                 break
             continue
         found.append(route)
-        path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK)
+        path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK_FIT)
         vectors = rotated_vectors(space, encoding, path[None])
         scores.append(search.evaluate(vectors)[0])
         if not search.first_safe_found():
@@ -146,7 +153,7 @@ def search_other_sides(search: Search) -> None:
         for route in side_routes(data, frame, grid, bound, MAX_ROUTES):
             if search.must_end():
                 return
-            search.shorten(evenly(frame.restore(route.points), encoding.waypoints))
+            search.shorten(resample(frame.restore(route.points), encoding.waypoints))
 
 
 def shorten_best(search: Search) -> None:
@@ -156,7 +163,7 @@ def shorten_best(search: Search) -> None:
         if search.shortest is None or search.must_end():
             return
         before = path_length(search.shortest[0])
-        search.shorten(evenly(search.shortest[0], search.encoding.waypoints))
+        search.shorten(resample(search.shortest[0], search.encoding.waypoints))
         search.shorten(search.shortest[0])
         if path_length(search.shortest[0]) > (1.0 - MIN_GAIN) * before:
             return
@@ -212,8 +219,8 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
 def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
     """The best path found in a frame along a route (k, 3), and its certificate."""
     waypoints = search.encoding.waypoints
-    pieces, _ = spread_over(route, waypoints - 1)
-    encoding = along_route(search.problem.space, pieces[:, :2])
+    pieces, _ = sample_route(route, waypoints - 1)
+    encoding = route_encoding(search.problem.space, pieces[:, :2])
     inner = Search(
         search.problem,
         search.algorithm,
@@ -226,7 +233,7 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
         search.improved,
         evaluations=search.evaluations,
     )
-    path = fit_points(inner.problem.search, frames_of(encoding), _candidate_points(route, encoding), CLOSE)
+    path = fit_points(inner.problem.search, frames_of(encoding), _candidate_points(route, encoding), CLOSE_FIT)
     vector = np.clip(frames_of(encoding).rotate(path[1:-1]).ravel(), encoding.lower, encoding.upper)
     with suppress(SearchEnded):
         _improve_along(inner, vector, (path, route))
@@ -247,15 +254,15 @@ def _improve_along(inner: Search, vector: Floats, routes: tuple[Floats, ...]) ->
         inner.tighten(inner.archive.vectors[0], ROUNDS, scale, LATER_SEARCH)
     if inner.shortens:
         for route in routes:
-            inner.shorten(evenly(route, inner.encoding.waypoints))
+            inner.shorten(resample(route, inner.encoding.waypoints))
         shorten_best(inner)
 
 
 def _candidate_points(route: Floats, encoding: Encoding) -> Floats:
-    """Candidate points (w - 2, places, 3) on a route (k, 3) for each waypoint in its frame, within its piece."""
+    """Candidate points (w - 2, k, 3) on a route (k, 3) for each waypoint in its frame, within its piece."""
     count = encoding.waypoints - 2
-    dense, _ = spread_over(route, count * (CLOSE.places + 1) + 1)
-    rows = np.arange(count)[:, None] * (CLOSE.places + 1) + 1 + np.arange(CLOSE.places)
+    dense, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)
+    rows = np.arange(count)[:, None] * (CLOSE_FIT.candidates + 1) + 1 + np.arange(CLOSE_FIT.candidates)
     frames = frames_of(encoding)
     points = frames.rotate(dense[rows].transpose(1, 0, 2)).transpose(1, 0, 2)
     points[..., 0] = np.clip(points[..., 0], frames.edges[:-1, None], frames.edges[1:, None])

@@ -12,20 +12,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.airspace.zone_distances import inside_depth
-from planner.airspace.zone_limits import KeptZones, MapSegment, first_near, line_between, reach_of
+from planner.airspace.zone_distances import penetration_depth
+from planner.airspace.zone_limits import MapSegment, ZonesWithMargins, first_exclusion_near, segment_between, view_shape
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
-from planner.evaluation.problem import ProblemArrays, clearance_at, required_below, required_clearance
+from planner.evaluation.problem import ProblemArrays, clearance_at, required_clearance, required_headroom
 from planner.seeding.grids import (
     EXPECTED,
     KILL_COST,
-    LAYERS_A_STEP,
+    LAYERS_PER_STEP,
     SIDEWAYS,
     GridRoute,
-    beside_used,
     find_obstacles,
     position_of,
+    proximity_cost,
 )
 from world.kernels import Record, Records, compiled
 from world.terrain import ground_height
@@ -82,40 +82,40 @@ def _column(
     column.lowest = max(data.floor, ground + clearance_at(required_clearance(data), east, north))
     column.highest = data.ceiling
     if grid.follows:
-        column.highest = min(data.ceiling, ground - clearance_at(required_below(data), east, north))
+        column.highest = min(data.ceiling, ground - clearance_at(required_headroom(data), east, north))
     zones = data.airspace.zones
     for z in range(zones.inclusions):
-        zone, keeps = zones.records.zones[z], zones.kept[z]
-        column.lowest = max(column.lowest, zone.floor + keeps.beyond + (ground if zone.floor_above_ground else 0.0))
-        top = zone.ceiling - keeps.beyond + (ground if zone.ceiling_above_ground else 0.0)
+        zone, need = zones.records.zones[z], zones.required[z]
+        column.lowest = max(column.lowest, zone.floor + need.vertical + (ground if zone.floor_above_ground else 0.0))
+        top = zone.ceiling - need.vertical + (ground if zone.ceiling_above_ground else 0.0)
         column.highest = min(column.highest, top)
 
 
 @compiled
 def _passage(
-    zones: KeptZones, line: MapSegment, beside: float, ground: float
+    zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float
 ) -> _Passage:  # pragma: no cover - compiled
-    """Heights that zones close to a horizontal step; beside: lateral tracking error added to their margins, m."""
+    """Heights that zones close to a horizontal step; lateral: lateral tracking error added to their margins, m."""
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):
-        wanted = zones.kept[z].beside + beside
-        reach = reach_of(zones.records, z, line, wanted)
+        wanted = zones.required[z].horizontal + lateral
+        reach = view_shape(zones.records, z, line, wanted)
         if not reach.inside or reach.distance < wanted:
             return _Passage(-math.inf, math.inf)
-    most = zones.beside + beside
+    widest = zones.max_horizontal + lateral
     to_east, to_north = line.east + line.run * line.course_east, line.north + line.run * line.course_north
-    west, east = min(line.east, to_east) - most, max(line.east, to_east) + most
-    south, north = min(line.north, to_north) - most, max(line.north, to_north) + most
-    for z in range(first_near(zones, west), zones.kept.shape[0]):
-        zone, keeps = zones.records.zones[z], zones.kept[z]
+    west, east = min(line.east, to_east) - widest, max(line.east, to_east) + widest
+    south, north = min(line.north, to_north) - widest, max(line.north, to_north) + widest
+    for z in range(first_exclusion_near(zones, west), zones.required.shape[0]):
+        zone, need = zones.records.zones[z], zones.required[z]
         if zone.west > east:
             break
         if zone.east < west or zone.south > north or zone.north < south:
             continue
-        depth, _, _ = inside_depth(zones.records, z, line, keeps.beside + beside)
+        depth, _, _ = penetration_depth(zones.records, z, line, need.horizontal + lateral)
         if depth > 0.0:
-            low = min(low, zone.floor - keeps.beyond + (ground if zone.floor_above_ground else 0.0))
-            high = max(high, zone.ceiling + keeps.beyond + (ground if zone.ceiling_above_ground else 0.0))
+            low = min(low, zone.floor - need.vertical + (ground if zone.floor_above_ground else 0.0))
+            high = max(high, zone.ceiling + need.vertical + (ground if zone.ceiling_above_ground else 0.0))
     return _Passage(low, high)
 
 
@@ -135,7 +135,7 @@ def _slopes(
 
 
 @compiled
-def _set_cell_prices(
+def _set_cell_costs(
     grid: AirspaceGrid, columns: Records, obstacles: Records, along: float, extra: Floats, price: Floats
 ) -> None:  # pragma: no cover - compiled
     """Fill the cost per m of a stage's cells (across, layers); inf where a path is not allowed."""
@@ -160,7 +160,7 @@ def _set_cell_prices(
 
 
 @compiled
-def _step_on(
+def _relax_stage(
     data: ProblemArrays,
     frame: RotatedFrame,
     grid: AirspaceGrid,
@@ -170,18 +170,18 @@ def _step_on(
     cost: Floats,
     price: Floats,
     after: Floats,
-    came_before: Codes,
-    came: Codes,
+    parents_before: Codes,
+    parents: Codes,
 ) -> None:  # pragma: no cover - compiled
     """Relax one stage: costs (across, layers) before and after it, and the parent cell (across x layers) of each.
 
-    before, columns: `COLUMN` records (across,) of the previous stage and of this one. came_before: parents of the
+    before, columns: `COLUMN` records (across,) of the previous stage and of this one. parents_before: parents of the
     previous stage. Changes of course are counted along the cheapest route to a cell only, so the result is not exactly
     the optimum.
     """
     step, wide, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
     # No tracking error at a fixed end.
-    beside = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
+    lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
     turn_cost, share = (TURN_COST * step, SLOPE_SHARE) if grid.gentle else (0.0, 1.0)
     slopes = _slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), share)
     for y in range(wide):
@@ -197,14 +197,14 @@ def _step_on(
             run = step * math.sqrt(1.0 + side * side)
             to_east, to_north = position_of(frame, stage * step, grid.across[to])
             closed = _Passage(math.inf, -math.inf)
-            if zones.kept.shape[0] > 0:
-                closed = _passage(zones, line_between(east, north, to_east, to_north), beside, before[y].ground)
+            if zones.required.shape[0] > 0:
+                closed = _passage(zones, segment_between(east, north, to_east, to_north), lateral, before[y].ground)
             climb, dive = slopes[side + SIDEWAYS, 0] * run, slopes[side + SIDEWAYS, 1] * run
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:
                     continue
                 up = first + z * grid.pitch
-                turned = 0 if stage == 1 else side - (y - came_before[y, z] // grid.layers)
+                turned = 0 if stage == 1 else side - (y - parents_before[y, z] // grid.layers)
                 here = cost[y, z] + turn_cost * turned * turned
                 lowest = max(0, math.ceil((up - dive - to_first) / grid.pitch))
                 highest = min(grid.layers - 1, math.floor((up + climb - to_first) / grid.pitch))
@@ -215,7 +215,7 @@ def _step_on(
                     total = here + math.sqrt(run * run + rise * rise) * price[to, z2]
                     if total < after[to, z2]:
                         after[to, z2] = total
-                        came[to, z2] = y * grid.layers + z
+                        parents[to, z2] = y * grid.layers + z
 
 
 @compiled
@@ -240,11 +240,11 @@ def cheapest_airspace_route(
         along = stage * step
         for y in range(wide):
             _column(data, frame, grid, along, grid.across[y], columns[stage, y])
-        _set_cell_prices(grid, columns[stage], obstacles, along, extra[stage], price)
+        _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], price)
         if stage == stages:
             price[home, _layer(grid, columns[stage, home], data.destination[2])] = 1.0
         after[:] = math.inf
-        _step_on(
+        _relax_stage(
             data,
             frame,
             grid,
@@ -290,11 +290,11 @@ def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: n
 # Factor on the number of stages of a grid without zones: hills and gaps need short steps.
 FINER = 2
 # Minimum and maximum number of layers of a band of heights above ground.
-FEWEST_LAYERS, MOST_LAYERS = 8, 24
+MIN_LAYERS, MAX_LAYERS = 8, 24
 # Minimum pitch of layers that do not follow the ground, as a share of the step along.
-LEAST_PITCH = 0.05
+MIN_PITCH = 0.05
 # Maximum number of cells of a grid: stages x across x layers.
-MOST_CELLS = 1_200_000
+MAX_CELLS = 1_200_000
 
 
 def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
@@ -311,17 +311,17 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
     while True:
         step = frame.length / stages
         across = np.arange(-math.floor(-span[0] / step), math.floor(span[1] / step) + 1) * step
-        pitch = max(1.0, gentlest * step / LAYERS_A_STEP)
+        pitch = max(1.0, gentlest * step / LAYERS_PER_STEP)
         if follows:
-            layers = min(MOST_LAYERS, max(FEWEST_LAYERS, math.ceil(band / pitch) + 1))
+            layers = min(MAX_LAYERS, max(MIN_LAYERS, math.ceil(band / pitch) + 1))
             # Near an end with smaller buffers the band is wider.
             widest = space.max_height - data.clearance
             pitch = max(1.0, band) / (layers - 1)
-            layers = max(layers, min(2 * MOST_LAYERS, math.ceil(widest / pitch) + 1))
+            layers = max(layers, min(2 * MAX_LAYERS, math.ceil(widest / pitch) + 1))
         else:
-            pitch = max(pitch, LEAST_PITCH * step)
+            pitch = max(pitch, MIN_PITCH * step)
             layers = max(1, math.floor((data.ceiling - low) / pitch) + 1)
-        if stages <= 8 or (stages + 1) * across.size * layers <= MOST_CELLS:
+        if stages <= 8 or (stages + 1) * across.size * layers <= MAX_CELLS:
             return AirspaceGrid(stages, np.asarray(across, np.float64), layers, pitch, follows, low, gentle=True)
         stages = max(8, int(stages / 1.2))
 
@@ -355,7 +355,7 @@ def _route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, used: tuple[GridRoute, ...], expected: float
 ) -> GridRoute | None:
     """Cheapest route over a grid away from those used, None if there is none. expected: first bound to try."""
-    extra = beside_used(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
+    extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
     for bound in (expected, math.inf):
         points, cost = cheapest_airspace_route(data, frame, grid, extra, bound)
         if len(points):

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 # Share of a seeded first population that is sampled around the seeds.
 AROUND_SEEDS = 1.0
 # Limits of the spread around a seed, as a share of the unseeded spread; sampled log-uniformly.
-LEAST_SPREAD, MOST_SPREAD = 0.003, 0.3
+MIN_SPREAD, MAX_SPREAD = 0.003, 0.3
 
 
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
@@ -69,7 +69,7 @@ def first_samples(
     if len(starts):
         near = min(population, max(len(starts), int(AROUND_SEEDS * population)))
         picked = starts[np.arange(near) % len(starts)].reshape(near, inner, 3)
-        scale = np.exp(rng.uniform(np.log(LEAST_SPREAD), np.log(MOST_SPREAD), (near, 1, 1)))
+        scale = np.exp(rng.uniform(np.log(MIN_SPREAD), np.log(MAX_SPREAD), (near, 1, 1)))
         scale[: len(starts)] = 0.0
         out[:near] = picked
         out[:near, :, 1:] += scale * bridges(near)

@@ -3,9 +3,9 @@
 A grid decides on which side to pass each obstacle; `planner.seeding.waypoint_fitting` then places the path's waypoints,
 one per interval, by evaluating whole legs. Both use dynamic programming over forward steps, because a path in the
 rotated encoding never turns back.
-Cells cost more near the ground and inside kill spheres (`set_prices`). `cheapest_route` relaxes one stage after another
-and prunes every cell through which no route stays within a cost bound; a route found within the bound is optimal.
-`grid_routes` repeats this with a penalty near earlier routes, to find routes on other sides.
+Cells cost more near the ground and inside kill spheres (`set_cell_costs`). `cheapest_route` relaxes one stage after
+another and prunes every cell through which no route stays within a cost bound; a route found within the bound is
+optimal. `grid_routes` repeats this with a penalty near earlier routes, to find routes on other sides.
 """
 
 import math
@@ -176,7 +176,7 @@ def _add_danger(
 
 
 @compiled
-def set_prices(
+def set_cell_costs(
     data: ProblemArrays,
     required: RequiredClearance,
     frame: RotatedFrame,
@@ -217,7 +217,7 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 
 @compiled
-def layers_a_step(
+def layers_per_step(
     data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float
 ) -> Records:  # pragma: no cover - compiled
     """`STEP_LAYERS` records (sideways, layers): climb and descent of a step on its course and at its height."""
@@ -242,7 +242,7 @@ def relax(
     cost: Floats,
     price: Floats,
     after: Floats,
-    came: Codes,
+    parents: Codes,
     start: int,
     end: int,
     priced: int,
@@ -257,14 +257,14 @@ def relax(
         total = cost[i] + length * price[np.uintp(priced) + np.uintp(k)]
         better = total < after[j]
         after[j] = total if better else after[j]
-        came[j] = start + k if better else came[j]
+        parents[j] = start + k if better else parents[j]
 
 
 @compiled
-def step_on(
+def relax_stage(
     cost: Floats,
     after: Floats,
-    came: Codes,
+    parents: Codes,
     spans: Records,
     step_layers: Records,
     price: Floats,
@@ -277,7 +277,7 @@ def step_on(
     spans: `SPAN` records (layers,) of the cells with a finite cost before. pitch: between layers, m.
     """
     high, wide = cost.shape
-    flat, flat_after, flat_came, flat_price = cost.ravel(), after.ravel(), came.ravel(), price.ravel()
+    flat, flat_after, flat_parents, flat_price = cost.ravel(), after.ravel(), parents.ravel(), price.ravel()
     for z in range(high):
         first, last = spans[z].first, spans[z].last
         if first > last:
@@ -286,16 +286,16 @@ def step_on(
             a, b = max(first, -side), min(last, wide - 1 - side) + 1
             if a >= b:
                 continue
-            most = step_layers[side + SIDEWAYS, z]
-            bottom, top = max(0, z - most.sink), min(high - 1, z + most.climb)
+            limit = step_layers[side + SIDEWAYS, z]
+            bottom, top = max(0, z - limit.sink), min(high - 1, z + limit.climb)
             for z2 in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
                 here, there = z * wide + a, z2 * wide + a + side
-                relax(flat, flat_price, flat_after, flat_came, here, there, there, b - a, length)
+                relax(flat, flat_price, flat_after, flat_parents, here, there, there, b - a, length)
 
 
 @compiled
-def way_ahead(
+def distance_to_goal(
     columns: int, home: int, left: int, step: float, ratio: float, out: Floats
 ) -> None:  # pragma: no cover - compiled
     """Shortest horizontal distance from each position across to the destination, `left` stages away, m."""
@@ -343,9 +343,9 @@ def cheapest_route(
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
-    step_layers, required = layers_a_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
+    step_layers, required = layers_per_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
     obstacles = find_obstacles(data, frame, step, grid.shrink)
-    came = np.empty((stages + 1, high, wide), dtype=np.int32)
+    parents = np.empty((stages + 1, high, wide), dtype=np.int32)
     price, cost, after = np.full((high, wide), np.inf), np.full((high, wide), np.inf), np.full((high, wide), np.inf)
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
     goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
@@ -361,39 +361,39 @@ def cheapest_route(
         low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
         if low > last:
             break
-        set_prices(data, required, frame, stage, obstacles, grid, extra, low, last, price)
+        set_cell_costs(data, required, frame, stage, obstacles, grid, extra, low, last, price)
         after[:, low : last + 1] = np.inf
-        step_on(cost, after, came[stage], spans, step_layers, price, step, pitch, grid.ratio)
-        way_ahead(wide, home, stages - stage, step, grid.ratio, ahead)
+        relax_stage(cost, after, parents[stage], spans, step_layers, price, step, pitch, grid.ratio)
+        distance_to_goal(wide, home, stages - stage, step, grid.ratio, ahead)
         prune(after, spans, ahead, rises, bound, low, last)
         cost, after = after, cost
     if spans[goal].first > home or spans[goal].last < home or cost[goal, home] == np.inf:
         return np.zeros(0, dtype=ROUTE_CELL), np.inf
-    return trace_back(came, goal, home), cost[goal, home]
+    return trace_back(parents, goal, home), cost[goal, home]
 
 
 @compiled
-def trace_back(came: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
-    """`ROUTE_CELL` records from the start to this cell of the last stage; came: (stages + 1, layers, across)."""
-    wide = came.shape[2]
-    cells = np.zeros(came.shape[0], dtype=ROUTE_CELL)
-    for stage in range(came.shape[0] - 1, -1, -1):
+def trace_back(parents: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
+    """`ROUTE_CELL` records from the start to this cell of the last stage; parents: (stages + 1, layers, across)."""
+    wide = parents.shape[2]
+    cells = np.zeros(parents.shape[0], dtype=ROUTE_CELL)
+    for stage in range(parents.shape[0] - 1, -1, -1):
         cells[stage].across = across
         cells[stage].layer = layer
         if stage > 0:
-            parent = came[stage, layer, across]
+            parent = parents[stage, layer, across]
             layer, across = parent // wide, parent % wide
     return cells
 
 
 # --- Grids and routes ---
 
-# Pitch of the layers as a share of the step along: the gentler slope limit's climb per step over LAYERS_A_STEP, within
-# these limits.
-LAYERS_A_STEP = 2.5
+# Pitch of the layers as a share of the step along: the gentler slope limit's climb per step over LAYERS_PER_STEP,
+# within these limits.
+LAYERS_PER_STEP = 2.5
 LOW_LAYER, HIGH_LAYER = 0.05, 0.12
 # Maximum number of cells of a grid: stages x across x layers.
-MOST_CELLS = 1_200_000
+MAX_CELLS = 1_200_000
 # Expected cost of the first route over the straight line; with few courses, grid routes are too long by about this.
 EXPECTED = 1.12
 # Different routes: within this distance of an earlier one (m, or steps if larger) a route costs up to twice as much.
@@ -416,14 +416,14 @@ def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float
     low, high = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level = np.array([*data.destination[:2], data.start[2]])
     share = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
-    share = min(HIGH_LAYER, max(LOW_LAYER, share / LAYERS_A_STEP))
+    share = min(HIGH_LAYER, max(LOW_LAYER, share / LAYERS_PER_STEP))
     while True:
         step = frame.length / stages
         layer = share * step
         below, above = math.floor(-span[0] / step), math.floor(span[1] / step)
         across = np.arange(-below, above + 1) * step
         up = np.arange(math.ceil((low - data.start[2]) / layer), math.floor((high - data.start[2]) / layer) + 1)
-        if stages <= 4 or (stages + 1) * across.size * max(1, up.size) <= MOST_CELLS:
+        if stages <= 4 or (stages + 1) * across.size * max(1, up.size) <= MAX_CELLS:
             return Grid(stages, np.asarray(across, np.float64), np.asarray(data.start[2] + up * layer, np.float64))
         stages = max(4, int(stages / 1.2))
 
@@ -443,7 +443,7 @@ def grid_route(
     if grid.layers.size == 0:
         return None
     along = np.linspace(0.0, frame.length, grid.stages + 1)
-    extra = beside_used(along, grid.across, used)
+    extra = proximity_cost(along, grid.across, used)
     for bound in (expected, math.inf):
         cells, cost = cheapest_route(data, frame, grid, extra, bound)
         if cells.size:
@@ -454,7 +454,7 @@ def grid_route(
     return None
 
 
-def beside_used(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> Floats:
+def proximity_cost(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> Floats:
     """Additional cost per m near earlier routes, at positions along (s,) and across (y,), m: (s, y)."""
     extra = np.zeros((along.size, across.size))
     width = max(APART, APART_STEPS * along[-1] / (along.size - 1))

@@ -3,7 +3,7 @@
 A* search (Hart, Nilsson and Raphael, 1968) over states of a lattice point and one of eight courses. A step leads to a
 neighbouring point, turns by no more than a right angle, and climbs or descends within the slope limits; a route that
 needs more distance to climb than is available therefore circles. The heuristic is the straight distance to the goal.
-The resulting route is simplified by replacing steps with feasible straight legs (`pulled_taut`).
+The resulting route is simplified by replacing steps with feasible straight legs (`simplify_route`).
 """
 
 import heapq
@@ -68,7 +68,7 @@ class Lattice(NamedTuple):
 
 
 @compiled
-def _place(
+def _set_position(
     frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats
 ) -> None:  # pragma: no cover - compiled
     """Fill the world position (3,) of a lattice point and layer."""
@@ -79,13 +79,13 @@ def _place(
 
 
 @compiled
-def _rises(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:  # pragma: no cover - compiled
+def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:  # pragma: no cover - compiled
     """Maximum climb and descent (8, 2) of a step on each course, in layers."""
     out, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
-    _place(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, a)
+    _set_position(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, a)
     for course in range(8):
         aside, ahead = _STEPS[course, 1], _STEPS[course, 0]
-        _place(frame, lattice, lattice.behind + ahead, lattice.right + aside, lattice.start_layer, b)
+        _set_position(frame, lattice, lattice.behind + ahead, lattice.right + aside, lattice.start_layer, b)
         run = math.hypot(b[0] - a[0], b[1] - a[1])
         climb, dive = slope_limits(data, a, b)
         out[course, 0] = max(0, math.floor(math.tan(climb) * run / lattice.pitch))
@@ -93,39 +93,39 @@ def _rises(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:
     return out
 
 
-class _Reached(NamedTuple):
+class _StateTable(NamedTuple):
     """State of the search. Per state: cost (m), parent, and whether it is closed. Per step: whether it is feasible.
 
     rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.
     """
 
     cost: Floats
-    came: Codes
+    parents: Codes
     done: Flags
     rises: Codes
     steps: Bytes
 
 
 @compiled
-def _take_steps(
+def _expand_state(
     data: ProblemArrays,
     limits: PrecomputedLimits,
     frame: RotatedFrame,
     lattice: Lattice,
-    reached: _Reached,
+    table: _StateTable,
     state: int,
     courses: int,
     open_states: list[tuple[float, int]],
 ) -> None:  # pragma: no cover - compiled
     """Expand a state: relax its successors and push them with cost plus straight distance to the goal."""
-    rises, course, cell = reached.rises, state % 8, state // 8
+    rises, course, cell = table.rises, state % 8, state // 8
     layer, place = cell % lattice.layers, cell // lattice.layers
     along, across = place // lattice.across, place % lattice.across
     sinks = np.max(rises[:, 1])
     width = np.max(rises[:, 0]) + sinks + 1
     a, b, goal = np.empty(3), np.empty(3), np.empty(3)
-    _place(frame, lattice, along, across, layer, a)
-    _place(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
+    _set_position(frame, lattice, along, across, layer, a)
+    _set_position(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
     for turn in range(-courses, courses + 1):
         to = (course + turn) % 8
         next_along, next_across = along + _STEPS[to, 0], across + _STEPS[to, 1]
@@ -134,18 +134,18 @@ def _take_steps(
         lowest, highest = max(0, layer - rises[to, 1]), min(lattice.layers - 1, layer + rises[to, 0])
         for next_layer in range(lowest, highest + 1):
             code = ((next_along * lattice.across + next_across) * lattice.layers + next_layer) * 8 + to
-            _place(frame, lattice, next_along, next_across, next_layer, b)
+            _set_position(frame, lattice, next_along, next_across, next_layer, b)
             length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-            total = reached.cost[state] + length + TURN_COST * lattice.step * abs(turn)
-            if reached.done[code] or total >= reached.cost[code]:
+            total = table.cost[state] + length + TURN_COST * lattice.step * abs(turn)
+            if table.done[code] or total >= table.cost[code]:
                 continue
             # The feasibility of a step does not depend on the course before it.
             number = (cell * 8 + to) * width + next_layer - layer + sinks
-            if reached.steps[number] == _UNKNOWN:
+            if table.steps[number] == _UNKNOWN:
                 free = _inside(data, b) and leg_cost(data, limits, a, b) <= CLOSED * length
-                reached.steps[number] = _FREE if free else _SHUT
-            if reached.steps[number] == _FREE:
-                reached.cost[code], reached.came[code] = total, state
+                table.steps[number] = _FREE if free else _SHUT
+            if table.steps[number] == _FREE:
+                table.cost[code], table.parents[code] = total, state
                 away = math.sqrt((b[0] - goal[0]) ** 2 + (b[1] - goal[1]) ** 2 + (b[2] - goal[2]) ** 2)
                 heapq.heappush(open_states, (total + away, code))
 
@@ -156,7 +156,7 @@ class LatticeSearch(NamedTuple):
     costs, states: (k,) of the open list. seen: number of states expanded. found: the goal state, or -1.
     """
 
-    reached: _Reached
+    table: _StateTable
     costs: Floats
     states: Codes
     seen: int
@@ -168,10 +168,10 @@ def begin_lattice_search(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice
 ) -> LatticeSearch:  # pragma: no cover - compiled
     """The search for a route from start to destination before its first step."""
-    rises = _rises(data, frame, lattice)
+    rises = _climb_layers(data, frame, lattice)
     size = lattice.along * lattice.across * lattice.layers * 8
     width = np.max(rises[:, 0]) + np.max(rises[:, 1]) + 1
-    reached = _Reached(
+    table = _StateTable(
         np.full(size, math.inf),
         np.full(size, -1, dtype=np.int64),
         np.zeros(size, dtype=np.bool_),
@@ -179,45 +179,45 @@ def begin_lattice_search(
         np.zeros(size * width, dtype=np.int8),
     )
     first = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
-    asked = _asked_course(frame, data.start_course)
-    states = np.arange(first, first + 8) if asked < 0 else np.array([first + asked])
+    prescribed = _nearest_course(frame, data.start_course)
+    states = np.arange(first, first + 8) if prescribed < 0 else np.array([first + prescribed])
     for state in states:
-        reached.cost[state] = 0.0
-    return LatticeSearch(reached, np.zeros(states.size), states, 0, -1)
+        table.cost[state] = 0.0
+    return LatticeSearch(table, np.zeros(states.size), states, 0, -1)
 
 
 @compiled
-def search_lattice_on(
-    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, most: int
+def continue_lattice_search(
+    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, max_expansions: int
 ) -> LatticeSearch:  # pragma: no cover - compiled
-    """The search continued by up to `most` expansions; it has failed if the open list is empty.
+    """The search continued by up to `max_expansions` expansions; it has failed if the open list is empty.
 
     courses: largest turn per step, in units of 45 degrees.
     """
-    limits, reached, seen = precompute_limits(data), search.reached, search.seen
+    limits, table, seen = precompute_limits(data), search.table, search.seen
     last = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
-    wanted = _asked_course(frame, data.destination_course)
+    wanted = _nearest_course(frame, data.destination_course)
     # The open list is stored in heap order and needs no sorting.
     open_states = [(search.costs[k], search.states[k]) for k in range(search.states.size)]
     found = -1
-    while len(open_states) > 0 and seen < search.seen + most:
+    while len(open_states) > 0 and seen < search.seen + max_expansions:
         _, state = heapq.heappop(open_states)
-        if reached.done[state]:
+        if table.done[state]:
             continue
-        reached.done[state] = True
+        table.done[state] = True
         seen += 1
         if state // 8 == last and (wanted < 0 or abs((state % 8 - wanted + 4) % 8 - 4) <= courses):
             found = state
             break
-        _take_steps(data, limits, frame, lattice, reached, state, courses, open_states)
+        _expand_state(data, limits, frame, lattice, table, state, courses, open_states)
     costs, states = np.empty(len(open_states)), np.empty(len(open_states), dtype=np.int64)
     for k in range(len(open_states)):
         costs[k], states[k] = open_states[k]
-    return LatticeSearch(reached, costs, states, seen, found)
+    return LatticeSearch(table, costs, states, seen, found)
 
 
 @compiled
-def _asked_course(frame: RotatedFrame, course: float) -> int:  # pragma: no cover - compiled
+def _nearest_course(frame: RotatedFrame, course: float) -> int:  # pragma: no cover - compiled
     """Index of the lattice course nearest to a course (rad, clockwise from north); -1 for NaN."""
     if math.isnan(course):
         return -1
@@ -234,11 +234,11 @@ def _inside(data: ProblemArrays, point: Floats) -> bool:  # pragma: no cover - c
 
 
 @compiled
-def traced(came: Codes, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
+def trace_route(parents: Codes, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
     """`LATTICE_CELL` records from the start to a state."""
     count, state = 0, found
     while state >= 0:
-        count, state = count + 1, came[state]
+        count, state = count + 1, parents[state]
     cells = np.zeros(count, dtype=LATTICE_CELL)
     state = found
     for k in range(count - 1, -1, -1):
@@ -247,12 +247,12 @@ def traced(came: Codes, found: int, lattice: Lattice) -> Records:  # pragma: no 
         cells[k].layer = cell % lattice.layers
         cells[k].along = place // lattice.across - lattice.behind
         cells[k].across = place % lattice.across - lattice.right
-        state = came[state]
+        state = parents[state]
     return cells
 
 
 @compiled
-def pulled_taut(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no cover - compiled
+def simplify_route(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no cover - compiled
     """Route (j, 3) with as many points of a route (k, 3) as possible dropped: greedy line-of-sight simplification.
 
     From each remaining point the leg goes to the furthest point that it reaches without a violation.
@@ -278,11 +278,11 @@ def pulled_taut(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no co
 # --- Lattices and routes ---
 
 # Minimum step, and upper limit on the step that two right-angled turns require, m.
-LEAST_STEP, LONGEST_STEP = 100.0, 2000.0
+MIN_STEP, MAX_STEP = 100.0, 2000.0
 # Layers that the gentler slope limit climbs or descends in a step along.
-LAYERS_A_STEP = 2
+LAYERS_PER_STEP = 2
 # Maximum number of states of a lattice, and of expanded states.
-MOST_LATTICE, MOST_STATES = 4_000_000, 600_000
+MAX_LATTICE_STATES, MAX_EXPANDED = 4_000_000, 600_000
 # States expanded between two calls of `pause`: some 10 ms.
 STATES_AT_ONCE = 2000
 
@@ -290,19 +290,19 @@ STATES_AT_ONCE = 2000
 def turning_step(data: ProblemArrays) -> float:
     """Length of a leg between two right-angled turns to the same side, m: their lengths and settling between them."""
     if not data.legs_hold_turns:
-        return LEAST_STEP
-    long = LONGEST_STEP
+        return MIN_STEP
+    long = MAX_STEP
     square = np.array([[0.0, 0.0], [long, 0.0], [long, long], [0.0, long]]) + data.start[:2]
     path = np.column_stack([square, np.full(4, data.start[2])])
     turns, rolls = turn_and_roll_lengths(data, path)
     need = float(turns[1] + rolls[1])
-    return min(LONGEST_STEP, max(LEAST_STEP, need + settling_length(need, 1.1 * need)))
+    return min(MAX_STEP, max(MIN_STEP, need + settling_length(need, 1.1 * need)))
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
     """A lattice over the whole map with points at both ends and steps of at most this length.
 
-    step: m. The step is increased where the lattice would have more than `MOST_LATTICE` states.
+    step: m. The step is increased where the lattice would have more than `MAX_LATTICE_STATES` states.
     """
     corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
     low, high = frame.rotate(corners)[:, :2].min(axis=0), frame.rotate(corners)[:, :2].max(axis=0)
@@ -312,12 +312,12 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     stages = max(1, math.ceil(frame.length / step))
     while True:
         step = frame.length / stages
-        pitch = gentlest * step / LAYERS_A_STEP
+        pitch = gentlest * step / LAYERS_PER_STEP
         behind, right = math.floor(-low[0] / step), math.floor(-low[1] / step)
         along, across = behind + math.floor(high[0] / step) + 1, right + math.floor(high[1] / step) + 1
         below = max(0, math.floor((data.start[2] - bottom) / pitch))
         layers = below + max(0, math.floor((data.ceiling - data.start[2]) / pitch)) + 1
-        if stages == 1 or along * across * layers * 8 <= MOST_LATTICE:
+        if stages == 1 or along * across * layers * 8 <= MAX_LATTICE_STATES:
             break
         stages -= 1
     goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / pitch) + below))
@@ -330,22 +330,22 @@ def cheapest_lattice_route(
     frame: RotatedFrame,
     lattice: Lattice,
     courses: int,
-    most_states: int,
+    max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> Records:
     """`LATTICE_CELL` records of the cheapest route from start to destination; empty if there is none.
 
-    courses: largest turn per step, in units of 45 degrees. most_states: maximum number of expanded states.
+    courses: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
     """
     search = begin_lattice_search(data, frame, lattice)
-    while search.found < 0 and len(search.states) and search.seen < most_states:
-        search = search_lattice_on(
-            data, frame, lattice, courses, search, min(STATES_AT_ONCE, most_states - search.seen)
+    while search.found < 0 and len(search.states) and search.seen < max_states:
+        search = continue_lattice_search(
+            data, frame, lattice, courses, search, min(STATES_AT_ONCE, max_states - search.seen)
         )
         pause()
     if search.found < 0:
         return np.zeros(0, dtype=LATTICE_CELL)
-    return traced(search.reached.came, search.found, lattice)
+    return trace_route(search.table.parents, search.found, lattice)
 
 
 def lattice_route(
@@ -358,11 +358,11 @@ def lattice_route(
     lattice = make_lattice(data, frame, step)
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
     courses = 2 if data.max_turn >= math.radians(90.0) else 1
-    cells = cheapest_lattice_route(data, frame, lattice, courses, MOST_STATES, pause)
+    cells = cheapest_lattice_route(data, frame, lattice, courses, MAX_EXPANDED, pause)
     if not len(cells):
         return np.empty((0, 3))
     places = np.column_stack([cells["along"], cells["across"]]) * lattice.step
     up = lattice.low + cells["layer"] * lattice.pitch
     points = frame.restore(np.column_stack([places, up]))
     points[0], points[-1] = data.start, data.destination
-    return np.asarray(pulled_taut(data, np.ascontiguousarray(points)))
+    return np.asarray(simplify_route(data, np.ascontiguousarray(points)))

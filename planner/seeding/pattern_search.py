@@ -29,7 +29,7 @@ EXPOSED = 0.002
 # Initial steps: along and across as shares of the interval between waypoints; up in m.
 FIRST_ALONG, FIRST_ACROSS, FIRST_UP = 0.2, 0.15, 25.0
 # Smallest step of a move, as a share of its initial step.
-LEAST_STEP = 0.002
+MIN_STEP = 0.002
 
 
 class _Found(NamedTuple):
@@ -156,7 +156,7 @@ def _search(
     start: Floats,
     moves: Floats,
     steps: Floats,
-    most: int,
+    max_evaluations: int,
 ) -> _Found:  # pragma: no cover - compiled
     """Search from a vector (d,) with moves (k, d) of these initial steps (k,), which it modifies."""
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
@@ -168,12 +168,12 @@ def _search(
         copy_into(feasible, here)
     made = 1
     first = steps.copy()
-    while made < most:
+    while made < max_evaluations:
         alive = False
         copy_into(before, here)
         # The last trial of a round repeats the displacement of the whole round (pattern move).
         for k in range(moves.shape[0] + 1):
-            if made >= most or (k < moves.shape[0] and abs(steps[k]) < LEAST_STEP * first[k]):
+            if made >= max_evaluations or (k < moves.shape[0] and abs(steps[k]) < MIN_STEP * first[k]):
                 continue
             better = False
             for _ in range(2):

@@ -18,11 +18,11 @@ from planner.evaluation.problem import ProblemArrays
 from planner.optimisers.linear_algebra import band_cholesky, solve_band
 from planner.seeding.shortening_model import (
     BAND,
-    Bindings,
+    ActiveConstraints,
     LagrangianModel,
-    bindings,
-    carried,
-    constraints_of,
+    active_constraints,
+    carry_multipliers,
+    constraint_count,
     lagrangian,
 )
 from world.kernels import compiled, copy_into
@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 # Added to the diagonal of the Hessian, 1 / m: along a straight line the position of a waypoint is undetermined.
 DAMPING = 2e-4
 # Longest step of a waypoint along an axis, m.
-LONGEST_STEP = 80.0
+MAX_STEP = 80.0
 # Penalties of the first and the last round, 1 / m; number of rounds, of steps per round, and of halvings per step.
 FIRST_PENALTY, LAST_PENALTY, ROUNDS, STEPS, HALVINGS = 0.1, 1.0, 9, 5, 5
 # A round ends with a step that moves no waypoint further than this, m.
@@ -54,7 +54,7 @@ def _newton_step(
         place, axis = path[1 + row // 3, row % 3], row % 3
         downhill = -model.gradient[row]
         if (place <= low[axis] and downhill < 0.0) or (place >= high[axis] and downhill > 0.0):
-            # An active bound: remove the coordinate from the system.
+            # At an active bound of the box: remove the coordinate from the system.
             model.gradient[row] = 0.0
             for k in range(1, BAND):
                 model.band[row, k] = 0.0
@@ -66,17 +66,17 @@ def _newton_step(
     for row in range(size):
         step[row] = -step[row]
         furthest = max(furthest, abs(step[row]))
-    if furthest > LONGEST_STEP:
+    if furthest > MAX_STEP:
         for row in range(size):
-            step[row] *= LONGEST_STEP / furthest
-    return min(furthest, LONGEST_STEP)
+            step[row] *= MAX_STEP / furthest
+    return min(furthest, MAX_STEP)
 
 
 class Shortening(NamedTuple):
     """State: path (w, 3) m, active constraints, their multipliers, rounds done, and models evaluated."""
 
     path: Floats
-    bound: Bindings
+    active: ActiveConstraints
     multipliers: Floats
     rounds: int
     models: int
@@ -84,14 +84,14 @@ class Shortening(NamedTuple):
 
 @compiled
 def begin_shortening(
-    data: ProblemArrays, path: Floats, samples: int, spare: float
+    data: ProblemArrays, path: Floats, samples: int, extra_margin: float
 ) -> Shortening:  # pragma: no cover - compiled
     """The shortening of a path (w, 3) m before its first round.
 
-    samples: of the ground on each leg. spare: additional margin to spheres and ground, m.
+    samples: of the ground on each leg. extra_margin: additional margin to spheres and ground, m.
     """
-    bound = bindings(data, path, samples, spare)
-    return Shortening(path.copy(), bound, np.zeros(constraints_of(bound)), 0, 0)
+    active = active_constraints(data, path, samples, extra_margin)
+    return Shortening(path.copy(), active, np.zeros(constraint_count(active)), 0, 0)
 
 
 class _Descent(NamedTuple):
@@ -106,11 +106,11 @@ class _Descent(NamedTuple):
 
 
 @compiled
-def shorten_on(
-    data: ProblemArrays, under_way: Shortening, spare: float, most: int
+def continue_shortening(
+    data: ProblemArrays, under_way: Shortening, extra_margin: float, max_rounds: int
 ) -> Shortening:  # pragma: no cover - compiled
-    """The shortening after up to `most` further rounds."""
-    here, bound, multipliers, number, made = under_way
+    """The shortening after up to `max_rounds` further rounds."""
+    here, active, multipliers, number, made = under_way
     limits, size = precompute_limits(data), 3 * (here.shape[0] - 2)
     descent = _Descent(
         np.array([data.west, data.south, data.floor]),
@@ -120,26 +120,26 @@ def shorten_on(
         np.zeros(size),
         here.copy(),
     )
-    last = min(ROUNDS, number + most)
+    last = min(ROUNDS, number + max_rounds)
     while number < last:
         if number > 0:
-            renewed = bindings(data, here, bound.samples, spare)
-            multipliers = carried(bound, multipliers, renewed)
-            bound = renewed
+            renewed = active_constraints(data, here, active.samples, extra_margin)
+            multipliers = carry_multipliers(active, multipliers, renewed)
+            active = renewed
         penalty = FIRST_PENALTY * (LAST_PENALTY / FIRST_PENALTY) ** (number / (ROUNDS - 1))
         values = np.zeros(multipliers.size)
-        made += _descend(data, limits, bound, here, multipliers, values, penalty, descent)
+        made += _descend(data, limits, active, here, multipliers, values, penalty, descent)
         for k in range(values.size):
             multipliers[k] = max(0.0, multipliers[k] - penalty * values[k])
         number += 1
-    return Shortening(here, bound, multipliers, number, made)
+    return Shortening(here, active, multipliers, number, made)
 
 
 @compiled
 def _descend(
     data: ProblemArrays,
     limits: PrecomputedLimits,
-    bound: Bindings,
+    active: ActiveConstraints,
     here: Floats,
     multipliers: Floats,
     values: Floats,
@@ -148,7 +148,7 @@ def _descend(
 ) -> int:  # pragma: no cover - compiled
     """Minimise over a path (w, 3), in place, and fill the constraints' values at the end; models evaluated."""
     low, high, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
-    merit, made = lagrangian(data, limits, bound, here, multipliers, values, penalty, model), 1
+    merit, made = lagrangian(data, limits, active, here, multipliers, values, penalty, model), 1
     for _ in range(STEPS):
         furthest, share, better = _newton_step(here, low, high, model, descent.factor, step), 1.0, False
         for _ in range(HALVINGS):
@@ -156,7 +156,7 @@ def _descend(
                 axis = row % 3
                 place = here[1 + row // 3, axis] + share * step[row]
                 trial[1 + row // 3, axis] = min(high[axis], max(low[axis], place))
-            found = lagrangian(data, limits, bound, trial, multipliers, values, penalty, model)
+            found = lagrangian(data, limits, active, trial, multipliers, values, penalty, model)
             made += 1
             if found < merit:
                 better = True
@@ -169,28 +169,28 @@ def _descend(
             copy_into(here[row], trial[row])
         if share * furthest < STILL:
             break
-    lagrangian(data, limits, bound, here, multipliers, values, penalty, model)
+    lagrangian(data, limits, active, here, multipliers, values, penalty, model)
     return made + 1
 
 
 # --- Shortening a path ---
 
 # Spacing of ground samples on the mean leg (m), and limits on their number per leg.
-SAMPLE_PITCH, FEWEST_SAMPLES, MOST_SAMPLES = 30.0, 6, 48
+SAMPLE_PITCH, MIN_SAMPLES, MAX_SAMPLES = 30.0, 6, 48
 # Additional margin to spheres and ground, m: the accuracy that the last steps reach.
-SPARE = 0.1
+EXTRA_MARGIN = 0.1
 # Maximum number of models per shortening.
-MOST_MODELS = ROUNDS * (2 + STEPS * HALVINGS)
+MAX_MODELS = ROUNDS * (2 + STEPS * HALVINGS)
 # Pairs of leg and missile between two calls of `pause`: some 5 ms.
 PAIRS_AT_ONCE = 400_000
 
 
 def shorten_path(
-    data: ProblemArrays, path: Floats, *, spare: float = SPARE, pause: Callable[[], None] = lambda: None
+    data: ProblemArrays, path: Floats, *, extra_margin: float = EXTRA_MARGIN, pause: Callable[[], None] = lambda: None
 ) -> tuple[Floats, int]:
     """A path (w, 3) world m, shorter or with smaller violations than this one, and the number of models evaluated.
 
-    A model counts as an evaluation. spare: additional margin to spheres and ground, m. pause: called after some
+    A model counts as an evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
     milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
 
     >>> from planfly.airframe import load_airframe
@@ -199,29 +199,29 @@ def shorten_path(
     >>> scenario = load_scenario("hard-07")
     >>> data = make_problem(scenario, load_airframe(scenario).limits).search
     >>> high = np.array([scenario.start, [5000.0, 5000.0, 590.0], scenario.destination])
-    >>> path, _ = shorten_path(data, evenly(high, 10))
+    >>> path, _ = shorten_path(data, resample(high, 10))
     >>> path.shape, bool(np.array_equal(path[-1], scenario.destination))
     ((10, 3), True)
     """
     mean = math.dist(path[0], path[-1]) / (len(path) - 1)
-    samples = int(min(MOST_SAMPLES, max(FEWEST_SAMPLES, math.ceil(mean / SAMPLE_PITCH))))
+    samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean / SAMPLE_PITCH))))
     rounds = max(1, PAIRS_AT_ONCE // (len(path) * max(1, len(data.missiles.missiles))))
     start = np.array(path, dtype=np.float64)
     # A grid's route ends at the height of a layer.
     start[0], start[-1] = data.start, data.destination
-    under_way: Shortening = begin_shortening(data, start, samples, spare)
+    under_way: Shortening = begin_shortening(data, start, samples, extra_margin)
     while under_way.rounds < ROUNDS:
-        under_way = shorten_on(data, under_way, spare, min(ROUNDS, rounds))
+        under_way = continue_shortening(data, under_way, extra_margin, min(ROUNDS, rounds))
         pause()
     return under_way.path, int(under_way.models)
 
 
-def evenly(way: Floats, count: int) -> Floats:
+def resample(route: Floats, count: int) -> Floats:
     """Waypoints (count, 3) at equal distances along a route (k, 3).
 
-    >>> evenly(np.array([[0.0, 0.0, 5.0], [30.0, 40.0, 5.0], [30.0, 90.0, 5.0]]), 5).tolist()
+    >>> resample(np.array([[0.0, 0.0, 5.0], [30.0, 40.0, 5.0], [30.0, 90.0, 5.0]]), 5).tolist()
     [[0.0, 0.0, 5.0], [15.0, 20.0, 5.0], [30.0, 40.0, 5.0], [30.0, 65.0, 5.0], [30.0, 90.0, 5.0]]
     """
-    runs = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(way, axis=0) ** 2).sum(axis=1)))])
+    runs = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(route, axis=0) ** 2).sum(axis=1)))])
     at = np.linspace(0.0, runs[-1], count)
-    return np.column_stack([np.interp(at, runs, way[:, axis]) for axis in range(3)])
+    return np.column_stack([np.interp(at, runs, route[:, axis]) for axis in range(3)])

@@ -4,8 +4,8 @@ The method of multipliers of Hestenes and Powell, in the form for inequalities o
 Hestenes and Powell applied to convex programming", Journal of Optimization Theory and Applications 12, 1973): a
 constraint c >= 0 with multiplier m adds (max(0, m - p c)^2 - m^2) / 2 p to the length, and m becomes max(0, m - p c).
 Constraints are distances from missiles, heights above ground, slopes, turns, and lengths of legs against their turns.
-Their coefficients are computed once per round (`Bindings`). The curvature of the constraints is left out of the
-Hessian; a constraint couples at most four consecutive waypoints, so the Hessian is banded.
+Their coefficients are computed once per round (`ActiveConstraints`). The curvature of the constraints is left out of
+the Hessian; a constraint couples at most four consecutive waypoints, so the Hessian is banded.
 """
 
 import math
@@ -43,14 +43,14 @@ Ints = NDArray[np.int64]
 # A sphere constrains the legs that come within this distance of its surface, m.
 NEAR = 250.0
 # Turns below the minimum are measured at it; above the maximum the tangent of half the turn is taken at the maximum
-# (rad). LONGEST_NEED: upper limit on the length that a turn takes of a leg, m.
-LEAST_TURN, GREATEST_TURN, LONGEST_NEED = 0.2, 3.0, 1e4
+# (rad). MAX_TURN_LENGTH: upper limit on the length that a turn takes of a leg, m.
+MIN_TURN, MAX_TURN, MAX_TURN_LENGTH = 0.2, 3.0, 1e4
 
 
-class Bindings(NamedTuple):
+class ActiveConstraints(NamedTuple):
     """Active constraints of a path of w waypoints in one round, linearised at the path with which the round began.
 
-    pairs: (p, 2) leg and missile near it. wide: (p,) required distance (m) from the missile's centre.
+    pairs: (p, 2) leg and missile near it. distances: (p,) required (m) from the missile's centre.
     samples: number of ground samples on each leg. low: (w - 1,) height required above the clearance, m.
     climb, dive: (w - 1,) tangents. before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent
     of half the turn. roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
@@ -58,7 +58,7 @@ class Bindings(NamedTuple):
     """
 
     pairs: Ints
-    wide: Floats
+    distances: Floats
     samples: int
     low: Floats
     climb: Floats
@@ -70,28 +70,30 @@ class Bindings(NamedTuple):
 
 
 @compiled
-def bindings(data: ProblemArrays, path: Floats, samples: int, spare: float) -> Bindings:  # pragma: no cover - compiled
-    """Active constraints near a path (w, 3); spare: additional margin to spheres and ground, m."""
+def active_constraints(
+    data: ProblemArrays, path: Floats, samples: int, extra_margin: float
+) -> ActiveConstraints:  # pragma: no cover - compiled
+    """Active constraints near a path (w, 3); extra_margin: additional margin to spheres and ground, m."""
     limits = precompute_limits(data)
     count = path.shape[0] - 1
     legs, corners, lags = np.zeros(count, dtype=LEG), np.zeros(count + 1, dtype=CORNER), np.zeros(count, HEIGHT_LAG)
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
-    if data.tracking.strays:
+    if data.tracking.has_error:
         measure_lags(data.tracking, data.aircraft, limits.wind, path, legs, lags)
     low, climb, dive, roll = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
     for i in range(count):
         steepest, deepest = slope_limits(data, path[i], path[i + 1])
         climb[i], dive[i] = math.tan(steepest), math.tan(deepest)
-        low[i] = spare + lags[i].most
+        low[i] = extra_margin + lags[i].max_below
         if data.legs_hold_turns and not data.fly_over:
             up = min(path[i, 2], path[i + 1, 2])
             roll[i] = roll_length(data.aircraft, legs, corners, i, up, limits.wind)
     before, after = np.zeros(count + 1), np.zeros(count + 1)
     if data.legs_hold_turns:
         _turn_shares(data, limits, path, legs, before, after)
-    pairs, wide = _near_missiles(data, path, corners, lags, spare)
-    return Bindings(pairs, wide, samples, low, climb, dive, before, after, roll, data.legs_hold_turns)
+    pairs, distances = _near_missiles(data, path, corners, lags, extra_margin)
+    return ActiveConstraints(pairs, distances, samples, low, climb, dive, before, after, roll, data.legs_hold_turns)
 
 
 @compiled
@@ -106,24 +108,27 @@ def _turn_shares(
         turn = math.atan2(abs(cross), dot)
         if i in (0, path.shape[0] - 1) and turn == 0.0:
             continue
-        if turn < LEAST_TURN:
-            turn = LEAST_TURN
+        if turn < MIN_TURN:
+            turn = MIN_TURN
             sine = math.sin(turn) if cross >= 0.0 else -math.sin(turn)
             vx, vy = ux * math.cos(turn) - uy * sine, uy * math.cos(turn) + ux * sine
         measure_corner(data.aircraft, data.tracking, limits.wind, True, ux, uy, vx, vy, path[i, 2], corners[0])
-        share = math.tan(0.5 * min(turn, GREATEST_TURN))
-        before[i], after[i] = min(LONGEST_NEED, corners[0].before) / share, min(LONGEST_NEED, corners[0].after) / share
+        share = math.tan(0.5 * min(turn, MAX_TURN))
+        before[i], after[i] = (
+            min(MAX_TURN_LENGTH, corners[0].before) / share,
+            min(MAX_TURN_LENGTH, corners[0].after) / share,
+        )
         if data.fly_over:
-            before[i], after[i] = 0.0, min(LONGEST_NEED, turn_length(True, corners, 0)) / share
+            before[i], after[i] = 0.0, min(MAX_TURN_LENGTH, turn_length(True, corners, 0)) / share
 
 
 @compiled
 def _near_missiles(
-    data: ProblemArrays, path: Floats, corners: Records, lags: Records, spare: float
+    data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
 ) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
     """Legs and the missiles near them (p, 2), and the distances (p,) required from the missiles' centres, m."""
     missiles = data.missiles.missiles
-    pairs, wide = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
+    pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
     for k in range(missiles.shape[0]):
         missile = missiles[k]
         for i in range(path.shape[0] - 1):
@@ -140,28 +145,30 @@ def _near_missiles(
                 aside = corners[i].excursion
             if (1.0 - share) * length < corners[i + 1].before:
                 aside = max(aside, corners[i + 1].excursion)
-            lag = max(lags[i].most, -lags[i].least) * abs(az + share * dz) / max(away, 1.0)
+            lag = max(lags[i].max_below, -lags[i].min_below) * abs(az + share * dz) / max(away, 1.0)
             pairs.append((i, k))
-            wide.append(missile.radius + data.kill_margin + spare + aside + lag)
+            distances.append(missile.radius + data.kill_margin + extra_margin + aside + lag)
     out, wanted = np.zeros((len(pairs), 2), dtype=np.int64), np.zeros(len(pairs))
     for p in range(len(pairs)):
         out[p, 0], out[p, 1] = pairs[p]
-        wanted[p] = wide[p]
+        wanted[p] = distances[p]
     return out, wanted
 
 
 @compiled
-def constraints_of(bound: Bindings) -> int:  # pragma: no cover - compiled
+def constraint_count(active: ActiveConstraints) -> int:  # pragma: no cover - compiled
     """Number of constraints of `lagrangian`."""
-    legs = bound.low.size
-    count: int = bound.pairs.shape[0] + legs * (bound.samples + 4) + legs + 1
+    legs = active.low.size
+    count: int = active.pairs.shape[0] + legs * (active.samples + 4) + legs + 1
     return count
 
 
 @compiled
-def carried(old: Bindings, multipliers: Floats, new: Bindings) -> Floats:  # pragma: no cover - compiled
+def carry_multipliers(
+    old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints
+) -> Floats:  # pragma: no cover - compiled
     """Multipliers for new active constraints; those of new pairs of leg and missile start at 0."""
-    out, many, before = np.zeros(constraints_of(new)), new.pairs.shape[0], old.pairs.shape[0]
+    out, many, before = np.zeros(constraint_count(new)), new.pairs.shape[0], old.pairs.shape[0]
     copy_into(out[many:], multipliers[before:])
     k = 0
     for p in range(many):
@@ -185,7 +192,7 @@ TURN_LENGTH = 200.0
 # Shortest leg, m: slightly more than the scores require.
 SHORTEST_LEG = 15.0
 # Additional margin of slopes (m of height) and of leg lengths between turns, m: the accuracy that the last steps reach.
-LEVEL_SPARE, TURN_SPARE = 0.2, 1.0
+SLOPE_MARGIN, TURN_MARGIN = 0.2, 1.0
 # Half-step of the finite difference for the ground's slope, m.
 GROUND_STEP = 8.0
 
@@ -253,7 +260,7 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no co
 @compiled
 def _add_missiles(
     data: ProblemArrays,
-    bound: Bindings,
+    active: ActiveConstraints,
     path: Floats,
     multipliers: Floats,
     values: Floats,
@@ -262,8 +269,8 @@ def _add_missiles(
 ) -> float:  # pragma: no cover - compiled
     """Add the distances of legs from missiles, the first constraints; returns their contribution to the merit."""
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
-    for p in range(bound.pairs.shape[0]):
-        i, missile = bound.pairs[p, 0], missiles[bound.pairs[p, 1]]
+    for p in range(active.pairs.shape[0]):
+        i, missile = active.pairs[p, 0], missiles[active.pairs[p, 1]]
         ax, ay, az = path[i, 0] - missile.east, path[i, 1] - missile.north, path[i, 2] - missile.up
         dx, dy, dz = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
         length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
@@ -275,7 +282,7 @@ def _add_missiles(
         for axis in range(3):
             slopes[1, axis] = share * slopes[0, axis]
             slopes[0, axis] *= 1.0 - share
-        values[p] = away - bound.wide[p]
+        values[p] = away - active.distances[p]
         merit += _add(values[p], i, 2, multipliers[p], penalty, model)
     return merit
 
@@ -284,7 +291,7 @@ def _add_missiles(
 def _add_ground(
     data: ProblemArrays,
     limits: PrecomputedLimits,
-    bound: Bindings,
+    active: ActiveConstraints,
     path: Floats,
     multipliers: Floats,
     values: Floats,
@@ -295,14 +302,14 @@ def _add_ground(
     """Add the heights of leg samples above the required height, constraints from `at`; see `_add_missiles`."""
     merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
     for i in range(path.shape[0] - 1):
-        for k in range(bound.samples):
-            share = (k + 1.0) / (bound.samples + 1.0)
+        for k in range(active.samples):
+            share = (k + 1.0) / (active.samples + 1.0)
             x = path[i, 0] + share * (path[i + 1, 0] - path[i, 0])
             y = path[i, 1] + share * (path[i + 1, 1] - path[i, 1])
             z = path[i, 2] + share * (path[i + 1, 2] - path[i, 2])
             column, row = polymap(to_pixel, x, y)
-            value = z - pixel_height(heights, column, row) - clearance_at(limits.required, x, y) - bound.low[i]
-            number = at + i * bound.samples + k
+            value = z - pixel_height(heights, column, row) - clearance_at(limits.required, x, y) - active.low[i]
+            number = at + i * active.samples + k
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
                 column, row = polymap(to_pixel, x + GROUND_STEP, y)
@@ -326,7 +333,13 @@ def _add_ground(
 
 @compiled
 def _add_slopes(
-    bound: Bindings, path: Floats, multipliers: Floats, values: Floats, penalty: float, model: LagrangianModel, at: int
+    active: ActiveConstraints,
+    path: Floats,
+    multipliers: Floats,
+    values: Floats,
+    penalty: float,
+    model: LagrangianModel,
+    at: int,
 ) -> float:  # pragma: no cover - compiled
     """Add slope margins of legs, as m of height, and lengths above the shortest leg; see `_add_missiles`."""
     merit, slopes = 0.0, model.slopes
@@ -334,14 +347,14 @@ def _add_slopes(
         dx, dy, rise = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
         run = max(1e-3, math.sqrt(dx * dx + dy * dy))
         for kind in range(3):
-            tangent = bound.climb[i] if kind == 0 else bound.dive[i] if kind == 1 else 1.0
+            tangent = active.climb[i] if kind == 0 else active.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
             second = slopes[1]
             second[0], second[1], second[2] = tangent * dx / run, tangent * dy / run, sign
             for axis in range(3):
                 slopes[0, axis] = -slopes[1, axis]
             number = at + 3 * i + kind
-            values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else LEVEL_SPARE)
+            values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else SLOPE_MARGIN)
             merit += _add(values[number], i, 2, multipliers[number], penalty, model)
     return merit
 
@@ -349,7 +362,7 @@ def _add_slopes(
 @compiled
 def _add_turns(
     data: ProblemArrays,
-    bound: Bindings,
+    active: ActiveConstraints,
     path: Floats,
     multipliers: Floats,
     values: Floats,
@@ -378,20 +391,20 @@ def _add_turns(
         _turn_slopes(of_before[i], of_after[i], -TURN_LENGTH, slopes[:3])
         values[at + i] = TURN_LENGTH * (data.max_turn - turn[i])
         merit += _add(values[at + i], i - 1, 3, multipliers[at + i], penalty, model)
-    if not bound.turns_in_legs:
+    if not active.turns_in_legs:
         return merit
     for i in range(count):
         number = at + count + 1 + i
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
         run = max(1e-3, math.sqrt(dx * dx + dy * dy))
-        one, two = math.tan(0.5 * min(GREATEST_TURN, turn[i])), math.tan(0.5 * min(GREATEST_TURN, turn[i + 1]))
-        need = bound.after[i] * one + bound.before[i + 1] * two + bound.roll[i]
+        one, two = math.tan(0.5 * min(MAX_TURN, turn[i])), math.tan(0.5 * min(MAX_TURN, turn[i + 1]))
+        need = active.after[i] * one + active.before[i + 1] * two + active.roll[i]
         slopes[:] = 0.0
         for axis, part in ((0, dx / run), (1, dy / run)):
             slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * part, (1.0 - SETTLING_SHARE) * part
-        _turn_slopes(of_before[i], of_after[i], -0.5 * bound.after[i] * (1.0 + one * one), slopes[:3])
-        _turn_slopes(of_before[i + 1], of_after[i + 1], -0.5 * bound.before[i + 1] * (1.0 + two * two), slopes[1:])
-        values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - TURN_SPARE
+        _turn_slopes(of_before[i], of_after[i], -0.5 * active.after[i] * (1.0 + one * one), slopes[:3])
+        _turn_slopes(of_before[i + 1], of_after[i + 1], -0.5 * active.before[i + 1] * (1.0 + two * two), slopes[1:])
+        values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - TURN_MARGIN
         merit += _add(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit
 
@@ -411,7 +424,7 @@ def _turn_slopes(
 def lagrangian(
     data: ProblemArrays,
     limits: PrecomputedLimits,
-    bound: Bindings,
+    active: ActiveConstraints,
     path: Floats,
     multipliers: Floats,
     values: Floats,
@@ -420,12 +433,12 @@ def lagrangian(
 ) -> float:  # pragma: no cover - compiled
     """Augmented length of a path (w, 3), m; fills the constraints' values and the model."""
     model.gradient[:], model.band[:] = 0.0, 0.0
-    at = bound.pairs.shape[0]
+    at = active.pairs.shape[0]
     merit = _add_length(path, model)
-    merit += _add_missiles(data, bound, path, multipliers, values, penalty, model)
-    merit += _add_ground(data, limits, bound, path, multipliers, values, penalty, model, at)
-    at += bound.samples * (path.shape[0] - 1)
-    merit += _add_slopes(bound, path, multipliers, values, penalty, model, at)
+    merit += _add_missiles(data, active, path, multipliers, values, penalty, model)
+    merit += _add_ground(data, limits, active, path, multipliers, values, penalty, model, at)
+    at += active.samples * (path.shape[0] - 1)
+    merit += _add_slopes(active, path, multipliers, values, penalty, model, at)
     at += 3 * (path.shape[0] - 1)
-    merit += _add_turns(data, bound, path, multipliers, values, penalty, model, at)
+    merit += _add_turns(data, active, path, multipliers, values, penalty, model, at)
     return merit

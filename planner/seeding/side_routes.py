@@ -19,15 +19,15 @@ from planner.seeding.grids import (
     SPAN,
     Grid,
     GridRoute,
+    distance_to_goal,
     find_obstacles,
-    layers_a_step,
+    layers_per_step,
     make_grid,
     prune,
     relax,
-    set_prices,
-    step_on,
+    relax_stage,
+    set_cell_costs,
     trace_back,
-    way_ahead,
 )
 from world.kernels import Records, compiled, inlined
 
@@ -51,22 +51,22 @@ PASSING = np.dtype(
 class GridCosts(NamedTuple):
     """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across); inf if none is within the bound.
 
-    reached: from the start; came: the previous cell, as layer x width + across.
-    left: to the destination; went: the next cell.
+    reached: from the start; parents: the previous cell, as layer x width + across.
+    left: to the destination; successors: the next cell.
     """
 
     reached: Floats
-    came: Codes
+    parents: Codes
     left: Floats
-    went: Codes
+    successors: Codes
 
 
 @compiled
-def _step_back(
+def _relax_stage_back(
     left: Floats,
     price: Floats,
     before: Floats,
-    went: Codes,
+    successors: Codes,
     spans: Records,
     step_layers: Records,
     step: float,
@@ -78,7 +78,7 @@ def _step_back(
     spans: `SPAN` records (layers,) of the cells before it that are within the bound.
     """
     high, wide = left.shape
-    flat, flat_before, flat_went, flat_price = left.ravel(), before.ravel(), went.ravel(), price.ravel()
+    flat, flat_before, flat_successors, flat_price = left.ravel(), before.ravel(), successors.ravel(), price.ravel()
     for z in range(high):
         first, last = spans[z].first, spans[z].last
         if first > last:
@@ -87,12 +87,12 @@ def _step_back(
             a, b = max(first, -side), min(last, wide - 1 - side) + 1
             if a >= b:
                 continue
-            most = step_layers[side + SIDEWAYS, z]
-            bottom, top = max(0, z - most.sink), min(high - 1, z + most.climb)
+            limit = step_layers[side + SIDEWAYS, z]
+            bottom, top = max(0, z - limit.sink), min(high - 1, z + limit.climb)
             for z2 in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
                 here, after = z * wide + a, z2 * wide + a + side
-                relax(flat, flat_price, flat_before, flat_went, after, here, after, b - a, length)
+                relax(flat, flat_price, flat_before, flat_successors, after, here, after, b - a, length)
 
 
 @compiled
@@ -112,12 +112,12 @@ def grid_costs(
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
-    step_layers, required = layers_a_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
+    step_layers, required = layers_per_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
     obstacles = find_obstacles(data, frame, step, grid.shrink)
     shape = (stages + 1, high, wide)
     reached, left = np.full(shape, np.inf), np.full(shape, np.inf)
     price, extra = np.full(shape, np.inf), np.zeros((stages + 1, wide))
-    came, went = np.zeros(shape, dtype=np.int32), np.zeros(shape, dtype=np.int32)
+    parents, successors = np.zeros(shape, dtype=np.int32), np.zeros(shape, dtype=np.int32)
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
     goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
     rises, ahead = grid.layers - grid.layers[goal], np.empty(wide)
@@ -131,18 +131,20 @@ def grid_costs(
             low, last = min(low, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
         low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
         if low > last:
-            return GridCosts(reached, came, left, went)
-        set_prices(data, required, frame, stage, obstacles, grid, extra, low, last, price[stage])
+            return GridCosts(reached, parents, left, successors)
+        set_cell_costs(data, required, frame, stage, obstacles, grid, extra, low, last, price[stage])
         before, here = reached[stage - 1], reached[stage]
-        step_on(before, here, came[stage], spans[stage - 1], step_layers, price[stage], step, pitch, grid.ratio)
-        way_ahead(wide, home, stages - stage, step, grid.ratio, ahead)
+        relax_stage(before, here, parents[stage], spans[stage - 1], step_layers, price[stage], step, pitch, grid.ratio)
+        distance_to_goal(wide, home, stages - stage, step, grid.ratio, ahead)
         prune(reached[stage], spans[stage], ahead, rises, bound, low, last)
     left[stages, goal, home] = 0.0
     for stage in range(stages - 1, -1, -1):
         after, here = left[stage + 1], left[stage]
-        _step_back(after, price[stage + 1], here, went[stage], spans[stage], step_layers, step, pitch, grid.ratio)
+        _relax_stage_back(
+            after, price[stage + 1], here, successors[stage], spans[stage], step_layers, step, pitch, grid.ratio
+        )
         _bounded(reached[stage], left[stage], spans[stage], bound)
-    return GridCosts(reached, came, left, went)
+    return GridCosts(reached, parents, left, successors)
 
 
 @inlined
@@ -182,13 +184,13 @@ def cheapest_passings(
 @compiled
 def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:  # pragma: no cover - compiled
     """`ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
-    last, wide = costs.went.shape[0] - 1, costs.went.shape[2]
+    last, wide = costs.successors.shape[0] - 1, costs.successors.shape[2]
     cells = np.zeros(last + 1, dtype=ROUTE_CELL)
-    before = trace_back(costs.came[: stage + 1], layer, across)
+    before = trace_back(costs.parents[: stage + 1], layer, across)
     for here in range(stage + 1):
         cells[here] = before[here]
     for here in range(stage, last):
-        after = costs.went[here, layer, across]
+        after = costs.successors[here, layer, across]
         layer, across = after // wide, after % wide
         cells[here + 1].layer, cells[here + 1].across = layer, across
     return cells
@@ -221,9 +223,9 @@ def side_routes(
     frame: RotatedFrame,
     grid: Grid,
     bound: float,
-    most: int,
+    max_routes: int,
 ) -> list[GridRoute]:
-    """Up to `most` routes with different sides and a cost of at most `bound`, cheapest first.
+    """Up to `max_routes` routes with different sides and a cost of at most `bound`, cheapest first.
 
     Each is the cheapest that passes one obstacle on one side; the first is the cheapest of all. Of routes close to each
     other only the cheapest is returned.
@@ -248,7 +250,7 @@ def side_routes(
         if any(np.abs(points[:, 1] - route.points[:, 1]).mean() < SAME_WAY for route in routes):
             continue
         routes.append(GridRoute(points, float(passing["cost"])))
-        if len(routes) == most:
+        if len(routes) == max_routes:
             break
     return routes
 

@@ -93,28 +93,28 @@ def waypoint_chains(
 
 @compiled
 def _advance(
-    data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, most: int
+    data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, max_legs: int
 ) -> bool:  # pragma: no cover - compiled
-    """Continue from the cursor until `most` legs have been evaluated; returns whether all is done.
+    """Continue from the cursor until `max_legs` legs have been evaluated; returns whether all is done.
 
     legs: (w - 1, k, k) costs, filled on demand. cursor: a `_CURSOR` record (1,).
     """
     count, wide, _ = candidates.shape
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
-    at, least = cursor[0], np.empty(wide)
+    at, lower_bounds = cursor[0], np.empty(wide)
     begun = at.legs
     while at.waypoint >= 0:
         i, step = at.waypoint, at.step
         cost, link = (sweeps.forward, sweeps.before) if step > 0 else (sweeps.backward, sweeps.after)
         open_ends = np.flatnonzero(cost[i - step] < np.inf)
         while at.candidate < (wide if 0 < i < count - 1 else 1):
-            if at.legs - begun >= most:
+            if at.legs - begun >= max_legs:
                 return False
             k = at.candidate
             # Lower bound on the cost of the rest of a path through this candidate.
             rest = _distance(candidates[i, k], candidates[-1][0]) if step > 0 else sweeps.forward[i, k]
             at.legs += _extend(
-                data, limits, candidates, i, k, step, cost, link, bound - rest, legs, open_ends, least, corners
+                data, limits, candidates, i, k, step, cost, link, bound - rest, legs, open_ends, lower_bounds, corners
             )
             at.candidate += 1
         at.candidate = 0
@@ -150,37 +150,37 @@ def _extend(
     step: int,
     cost: Floats,
     link: Ints,
-    most: float,
+    max_cost: float,
     legs: Floats,
     open_ends: Ints,
-    least: Floats,
+    lower_bounds: Floats,
     corners: Records,
 ) -> int:  # pragma: no cover - compiled
     """Extend partial paths with costs (w, k) to candidate k of waypoint i; returns the number of legs evaluated.
 
     step: 1 for paths from the start, -1 from the destination. link: (w, k) neighbouring candidate of each partial path.
-    most: upper limit on the cost of a partial path. open_ends: candidates of the previous waypoint with partial paths.
-    least, corners: scratch.
+    max_cost: upper limit on the cost of a partial path. open_ends: candidates of the previous waypoint with partial
+    paths. lower_bounds, corners: scratch.
     """
     last, evaluated, here = i - step, 0, candidates[i, k]
-    if not most > 0.0 or open_ends.size == 0:
+    if not max_cost > 0.0 or open_ends.size == 0:
         return 0
     for m in range(open_ends.size):
         # A leg costs at least its length.
-        least[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
+        lower_bounds[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
     while True:
         # Best lower bound first: a leg without violations ends the search.
-        m = _lowest(least, open_ends.size)
-        j, cheapest = open_ends[m], least[m]
-        if not cheapest < min(cost[i, k], most):
+        m = _lowest(lower_bounds, open_ends.size)
+        j, cheapest = open_ends[m], lower_bounds[m]
+        if not cheapest < min(cost[i, k], max_cost):
             return evaluated
-        least[m] = np.inf
+        lower_bounds[m] = np.inf
         turn = 0.0
         if 0 < last < candidates.shape[0] - 1:
             beyond = candidates[last - step, link[last, j]]
             a, c = (beyond, here) if step > 0 else (here, beyond)
             turn = _corner_cost(data, limits, a, candidates[last, j], c, corners)
-        if not cheapest + turn < min(cost[i, k], most):
+        if not cheapest + turn < min(cost[i, k], max_cost):
             continue
         first, second = (j, k) if step > 0 else (k, j)
         leg = legs[min(i, last), first, second]
@@ -189,7 +189,7 @@ def _extend(
             legs[min(i, last), first, second] = leg
             evaluated += 1
         total = cost[last, j] + leg + turn
-        if total < min(cost[i, k], most):
+        if total < min(cost[i, k], max_cost):
             cost[i, k], link[i, k] = total, j
 
 
@@ -233,7 +233,7 @@ def _corner_cost(
 
 
 @compiled
-def open_places(data: ProblemArrays, places: Floats) -> Flags:  # pragma: no cover - compiled
+def free_points(data: ProblemArrays, points: Floats) -> Flags:  # pragma: no cover - compiled
     """Whether points (n, 3), world m, are on the map, above the required clearance and outside all kill spheres, (n,).
 
     >>> from planfly.airframe import load_airframe
@@ -242,13 +242,13 @@ def open_places(data: ProblemArrays, places: Floats) -> Flags:  # pragma: no cov
     >>> scenario = load_scenario("hard-07")
     >>> data = make_problem(scenario, load_airframe(scenario).limits).search
     >>> unit = scenario.threats.position[0]
-    >>> open_places(data, np.array([scenario.start, unit + [0.0, 0.0, 50.0], [-5000.0, 0.0, 300.0]])).tolist()
+    >>> free_points(data, np.array([scenario.start, unit + [0.0, 0.0, 50.0], [-5000.0, 0.0, 300.0]])).tolist()
     [True, False, False]
     """
     required = required_clearance(data)
-    out = np.zeros(places.shape[0], dtype=np.bool_)
-    for k in range(places.shape[0]):
-        x, y, z = places[k, 0], places[k, 1], places[k, 2]
+    out = np.zeros(points.shape[0], dtype=np.bool_)
+    for k in range(points.shape[0]):
+        x, y, z = points[k, 0], points[k, 1], points[k, 2]
         if not (data.west <= x <= data.east and data.south <= y <= data.north):
             continue
         column, row = polymap(data.to_pixel, x, y)

@@ -40,7 +40,7 @@ def leg_cost(
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
     steep = slope_excess(data, limits, ux, uy, run, a[2], b[2])
     ends = segment_pixels(data.to_pixel, a[0], a[1], b[0], b[1])
-    below = _below(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.strays else 0.0
+    below = _below(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.has_error else 0.0
     depth = terrain_excess(
         data.heights, data.slope_bounds, limits.required, max(0.0, below), ends, a[0], a[1], a[2], b[0], b[1], b[2]
     )
@@ -62,7 +62,7 @@ def leg_cost(
     )
     if kill > 0.0:
         total += KILL_COST * length * min(1.0, 0.1 + kill)
-    if data.airspace.zones.kept.shape[0] > 0 or data.airspace.max_height < math.inf:
+    if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         total += DEPTH_COST * airspace_excess(data, a, b, max(0.0, below), max(0.0, -below))
     return total
 
@@ -83,11 +83,11 @@ def _below(
 def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pragma: no cover - compiled
     """Candidates (w, c, 3) chosen at each waypoint to minimise the sum of leg costs; number of legs evaluated."""
     count, width, _ = candidates.shape
-    came = np.zeros((count, width), dtype=np.int64)
+    parents = np.zeros((count, width), dtype=np.int64)
     cost = np.full(width, np.inf)
     cost[0] = 0.0
     limits = precompute_limits(data)
-    least, evaluated = np.empty(width), 0
+    lower_bounds, evaluated = np.empty(width), 0
     for i in range(1, count):
         after = np.full(width, np.inf)
         for k in range(width if i < count - 1 else 1):
@@ -95,22 +95,22 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pra
             for j in range(width):
                 a = candidates[i - 1, j]
                 # A leg costs at least its length.
-                least[j] = cost[j] + math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+                lower_bounds[j] = cost[j] + math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
             # Best lower bound first: a leg without violations ends the search.
             while True:
-                j = int(np.argmin(least))
-                if least[j] >= after[k]:
+                j = int(np.argmin(lower_bounds))
+                if lower_bounds[j] >= after[k]:
                     break
-                least[j] = np.inf
+                lower_bounds[j] = np.inf
                 evaluated += 1
                 total = cost[j] + leg_cost(data, limits, candidates[i - 1, j], b)
                 if total < after[k]:
                     after[k] = total
-                    came[i, k] = j
+                    parents[i, k] = j
         cost = after
     out = np.zeros(count, dtype=np.int64)
     for i in range(count - 1, 0, -1):
-        out[i - 1] = came[i, out[i]]
+        out[i - 1] = parents[i, out[i]]
     return out, evaluated
 
 
@@ -118,13 +118,13 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pra
 class WaypointFit:
     """Effort of fitting waypoints to a route.
 
-    places: candidate points along each interval.
+    candidates: along each interval.
     lifts: heights above the route, m.
     rounds: of moves of each waypoint.
     diagonal: whether moves lead to all 26 neighbours, not just the 6 along the axes.
     """
 
-    places: int
+    candidates: int
     lifts: tuple[float, ...]
     rounds: int
     diagonal: bool
@@ -132,34 +132,37 @@ class WaypointFit:
 
 # Initial moves of a waypoint: shares of the interval along and across, and m up; and their reduction per round.
 FIRST_MOVES, SHRINK, LAST_SHRINK = (0.25, 0.2, 40.0), 0.7, 0.6
-CLOSE, QUICK = WaypointFit(9, (0.0, 20.0, 60.0), 2, diagonal=True), WaypointFit(5, (0.0, 20.0, 60.0), 2, diagonal=False)
+CLOSE_FIT, QUICK_FIT = (
+    WaypointFit(9, (0.0, 20.0, 60.0), 2, diagonal=True),
+    WaypointFit(5, (0.0, 20.0, 60.0), 2, diagonal=False),
+)
 # Steps to the 26 neighbours and to the point itself, along, across and up.
-_AROUND = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
-_BESIDE = _AROUND[np.abs(_AROUND).sum(axis=1) <= 1.0]
+_NEIGHBOURS = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+_AXIS_NEIGHBOURS = _NEIGHBOURS[np.abs(_NEIGHBOURS).sum(axis=1) <= 1.0]
 
 
 def fit_waypoints(
-    data: ProblemArrays, frame: RotatedFrame, route: Floats, waypoints: int, fit: WaypointFit = CLOSE
+    data: ProblemArrays, frame: RotatedFrame, route: Floats, waypoints: int, fit: WaypointFit = CLOSE_FIT
 ) -> Floats:
     """Waypoints (w, 3) world m along a route (s, 3) in rotated axes, one per interval, chosen by whole legs."""
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     span = edges[1] - edges[0]
-    shares = np.linspace(0.1, 0.9, fit.places)
+    shares = np.linspace(0.1, 0.9, fit.candidates)
     along = edges[:-1, None] + shares * span
     points = np.stack([along, *(np.interp(along, route[:, 0], route[:, axis]) for axis in (1, 2))], axis=-1)
     return fit_points(data, straight_frames(*frame[:4], edges), points, fit)
 
 
-def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE) -> Floats:
-    """Waypoints (w, 3) world m: each one of its candidates (w - 2, places, 3) in its frame, then moved locally."""
-    inner, places, _ = points.shape
-    candidates = np.zeros((inner + 2, places * len(fit.lifts), 3))
+def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
+    """Waypoints (w, 3) world m: each one of its candidates (w - 2, k, 3) in its frame, then moved locally."""
+    inner, width, _ = points.shape
+    candidates = np.zeros((inner + 2, width * len(fit.lifts), 3))
     candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
-    candidates[1:-1, :, 2] += np.repeat(fit.lifts, places)
+    candidates[1:-1, :, 2] += np.repeat(fit.lifts, width)
     chosen, _ = _pick(data, frames, candidates)
-    steps = _AROUND if fit.diagonal else _BESIDE
-    moved, _ = _moved(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), SHRINK)
-    return _restored(frames, moved[:, None])[:, 0]
+    steps = _NEIGHBOURS if fit.diagonal else _AXIS_NEIGHBOURS
+    moved, _ = _move(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), SHRINK)
+    return _restore(frames, moved[:, None])[:, 0]
 
 
 def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
@@ -171,11 +174,11 @@ def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int
     frames = frames_of(encoding)
     path = np.zeros((encoding.waypoints, 3))
     path[1:-1] = frames.rotate(encoding.decode(vector[None])[0, 1:-1])
-    chosen, legs = _moved(data, frames, path, _AROUND, rounds, scale * np.array(FIRST_MOVES), LAST_SHRINK)
+    chosen, legs = _move(data, frames, path, _NEIGHBOURS, rounds, scale * np.array(FIRST_MOVES), LAST_SHRINK)
     return np.clip(chosen[1:-1].ravel(), encoding.lower, encoding.upper), math.ceil(legs / (encoding.waypoints - 1))
 
 
-def _moved(
+def _move(
     data: ProblemArrays,
     frames: WaypointFrames,
     chosen: Floats,
@@ -204,13 +207,13 @@ def _pick(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tu
     """Chosen candidates (w, 3) in their frames, with fixed ends; number of legs evaluated."""
     count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.
-    for end, place, inner in ((0, data.start, 0), (-1, data.destination, count - 1)):
-        candidates[end] = frames.rotate(np.tile(place, (count, 1)))[inner]
-    chosen, legs = _choose(data, np.ascontiguousarray(_restored(frames, candidates)))
+    for end, point, inner in ((0, data.start, 0), (-1, data.destination, count - 1)):
+        candidates[end] = frames.rotate(np.tile(point, (count, 1)))[inner]
+    chosen, legs = _choose(data, np.ascontiguousarray(_restore(frames, candidates)))
     return candidates[np.arange(len(candidates)), chosen], int(legs)
 
 
-def _restored(frames: WaypointFrames, candidates: Floats) -> Floats:
+def _restore(frames: WaypointFrames, candidates: Floats) -> Floats:
     """World positions of candidates (w, c, 3), those of the ends in the frame of the waypoint next to each."""
     rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
     east, north, cosine, sine = (values[rows] for values in frames[:4])

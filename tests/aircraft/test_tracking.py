@@ -10,10 +10,10 @@ from aircraft.tracking import (
     TURNS,
     TrackingError,
     air_density_factor,
-    corner_room,
+    corner_deviation,
     corridor_half_width,
-    faster_by,
     no_tracking,
+    true_airspeed_excess,
 )
 
 
@@ -29,21 +29,21 @@ def error_of(**numbers: float) -> TrackingError:
 @pytest.mark.parametrize("speed", [15.0, 22.0, 31.0, 45.0])
 def test_what_is_linear_is_found_between_the_knots(turn_deg: float, speed: float) -> None:
     turn = math.radians(turn_deg)
-    room = corner_room(error_of().record, turn, speed)
-    assert room == pytest.approx((10.0 * turn + speed - 15.0, 3.0 * turn, 7.0 * turn))
+    deviation = corner_deviation(error_of().record, turn, speed)
+    assert deviation == pytest.approx((10.0 * turn + speed - 15.0, 3.0 * turn, 7.0 * turn))
     assert error_of().corner_acceptance(turn, speed) == pytest.approx(40.0 * turn)
 
 
 def test_outside_the_tables_their_edges_count() -> None:
     record, most = error_of().record, math.radians(150.0)
-    assert corner_room(record, math.pi, 60.0) == pytest.approx((10.0 * most + 30.0, 3.0 * most, 7.0 * most))
-    assert corner_room(record, 0.5, 5.0)[0] == pytest.approx(5.0)
+    assert corner_deviation(record, math.pi, 60.0) == pytest.approx((10.0 * most + 30.0, 3.0 * most, 7.0 * most))
+    assert corner_deviation(record, 0.5, 5.0)[0] == pytest.approx(5.0)
 
 
 def test_an_exact_autopilot_has_nothing_to_leave_room_for() -> None:
     record = no_tracking()
-    assert not record.strays
-    assert error_of().record.strays
+    assert not record.has_error
+    assert error_of().record.has_error
     with pytest.raises(ValueError, match="read-only"):
         error_of().record.lag = 1.0
 
@@ -52,7 +52,7 @@ def test_an_exact_autopilot_has_nothing_to_leave_room_for() -> None:
 def test_true_airspeed_grows_with_height(amsl: float, factor: float) -> None:
     """The standard atmosphere's density ratios at 1, 2 and 4 km are 0.9075, 0.8217 and 0.6689 (ICAO Doc 7488)."""
     assert air_density_factor(amsl) == pytest.approx(factor, rel=0.006)
-    assert faster_by(error_of().record, amsl) == pytest.approx(25.0 * (factor - 1.0), abs=0.15)
+    assert true_airspeed_excess(error_of().record, amsl) == pytest.approx(25.0 * (factor - 1.0), abs=0.15)
 
 
 # ----------------------------------------------------------------------

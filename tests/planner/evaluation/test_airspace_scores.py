@@ -21,7 +21,7 @@ from planner.evaluation.problem import (
 )
 from planner.plan import Certificate, Violation
 from planner.search.plan_path import plan_path
-from tests.planner.straying import straying
+from tests.planner.tracking_limits import with_tracking_error
 from world.scenario import Scenario
 
 Made = Callable[..., Problem]
@@ -34,7 +34,7 @@ def made(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limit
     def problem(numbers: dict[str, float] | None = None, **tables: Any) -> Problem:
         scenario = small(**({"terrain": {"kind": "flat", "amsl_m": 0}, "threats": []} | tables))
         limits = make_limits(scenario)
-        return make_problem(scenario, limits if numbers is None else straying(limits, **numbers))
+        return make_problem(scenario, limits if numbers is None else with_tracking_error(limits, **numbers))
 
     return problem
 
@@ -73,7 +73,7 @@ def test_a_zone_inside_a_turn_is_what_the_arc_comes_near(made: Made) -> None:
     result = certificate(problem, TURNED)
     assert result.problems[0].startswith("turn at waypoint 1")
     legs = [piece for piece in airspace_pieces(problem.certified, TURNED) if not piece["of_corner"]]
-    assert all(piece["zones"]["kept"] for piece in legs)
+    assert all(piece["zones"]["satisfied"] for piece in legs)
 
 
 @pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
@@ -136,7 +136,7 @@ def make_arrays(small: Callable[..., Scenario], make_limits: Callable[[Scenario]
         ground = {"terrain": {"kind": "flat", "amsl_m": 0}, "threats": []}
         scenario = small(**(ground | tables))
         limits = make_limits(scenario)
-        return make_problem(scenario, limits if numbers is None else straying(limits, **numbers)).search
+        return make_problem(scenario, limits if numbers is None else with_tracking_error(limits, **numbers)).search
 
     return arrays
 

@@ -14,12 +14,12 @@ from planner.evaluation.certify_kernels import (
     heights_above_ground,
     leg_slope_limits,
     missile_distance,
-    strayed_pieces,
+    tracked_pieces,
     turn_and_roll_lengths,
     with_courses,
 )
 from planner.evaluation.problem import ANGLE_MARGIN, BUFFER_GROWTH, ProblemArrays, make_problem
-from tests.planner.straying import straying
+from tests.planner.tracking_limits import with_tracking_error
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -36,14 +36,14 @@ CLIMB = CORNER + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 100.0], [0.0, 0.0, 100.0]
 def make(small: Callable[..., Scenario], make_limits: Make) -> Callable[..., ProblemArrays]:
     def made(numbers: dict[str, float], **tables: Any) -> ProblemArrays:
         scenario = small(**({"terrain": FLAT, "threats": []} | tables))
-        return make_problem(scenario, straying(make_limits(scenario), **numbers)).certified
+        return make_problem(scenario, with_tracking_error(make_limits(scenario), **numbers)).certified
 
     return made
 
 
 def test_pieces_follow_each_leg_and_both_sides_of_a_corner(make: Callable[..., ProblemArrays]) -> None:
     ends = {"east_m": 2000, "north_m": 1500, "amsl_m": 150}
-    pieces = strayed_pieces(make({"across": 4.0, "lag": 3.0, "before": 150.0}, destination=ends), CORNER)
+    pieces = tracked_pieces(make({"across": 4.0, "lag": 3.0, "before": 150.0}, destination=ends), CORNER)
     along = pieces[~pieces["of_corner"]]
     for leg in range(2):
         own = along[along["number"] == leg]
@@ -54,10 +54,10 @@ def test_pieces_follow_each_leg_and_both_sides_of_a_corner(make: Callable[..., P
     assert about["begin"][0] == pytest.approx([1850.0, 0.0, 150.0])
     assert about["end"][1] == pytest.approx([2000.0, 200.0, 150.0])
     # 20 m at a right angle, and 4 m as on a straight leg; nothing where the plan is fixed.
-    assert about["beside"] == pytest.approx([24.0, 24.0])
-    assert along["beside_begin"][0] == 0.0
-    assert along["beside_begin"][1:-1] == pytest.approx(4.0, abs=4.0)
-    assert along["beside_end"][-1] == 0.0
+    assert about["lateral"] == pytest.approx([24.0, 24.0])
+    assert along["lateral_begin"][0] == 0.0
+    assert along["lateral_begin"][1:-1] == pytest.approx(4.0, abs=4.0)
+    assert along["lateral_end"][-1] == 0.0
 
 
 def test_missiles_are_nearer_by_what_it_strays(make: Callable[..., ProblemArrays]) -> None:

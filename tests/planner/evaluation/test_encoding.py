@@ -17,7 +17,7 @@ from planner.evaluation.encoding import (
     rotated,
     rotated_frame,
     rotated_vectors,
-    spread_over,
+    sample_route,
     straight_frames,
 )
 from world.geometry import leg_slopes, path_length, turning_angles
@@ -62,7 +62,7 @@ def test_a_piece_without_length_has_the_course_of_the_piece_before_it() -> None:
 @pytest.mark.parametrize("count", [2, 7])
 def test_points_are_spread_at_even_steps_on_the_map(count: int) -> None:
     climbing = np.column_stack([ROUTE, [0.0, 900.0, 0.0, 200.0]])
-    points, along = spread_over(climbing, count)
+    points, along = sample_route(climbing, count)
     np.testing.assert_allclose(along, np.linspace(0.0, 350.0, count))
     np.testing.assert_allclose(points[[0, -1]], climbing[[0, -1]])
     if count == 7:

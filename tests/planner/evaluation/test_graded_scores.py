@@ -12,7 +12,7 @@ from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_KILL_MARGIN, Problem, ProblemArrays, make_problem
 from planner.plan import Objective, Violation
-from tests.planner.straying import straying
+from tests.planner.tracking_limits import with_tracking_error
 from world.frames import polymap
 from world.scenario import Scenario
 
@@ -59,7 +59,7 @@ def strayed(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Li
             "start": {"east_m": 0, "north_m": 0, "amsl_m": 200},
         }
         scenario = small(**(ground | ends | tables))
-        return make_problem(scenario, straying(make_limits(scenario), **numbers)).search
+        return make_problem(scenario, with_tracking_error(make_limits(scenario), **numbers)).search
 
     return made
 

@@ -13,10 +13,10 @@ from planner.evaluation.leg_constraints import (
     BLOCK,
     BLOCK_SCRATCH,
     clear_sums,
-    copy_place,
+    copy_point,
     divide_legs,
     load_waypoints,
-    subtract_places,
+    subtract_points,
 )
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import ANGLE_MARGIN, Problem, make_problem
@@ -55,14 +55,14 @@ def test_all_sums_begin_with_nothing(block: Any) -> None:
 
 def test_places_are_copied_for_the_paths_that_there_are(block: Any) -> None:
     begin, end = columns(block.begin), columns(block.end)
-    copy_place(block.end, block.begin, SIZE)
+    copy_point(block.end, block.begin, SIZE)
     np.testing.assert_array_equal(columns(block.begin)[:, :SIZE], end[:, :SIZE])
     np.testing.assert_array_equal(columns(block.begin)[:, SIZE:], begin[:, SIZE:])
 
 
 def test_a_step_leads_from_begin_to_end(block: Any) -> None:
     wanted, kept = columns(block.end) - columns(block.begin), columns(block.step)
-    subtract_places(block.end, block.begin, SIZE, block.step)
+    subtract_points(block.end, block.begin, SIZE, block.step)
     np.testing.assert_array_equal(columns(block.step)[:, :SIZE], wanted[:, :SIZE])
     np.testing.assert_array_equal(columns(block.step)[:, SIZE:], kept[:, SIZE:])
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits, downwind
 from planner.evaluation.corners import LEG, measure_legs
 from planner.evaluation.problem import SlopeBounds, make_problem, required_clearance
-from planner.evaluation.terrain_clearance import HEIGHT_LAG, below_at, measure_lags, terrain_excess
-from tests.planner.straying import straying
+from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags, terrain_excess
+from tests.planner.tracking_limits import with_tracking_error
 from world.scenario import Scenario
 from world.terrain import TILE, steepest_slopes
 
@@ -140,15 +140,15 @@ def test_height_follows_late(small: Callable[..., Scenario], make_limits: Make, 
     """25 m/s north, with a wind along: within half a metre of the lag, and of its most and least, everywhere."""
     blowing = {"speed_mps": abs(wind), "from_deg": 180.0 if wind > 0.0 else 0.0}
     scenario = small(wind=blowing)
-    limits = straying(make_limits(scenario), lag=3.0, step=15.0)
+    limits = with_tracking_error(make_limits(scenario), lag=3.0, step=15.0)
     path = path_of(RUNS, RISES)
     lags = lags_of(limits, scenario, path)
     for lag, below in zip(lags, stepped(path, 25.0 * 1.016 + wind, 3.0, 15.0), strict=True):
         shares = np.linspace(0.0, 1.0, below.size, endpoint=False)
-        got = np.array([below_at(lag, share) for share in shares])
+        got = np.array([lag_at(lag, share) for share in shares])
         assert got == pytest.approx(below, abs=0.7)
-        assert lag["most"] >= max(0.0, got.max()) - 1e-9
-        assert lag["least"] <= min(0.0, got.min()) + 1e-9
+        assert lag["max_below"] >= max(0.0, got.max()) - 1e-9
+        assert lag["min_below"] <= min(0.0, got.min()) + 1e-9
 
 
 def test_a_steady_climb_is_lag_times_climb_rate_low(small: Callable[..., Scenario], make_limits: Make) -> None:
@@ -156,9 +156,9 @@ def test_a_steady_climb_is_lag_times_climb_rate_low(small: Callable[..., Scenari
     scenario = small()
     path = path_of((3000.0,), (300.0,))
     for seconds, low in ((3.0, 7.5), (1.0, 2.5)):
-        lag = lags_of(straying(make_limits(scenario), lag=seconds), scenario, path)[0]
-        assert below_at(lag, 1.0) == pytest.approx(low * 1.015, rel=0.01)
-        assert below_at(lag, 0.0) == pytest.approx(0.0, abs=1e-9)
+        lag = lags_of(with_tracking_error(make_limits(scenario), lag=seconds), scenario, path)[0]
+        assert lag_at(lag, 1.0) == pytest.approx(low * 1.015, rel=0.01)
+        assert lag_at(lag, 0.0) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(("rise", "flown_level"), [(-14.9, True), (-15.1, False)])
@@ -166,13 +166,15 @@ def test_a_small_change_of_height_is_flown_at_its_end(
     small: Callable[..., Scenario], make_limits: Make, rise: float, flown_level: bool
 ) -> None:
     scenario = small()
-    lag = lags_of(straying(make_limits(scenario), lag=3.0, step=15.0), scenario, path_of((2000.0,), (rise,)))[0]
+    lag = lags_of(
+        with_tracking_error(make_limits(scenario), lag=3.0, step=15.0), scenario, path_of((2000.0,), (rise,))
+    )[0]
     # Half way, 7.5 m below the leg; or a little above its slope.
-    assert below_at(lag, 0.5) == pytest.approx(7.45 if flown_level else -3.0 * 25.4 * 15.1 / 2000.0, abs=0.05)
+    assert lag_at(lag, 0.5) == pytest.approx(7.45 if flown_level else -3.0 * 25.4 * 15.1 / 2000.0, abs=0.05)
 
 
 def test_no_lag_is_no_difference(small: Callable[..., Scenario], make_limits: Make) -> None:
     scenario = small()
-    lags = lags_of(straying(make_limits(scenario), lag=0.0), scenario, path_of(RUNS, RISES))
-    assert np.abs([[below_at(lag, share) for share in (0.0, 0.5, 1.0)] for lag in lags]).max() < 1e-3
-    assert math.isclose(lags["most"].max(), 0.0, abs_tol=1e-3)
+    lags = lags_of(with_tracking_error(make_limits(scenario), lag=0.0), scenario, path_of(RUNS, RISES))
+    assert np.abs([[lag_at(lag, share) for share in (0.0, 0.5, 1.0)] for lag in lags]).max() < 1e-3
+    assert math.isclose(lags["max_below"].max(), 0.0, abs_tol=1e-3)

@@ -1,4 +1,4 @@
-"""Which zones close a way: a wall, a ring about an end, a floor to pass under, and a gap."""
+"""Zones that separate start and destination: a wall, a ring around an end, a floor to pass under, and a gap."""
 
 from collections.abc import Callable
 from typing import Any
@@ -67,14 +67,14 @@ def failed_plan(scenario: Scenario) -> Plan:
     return Plan(scenario, path, *counts, certificate, 1, "umda-seeded", 60, np.zeros((0, 3)))
 
 
-def test_what_blocks_names_the_zones(small: Callable[..., Scenario]) -> None:
+def test_separating_zones_are_named(small: Callable[..., Scenario]) -> None:
     closed = small(terrain=FLAT, threats=[], zones=[wall(-3000, 3000)])
     assert explain_failure(failed_plan(closed))[:2] == [
-        "zones close the whole way (gaps narrower than 47 m count as closed): wall",
-        "the best path does not keep to: wall",
+        "zones block every route (gaps narrower than 47 m count as closed): wall",
+        "the best path violates: wall",
     ]
     beside = small(terrain=FLAT, threats=[], zones=[wall(-3000, 2000), wall(2500, 2600, "other")])
-    assert explain_failure(failed_plan(beside))[0] == "the best path does not keep to: wall"
+    assert explain_failure(failed_plan(beside))[0] == "the best path violates: wall"
 
 
 def test_zones_entered_by_their_heights(small: Callable[..., Scenario]) -> None:
@@ -94,7 +94,7 @@ MakeLimits = Callable[[Scenario], Limits]
 Small = Callable[..., Scenario]
 
 
-@pytest.mark.parametrize(("more", "said"), [(0.5, []), (-0.5, ["0.5 m more than there is"])])
+@pytest.mark.parametrize(("more", "said"), [(0.5, []), (-0.5, ["0.5 m more than available"])])
 def test_a_band_of_the_limits(more: float, said: list[str], small: Small, make_limits: MakeLimits) -> None:
     limits = {"min_clearance_m": 145.0, "max_height_m": 145.0 + 2.0 * CERTIFIED_BUFFER + more}
     scenario = small(**GROUND, limits=limits)
@@ -144,23 +144,25 @@ def test_ground_clearance_and_reserve_against_the_ceiling(
     scenario = small(**tables)
     limits = make_limits(scenario)
     lines = explain_failure(plan_path(scenario, limits, seed=1, algorithm="umda"), limits)
-    assert any("the heights left are too narrow" in line and "reserve of 5.0 m" in line for line in lines) is said
-    assert not any("terrain closes the way" in line for line in lines)
+    assert any("too little height is left" in line and "margin of 5.0 m" in line for line in lines) is said
+    assert not any("terrain blocks every route" in line for line in lines)
 
 
 # ----------------------------------------------------------------------
 # Why no path was found is named.
 
 
-def test_what_blocks_a_way_is_named(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> None:
+def test_obstacles_that_block_every_route_are_named(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
     hills = [{"east_m": 3000, "north_m": n, "height_m": 600, "sigma_m": 300} for n in range(-4000, 4001, 400)]
     table = {"waypoints": 6, "population": 20, "generations": 3}
     walled = small(terrain={"kind": "peaks", "peak": hills}, planner=table)
     plan = plan_path(walled, make_limits(walled), seed=1)
     assert not plan.feasible
     lines = explain_failure(plan)
-    assert "terrain closes the way" in lines[0]
+    assert "terrain blocks every route" in lines[0]
     assert "ceiling is 450 m" in lines[0]
-    assert "turn back, or go round to climb, were looked for" in lines[-1]
+    assert "turn back or circle to climb were searched" in lines[-1]
     alone = plan_path(walled, make_limits(walled), seed=1, algorithm="umda")
-    assert "a way that must turn back was not looked for" in explain_failure(alone)[-1]
+    assert "a route that must turn back was not searched" in explain_failure(alone)[-1]

@@ -96,5 +96,5 @@ def test_a_zone_that_comes_up_is_kept_out_of_and_a_leg_that_begins_in_it_is_refu
     legs = [np.linspace(*plan.waypoints[i : i + 2], 2000) for i in range(2, len(plan.waypoints) - 1)]
     assert np.linalg.norm(np.concatenate(legs)[:, :2] - middle[:2], axis=1).min() > 400.0
     here = dataclasses.replace(old.scenario, zones=(Zone("fire", "exclusion", Cylinder(*old.waypoints[3, :2], 50.0)),))
-    with pytest.raises(MissionError, match="leg 3: waypoint 3, where it begins, does not keep to fire"):
+    with pytest.raises(MissionError, match="leg 3: waypoint 3, where it begins, violates fire"):
         replan(here, limits, old, 3, seed=1)

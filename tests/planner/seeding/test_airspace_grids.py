@@ -10,9 +10,9 @@ from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_ZONE_MARGIN, ProblemArrays, make_problem
 from planner.seeding.airspace_grids import (
-    FEWEST_LAYERS,
     FINER,
-    MOST_CELLS,
+    MAX_CELLS,
+    MIN_LAYERS,
     SLOPE_SHARE,
     AirspaceGrid,
     airspace_grid,
@@ -167,7 +167,7 @@ def test_layers_follow_the_ground_where_there_is_a_greatest_height(
     data = arrays(small, make_limits, limits={"min_clearance_m": 60, "max_height_m": 200})
     grid = airspace_grid(data, rotated_frame(data.start, data.destination), SPAN, 60)
     assert grid.follows
-    assert grid.layers >= FEWEST_LAYERS
+    assert grid.layers >= MIN_LAYERS
     # The layers reach from what is cleared to what is not exceeded, and further where an end leaves more.
     assert (grid.layers - 1) * grid.pitch >= 200.0 - data.airspace.buffer - 60.0 - data.buffer
     assert 0.0 in grid.across
@@ -184,7 +184,7 @@ def test_layers_lie_level_without_one_and_the_grid_is_not_too_large(
     assert grid.floor + (grid.layers - 1) * grid.pitch <= data.ceiling
     large = airspace_grid(data, frame, SPAN, 5000)
     assert large.stages < 5000
-    assert (large.stages + 1) * large.across.size * large.layers <= MOST_CELLS
+    assert (large.stages + 1) * large.across.size * large.layers <= MAX_CELLS
 
 
 def test_routes_of_one_grid_take_both_sides(

@@ -21,14 +21,14 @@ from planner.seeding.grids import (
     Grid,
     Records,
     cheapest_route,
+    distance_to_goal,
     find_obstacles,
     grid_route,
     make_grid,
     position_of,
     relax,
-    set_prices,
+    set_cell_costs,
     trace_back,
-    way_ahead,
 )
 from world.scenario import Scenario
 
@@ -52,7 +52,7 @@ def prices(data: ProblemArrays, grid: Grid, stage: int, *, without_threats: bool
         obstacles = np.zeros(0, dtype=OBSTACLE)
     out = np.full((grid.layers.size, grid.across.size), -1.0)
     more = np.full((grid.stages + 1, grid.across.size), extra)
-    set_prices(data, required_clearance(data), frame, stage, obstacles, grid, more, 0, grid.across.size - 1, out)
+    set_cell_costs(data, required_clearance(data), frame, stage, obstacles, grid, more, 0, grid.across.size - 1, out)
     return out
 
 
@@ -198,7 +198,7 @@ def test_a_step_climbs_and_sinks_no_more_than_the_limits_allow(
 def test_the_way_ahead_is_the_shortest_of_all_ways(left: int) -> None:
     columns, home, step = 9, 3, 50.0
     out = np.empty(columns)
-    way_ahead(columns, home, left, step, 1.0, out)
+    distance_to_goal(columns, home, left, step, 1.0, out)
     for y in range(columns):
         ways = itertools.product(range(-SIDEWAYS, SIDEWAYS + 1), repeat=left)
         lengths = [sum(step * math.hypot(1.0, side) for side in way) for way in ways if y + sum(way) == home]
@@ -207,26 +207,26 @@ def test_the_way_ahead_is_the_shortest_of_all_ways(left: int) -> None:
 
 def test_a_move_is_taken_only_where_it_is_cheaper() -> None:
     cost, price = np.array([10.0, 10.0, math.inf, 10.0]), np.array([1.0, 2.0, 1.0, math.inf])
-    after, came = np.array([15.1, 19.9, 30.0, math.inf]), np.full(4, -1, dtype=np.int32)
-    relax(cost, price, after, came, 0, 0, 0, 4, 5.0)
+    after, parents = np.array([15.1, 19.9, 30.0, math.inf]), np.full(4, -1, dtype=np.int32)
+    relax(cost, price, after, parents, 0, 0, 0, 4, 5.0)
     assert after.tolist() == [15.0, 19.9, 30.0, math.inf]
-    assert came.tolist() == [0, -1, -1, -1]
+    assert parents.tolist() == [0, -1, -1, -1]
     # From cells one place to the left.
-    relax(cost, price, after, came, 0, 1, 1, 1, 4.0)
+    relax(cost, price, after, parents, 0, 1, 1, 1, 4.0)
     assert after[1] == 18.0
-    assert came[1] == 0
+    assert parents[1] == 0
     # Back from the second cell to the third, at the second's price.
-    relax(cost, price, after, came, 1, 2, 1, 1, 4.0)
+    relax(cost, price, after, parents, 1, 2, 1, 1, 4.0)
     assert after[2] == 18.0
-    assert came[2] == 1
+    assert parents[2] == 1
 
 
 def test_a_route_is_traced_back_from_its_end() -> None:
     # Two layers of three cells: (layer 1, across 2) is cell 5.
-    came = np.full((3, 2, 3), -9, dtype=np.int32)
-    came[2, 0, 1] = 5
-    came[1, 1, 2] = 0
-    cells = trace_back(came, 0, 1)
+    parents = np.full((3, 2, 3), -9, dtype=np.int32)
+    parents[2, 0, 1] = 5
+    parents[1, 1, 2] = 0
+    cells = trace_back(parents, 0, 1)
     assert cells.dtype == ROUTE_CELL
     assert cells["layer"].tolist() == [0, 1, 0]
     assert cells["across"].tolist() == [0, 2, 1]

@@ -13,13 +13,13 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding import lattice as lattice_module
 from planner.seeding.lattice import (
-    LEAST_STEP,
-    MOST_LATTICE,
+    MAX_LATTICE_STATES,
+    MIN_STEP,
     Lattice,
     cheapest_lattice_route,
     lattice_route,
     make_lattice,
-    pulled_taut,
+    simplify_route,
     turning_step,
 )
 from world.kernels import Records
@@ -106,8 +106,8 @@ def test_a_route_is_pulled_taut_as_far_as_it_stays_free(make_data: MakeData) -> 
     missile = {"east_m": 1500, "north_m": 0, "amsl_m": 150, "kill_radius_m": 400, "kill_scale_m": 50}
     corners = np.array([[0.0, 0.0], [500.0, 500.0], [1000.0, 500.0], [1500.0, 500.0], [2000.0, 500.0], [3000.0, 0.0]])
     points = np.column_stack([corners, np.full(6, 150.0)])
-    assert len(pulled_taut(make_data([]), points)) == 2
-    taut = pulled_taut(make_data([missile]), points)
+    assert len(simplify_route(make_data([]), points)) == 2
+    taut = simplify_route(make_data([missile]), points)
     assert 2 < len(taut) < 6
     np.testing.assert_array_equal(taut[[0, -1]], points[[0, -1]])
     # 15 m are kept from the sphere.
@@ -165,7 +165,7 @@ def test_a_lattice_covers_the_map_and_stands_on_both_ends(pocket: Problem, step:
 def test_a_lattice_that_would_be_too_large_has_longer_steps(pocket: Problem) -> None:
     data = pocket.search
     lattice = make_lattice(data, rotated_frame(data.start, data.destination), 20.0)
-    assert lattice.along * lattice.across * lattice.layers * 8 <= MOST_LATTICE
+    assert lattice.along * lattice.across * lattice.layers * 8 <= MAX_LATTICE_STATES
     assert lattice.step > 20.0
 
 
@@ -173,7 +173,7 @@ def test_a_step_holds_two_right_angles(pocket: Problem) -> None:
     data = pocket.search
     step = turning_step(data)
     if not data.legs_hold_turns:
-        assert step == LEAST_STEP
+        assert step == MIN_STEP
         return
     square = np.array([[0.0, 0.0, 0.0], [step, 0.0, 0.0], [step, step, 0.0], [0.0, step, 0.0]]) + data.start
     turns, rolls = turn_and_roll_lengths(data, square)

@@ -14,13 +14,13 @@ from planner.evaluation.problem import make_problem
 from planner.search.plan_path import plan_path
 from planner.seeding import shortening
 from planner.seeding.shortening import (
-    LONGEST_STEP,
-    MOST_MODELS,
+    MAX_MODELS,
+    MAX_STEP,
     ROUNDS,
     STEPS,
     begin_shortening,
-    evenly,
-    shorten_on,
+    continue_shortening,
+    resample,
     shorten_path,
 )
 from world.geometry import path_length
@@ -31,8 +31,8 @@ Floats = NDArray[np.float64]
 
 def test_waypoints_stay_on_the_map_and_between_floor_and_ceiling() -> None:
     data = make_task("hard-60").problem.search._replace(ceiling=520.0, east=9700.0)
-    start = evenly(np.array([data.start, [9650.0, 3000.0, 515.0], data.destination]), 14)
-    path = shorten_on(data, begin_shortening(data, start, 10, 0.0), 0.0, ROUNDS).path
+    start = resample(np.array([data.start, [9650.0, 3000.0, 515.0], data.destination]), 14)
+    path = continue_shortening(data, begin_shortening(data, start, 10, 0.0), 0.0, ROUNDS).path
     assert path[:, 2].max() <= 520.0
     assert path[:, 0].max() <= 9700.0
     np.testing.assert_array_equal(path[[0, -1]], start[[0, -1]])
@@ -40,18 +40,18 @@ def test_waypoints_stay_on_the_map_and_between_floor_and_ceiling() -> None:
 
 def test_no_round_moves_a_waypoint_further_than_its_steps() -> None:
     data = make_task("hard-60").problem.search
-    start = evenly(np.array([data.start, [2000.0, 8000.0, 590.0], data.destination]), 20)
+    start = resample(np.array([data.start, [2000.0, 8000.0, 590.0], data.destination]), 20)
     under_way = begin_shortening(data, start, 10, 0.0)
     before = under_way.path.copy()
     for _ in range(ROUNDS):
-        under_way = shorten_on(data, under_way, 0.0, 1)
+        under_way = continue_shortening(data, under_way, 0.0, 1)
         moved = float(np.abs(under_way.path - before).max())
-        assert moved <= STEPS * LONGEST_STEP + 1e-9
+        assert moved <= STEPS * MAX_STEP + 1e-9
         assert moved > 1.0 or under_way.rounds > 1
         before = under_way.path.copy()
     assert under_way.rounds == ROUNDS
     # Nothing is left to do.
-    np.testing.assert_array_equal(shorten_on(data, under_way, 0.0, ROUNDS).path, before)
+    np.testing.assert_array_equal(continue_shortening(data, under_way, 0.0, ROUNDS).path, before)
 
 
 # ----------------------------------------------------------------------
@@ -72,7 +72,7 @@ def test_it_is_as_short_as_slsqp_makes_it(name: str) -> None:
     assert is_safe(task.certificate(path))
     assert task.length_ratio(path) < task.length_ratio(start) - 0.001
     assert task.length_ratio(path) < 1.001 * task.length_ratio(theirs)
-    assert 10 < models <= MOST_MODELS
+    assert 10 < models <= MAX_MODELS
 
 
 def test_a_string_about_a_sphere(make_limits: Callable[[Scenario], Limits], small: Callable[..., Scenario]) -> None:
@@ -118,7 +118,7 @@ def test_many_missiles_are_looked_at_in_slices_with_the_same_result(monkeypatch:
 
 def test_points_at_equal_distances_lie_on_the_way() -> None:
     way = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 100.0, 50.0]])
-    points = evenly(way, 30)
+    points = resample(way, 30)
     steps = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1))
     assert len(points) == 30
     # One step cuts the corner.

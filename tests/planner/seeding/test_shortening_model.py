@@ -1,4 +1,4 @@
-"""What binds a path: the missiles near it by NumPy, and what is carried from one round to the next."""
+"""What binds a path: the missiles near it by NumPy, and what is carry_multipliers from one round to the next."""
 
 import numpy as np
 import pytest
@@ -6,32 +6,32 @@ import pytest
 from benchmarks.task import make_task
 from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import ProblemArrays, make_problem
-from planner.seeding.shortening import evenly
+from planner.seeding.shortening import resample
 from planner.seeding.shortening_model import (
     BAND,
     NEAR,
-    Bindings,
+    ActiveConstraints,
     LagrangianModel,
-    bindings,
-    carried,
-    constraints_of,
+    active_constraints,
+    carry_multipliers,
+    constraint_count,
     lagrangian,
 )
 from world.scenario import load_scenario
 
 
-def bound_of(north: float = 0.0) -> tuple[np.ndarray, Bindings]:
+def bound_of(north: float = 0.0) -> tuple[np.ndarray, ActiveConstraints]:
     data = make_task("hard-60").problem.search
-    path = evenly(np.array([data.start, data.destination]), 8)
+    path = resample(np.array([data.start, data.destination]), 8)
     path[1:-1, 1] += north
-    return path, bindings(data, path, 5, 0.0)
+    return path, active_constraints(data, path, 5, 0.0)
 
 
 def test_the_missiles_near_each_leg_are_those_within_reach_of_it() -> None:
-    path, bound = bound_of()
+    path, active = bound_of()
     data = make_task("hard-60").problem.search
     shares = np.linspace(0.0, 1.0, 2001)[:, None]
-    pairs = {(int(leg), int(missile)) for leg, missile in bound.pairs}
+    pairs = {(int(leg), int(missile)) for leg, missile in active.pairs}
     for k, missile in enumerate(data.missiles.missiles):
         place = np.array([missile["east"], missile["north"], missile["up"]])
         for i in range(len(path) - 1):
@@ -43,32 +43,32 @@ def test_the_missiles_near_each_leg_are_those_within_reach_of_it() -> None:
 
 
 def test_limits_of_slopes_and_what_is_wanted_are_the_problems_own() -> None:
-    _, bound = bound_of()
+    _, active = bound_of()
     data = make_task("hard-60").problem.search
-    np.testing.assert_allclose(bound.climb, np.tan(np.radians(19.5)))
-    np.testing.assert_allclose(bound.dive, np.tan(np.radians(24.5)))
-    np.testing.assert_allclose(bound.wide, data.missiles.missiles["radius"][bound.pairs[:, 1]] + 15.0)
-    assert not bound.turns_in_legs
-    assert constraints_of(bound) == len(bound.pairs) + 7 * (5 + 4) + 8
+    np.testing.assert_allclose(active.climb, np.tan(np.radians(19.5)))
+    np.testing.assert_allclose(active.dive, np.tan(np.radians(24.5)))
+    np.testing.assert_allclose(active.distances, data.missiles.missiles["radius"][active.pairs[:, 1]] + 15.0)
+    assert not active.turns_in_legs
+    assert constraint_count(active) == len(active.pairs) + 7 * (5 + 4) + 8
 
 
 def test_turns_take_of_the_legs_what_a_corner_of_that_turn_takes() -> None:
     """Over the tangent of half the turn it is about the arc's radius: v^2 / g tan(bank), without wind or autopilot."""
     task = make_task("jacksboro")
     data = task.problem.search
-    path = evenly(np.array([data.start, data.destination]), 8)
+    path = resample(np.array([data.start, data.destination]), 8)
     path[3, 0] += 400.0
-    bound = bindings(data, path, 5, 0.0)
-    assert bound.turns_in_legs
-    assert np.ptp(bound.before[1:-1]) < 0.5 * bound.before[1:-1].max()
-    np.testing.assert_allclose(bound.before[1:-1], bound.after[1:-1])
-    assert (bound.before[1:-1] > 30.0).all()
+    active = active_constraints(data, path, 5, 0.0)
+    assert active.turns_in_legs
+    assert np.ptp(active.before[1:-1]) < 0.5 * active.before[1:-1].max()
+    np.testing.assert_allclose(active.before[1:-1], active.after[1:-1])
+    assert (active.before[1:-1] > 30.0).all()
 
 
 def test_multipliers_stay_with_their_leg_and_missile() -> None:
     (_, old), (_, new) = bound_of(), bound_of(150.0)
-    multipliers = np.arange(constraints_of(old)) + 1.0
-    kept = carried(old, multipliers, new)
+    multipliers = np.arange(constraint_count(old)) + 1.0
+    kept = carry_multipliers(old, multipliers, new)
     by_pair = {tuple(pair): multipliers[k] for k, pair in enumerate(old.pairs.tolist())}
     assert {tuple(pair) for pair in new.pairs.tolist()} - set(by_pair)
     for k, pair in enumerate(new.pairs.tolist()):
@@ -82,7 +82,7 @@ def test_multipliers_stay_with_their_leg_and_missile() -> None:
 
 def zigzag(data: ProblemArrays, share: float, waypoints: int = 9) -> np.ndarray:
     """A path that breaks everything: through ground and spheres, too steep, too sharp."""
-    path = evenly(np.array([data.start, data.destination]), waypoints)
+    path = resample(np.array([data.start, data.destination]), waypoints)
     rng = np.random.default_rng(5)
     path[1:-1] += share * rng.normal(0.0, [1500.0, 1500.0, 500.0], (waypoints - 2, 3))
     return path
@@ -93,17 +93,17 @@ def test_the_gradient_is_that_of_the_augmented_length(name: str) -> None:
     data = make_task(name).problem.search
     assert data.legs_hold_turns == (name == "jacksboro")
     path, limits = zigzag(data, 1.0 if name == "hard-60" else 0.3), precompute_limits(data)
-    bound = bindings(data, path, 8, 0.5)
+    active = active_constraints(data, path, 8, 0.5)
     # As if turns took far more of their legs: then these are too short.
-    bound = bound._replace(before=40.0 * bound.before, after=40.0 * bound.after)
-    count, size = constraints_of(bound), 3 * (len(path) - 2)
+    active = active._replace(before=40.0 * active.before, after=40.0 * active.after)
+    count, size = constraint_count(active), 3 * (len(path) - 2)
     multipliers = np.random.default_rng(6).uniform(0.0, 1.0, count)
     values, model = np.zeros(count), LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3)))
 
     def value(change: np.ndarray) -> float:
         moved = path.copy()
         moved[1:-1] += change.reshape(-1, 3)
-        return float(lagrangian(data, limits, bound, moved, multipliers, values, 0.3, model))
+        return float(lagrangian(data, limits, active, moved, multipliers, values, 0.3, model))
 
     differences = np.zeros(size)
     for row in range(size):
@@ -116,7 +116,7 @@ def test_the_gradient_is_that_of_the_augmented_length(name: str) -> None:
     assert near.all()
     assert np.corrcoef(model.gradient, differences)[0, 1] > 0.999
     # Every kind of constraint is broken somewhere.
-    pairs, legs = len(bound.pairs), len(path) - 1
+    pairs, legs = len(active.pairs), len(path) - 1
     ends = np.cumsum([pairs, legs * 8, 3 * legs, legs + 1, legs])
     kinds = np.split(values, ends[:-1])
     broken = [bool(kind.size > 0 and kind.min() < 0.0) for kind in kinds]
@@ -131,14 +131,14 @@ def test_the_hessian_of_the_length_is_that_of_its_gradient() -> None:
     path, limits = zigzag(data, 1.0, 6), precompute_limits(data)
     # High above all of it nothing but the length is left.
     path[:, 2] += 5000.0
-    bound = bindings(data, path, 4, 0.5)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
-    count, size = constraints_of(bound), 3 * (len(path) - 2)
+    active = active_constraints(data, path, 4, 0.5)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
+    count, size = constraint_count(active), 3 * (len(path) - 2)
     values, model = np.zeros(count), LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3)))
 
     def gradient(change: np.ndarray) -> np.ndarray:
         moved = path.copy()
         moved[1:-1] += change.reshape(-1, 3)
-        lagrangian(data, limits, bound, moved, np.zeros(count), values, 0.1, model)
+        lagrangian(data, limits, active, moved, np.zeros(count), values, 0.1, model)
         return model.gradient.copy()
 
     columns = [(gradient(0.01 * row) - gradient(-0.01 * row)) / 0.02 for row in np.eye(size)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
-from planner.seeding.waypoint_chains import open_places, waypoint_chains
+from planner.seeding.waypoint_chains import free_points, waypoint_chains
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -102,10 +102,10 @@ def test_open_places_are_on_the_map_above_the_ground_and_outside_spheres(problem
     unit, radius = scenario.threats.position[0], float(scenario.threats.kill_radius[0])
     keep = radius + data.kill_margin
     places = np.array([unit + (keep - 0.5) * UP, unit + (keep + 0.5) * UP, scenario.start])
-    assert open_places(data, places).tolist() == [False, True, True]
+    assert free_points(data, places).tolist() == [False, True, True]
     terrain = scenario.terrain
     assert terrain is not None
     east, north = float(scenario.start[0]) + 700.0, float(scenario.start[1])
     need = float(terrain.height(east, north)) + data.clearance + data.buffer
     places = np.array([[east, north, need - 0.1], [east, north, need + 0.1], [data.west - 1.0, north, need + 50.0]])
-    assert open_places(data, places).tolist() == [False, True, False]
+    assert free_points(data, places).tolist() == [False, True, False]

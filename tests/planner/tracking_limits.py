@@ -1,4 +1,4 @@
-"""An autopilot that strays from its legs by plain numbers."""
+"""Limits with the tracking error of an autopilot, from plain numbers."""
 
 import math
 from dataclasses import replace
@@ -9,7 +9,7 @@ from aircraft.path_limits import Limits
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 
 
-def straying(
+def with_tracking_error(
     limits: Limits, *, excursion: float = 20.0, before: float = 50.0, after: float = 200.0, **more: float
 ) -> Limits:
     """Limits with a tracking error that grows with the turn; the lengths (m) are those of a right angle."""
