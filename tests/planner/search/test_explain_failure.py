@@ -77,7 +77,7 @@ def test_separating_zones_are_named(small: Callable[..., Scenario]) -> None:
     assert explain_failure(failed_plan(beside))[0] == "the best path violates: wall"
 
 
-def test_zones_entered_by_their_heights(small: Callable[..., Scenario]) -> None:
+def test_zones_are_violated_by_their_heights(small: Callable[..., Scenario]) -> None:
     path = np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])
     fence = {"name": "fence", "kind": "inclusion", "polygon_m": [[-400, -90], [6400, -90], [6400, 90], [-400, 90]]}
     scenario = small(terrain=FLAT, threats=[], zones=[wall(-50, 50, floor_agl_m=151.0), fence])

@@ -102,7 +102,7 @@ def test_where_all_is_closed_there_is_no_way(make_data: MakeData) -> None:
     assert len(route_of(make_data(wall), lattice())) == 0
 
 
-def test_a_route_is_pulled_taut_as_far_as_it_stays_free(make_data: MakeData) -> None:
+def test_a_route_is_simplified_as_far_as_it_stays_free(make_data: MakeData) -> None:
     missile = {"east_m": 1500, "north_m": 0, "amsl_m": 150, "kill_radius_m": 400, "kill_scale_m": 50}
     corners = np.array([[0.0, 0.0], [500.0, 500.0], [1000.0, 500.0], [1500.0, 500.0], [2000.0, 500.0], [3000.0, 0.0]])
     points = np.column_stack([corners, np.full(6, 150.0)])

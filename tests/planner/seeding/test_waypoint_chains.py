@@ -97,7 +97,7 @@ def test_a_path_goes_round_a_missile(small: Callable[..., Scenario], make_limits
     assert chains.path_through(0, 0).tolist() == [0, 1, 0]
 
 
-def test_open_places_are_on_the_map_above_the_ground_and_outside_spheres(problem: Problem) -> None:
+def test_free_points_are_on_the_map_above_the_ground_and_outside_spheres(problem: Problem) -> None:
     data, scenario = problem.search, problem.scenario
     unit, radius = scenario.threats.position[0], float(scenario.threats.kill_radius[0])
     keep = radius + data.kill_margin
