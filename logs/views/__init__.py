@@ -1,1 +1,1 @@
-"""Figures of a plan, a flight and an aircraft, drawn with matplotlib."""
+"""What is shown of a flight: charts, pictures and pages from one description each, replays, and files for others."""

@@ -268,9 +268,9 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
         "chart_data": Markup(script_json(charts)),
         "threats": len(setup.scenario.threats),
         "moments": bool(flight["flights"]),
-        "timed": (*(name for name, view in views.items() if isinstance(view, Chart) and view.timed),)
-        if flight["flights"]
-        else (),
+        "timed": tuple(
+            name for name, view in views.items() if isinstance(view, Chart) and view.timed and flight["flights"]
+        ),
         "library": page_library(),
         "script": Markup(script),
         "script_digest": script_digest(script),

@@ -88,7 +88,7 @@ function labelTraces(labels, axes, theme, width, scale = 1) {
   const step = Math.max(1, Math.ceil(labels.length / (isNarrow(width) ? 15 : 40))), shown = labels.filter((_, k) => k % step === 0);
   return [{
     type: "scatter", mode: "markers+text", marker: { size: 10, color: theme.clear }, ...axes, x: shown.map((label) => label[1] * scale), y: shown.map((label) => label[2] * scale),
-    text: shown.map((label) => `<b>${plainName(label[0])}</b>`), textposition: "top right", showlegend: false, hoverinfo: "skip",
+    text: shown.map((label) => `<b>${plainName(label[0])}</b>`), textposition: shown.map((label) => (label[3] === "ink" ? "bottom center" : "top right")), showlegend: false, hoverinfo: "skip",
     textfont: { size: 11, color: shown.map((label) => theme.colour(label[3])) }, cliponaxis: false,
   }];
 }
