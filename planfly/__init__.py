@@ -9,14 +9,21 @@
     planfly.export(path, "mission.waypoints")
     planfly.report(flown, "report")
 
-plan, fly, plan_then_fly     make a path, fly a plan or a mission file, or both at once
-check, read_log              judge a log, a plan or a mission; read a log, its track as a table
-figures, report, compare     matplotlib figures; a page of a flight; two flights beside each other
-export                       a mission in the forms that ground stations and maps read
-campaign, winds              how likely it is to fly; the largest wind from each direction
-scenarios, aircraft          what is embedded
-optimise                     the planner's estimation of distribution algorithm alone, by ask and tell
-PlanflyError                 what bad input raises, with file, field, value and allowed; and its kinds
+plan, replan, what_blocks            make a path; plan again in flight; why there is no feasible path
+fly, plan_then_fly, run              fly a plan or a mission file; both at once; the whole chain into a folder
+check, judge, read_log               judge a log, a plan or a mission; read a log, its track as a table
+figures, report, compare             matplotlib figures; a page of a flight; two flights beside each other
+export, foxglove_layout              files for ground stations, maps and other programs
+timeline, instruments, movie         a flight again, from its log
+play_to_foxglove, play_to_stations   the same in other programs
+import_log, refly, recover           another program's log; its mission flown in JSBSim; a damaged log
+campaign, campaign_flight, winds     how likely it is to fly; the largest wind from each direction
+serve                                a MAVLink vehicle for ground stations
+scenarios, aircraft                  what is embedded
+describe_aircraft, new_aircraft      trims, modes and envelope; a folder for an aircraft of one's own
+paper_tables, optimise               the paper's section V; the planner's optimisers alone, by ask and tell
+progress                             have the progress of the calls reported
+PlanflyError                         what bad input raises, with file, field, value and allowed; and its kinds
 
 Paths are `str` or `pathlib.Path`.  The command line is ``planfly --help``.
 """
@@ -34,31 +41,61 @@ if TYPE_CHECKING:
     from logs.recording.reader import FlightLog as FlightLog
     from logs.recording.reader import read_log as read_log
     from logs.verdict.findings import Verdict as Verdict
+    from logs.views.replay.instruments import Instruments as Instruments
+    from logs.views.replay.timeline import TimelineEntry as TimelineEntry
     from logs.views.report.compare import Comparison as Comparison
-    from planfly.api.flying import ExportedFiles as ExportedFiles
+    from planfly.api.aircraft import AircraftNumbers as AircraftNumbers
+    from planfly.api.aircraft import aircraft as aircraft
+    from planfly.api.aircraft import describe_aircraft as describe_aircraft
+    from planfly.api.aircraft import new_aircraft as new_aircraft
+    from planfly.api.campaigns import CampaignFlight as CampaignFlight
+    from planfly.api.campaigns import campaign as campaign
+    from planfly.api.campaigns import campaign_flight as campaign_flight
+    from planfly.api.campaigns import winds as winds
+    from planfly.api.exporting import ExportedFiles as ExportedFiles
+    from planfly.api.exporting import export as export
     from planfly.api.flying import FlownMission as FlownMission
-    from planfly.api.flying import WrittenReport as WrittenReport
+    from planfly.api.flying import Judged as Judged
     from planfly.api.flying import check as check
     from planfly.api.flying import fly as fly
+    from planfly.api.flying import judge as judge
+    from planfly.api.flying import plan_then_fly as plan_then_fly
+    from planfly.api.imported import Reflown as Reflown
+    from planfly.api.imported import import_log as import_log
+    from planfly.api.imported import recover as recover
+    from planfly.api.imported import refly as refly
     from planfly.api.optimising import BestFound as BestFound
     from planfly.api.optimising import Optimiser as Optimiser
     from planfly.api.optimising import optimise as optimise
-    from planfly.api.planning import aircraft as aircraft
     from planfly.api.planning import plan as plan
-    from planfly.api.planning import plan_then_fly as plan_then_fly
+    from planfly.api.planning import replan as replan
     from planfly.api.planning import scenarios as scenarios
+    from planfly.api.planning import what_blocks as what_blocks
+    from planfly.api.replaying import instruments as instruments
+    from planfly.api.replaying import movie as movie
+    from planfly.api.replaying import play_to_foxglove as play_to_foxglove
+    from planfly.api.replaying import play_to_stations as play_to_stations
+    from planfly.api.replaying import timeline as timeline
+    from planfly.api.reporting import WrittenReport as WrittenReport
     from planfly.api.reporting import compare as compare
-    from planfly.api.reporting import export as export
     from planfly.api.reporting import figures as figures
+    from planfly.api.reporting import foxglove_layout as foxglove_layout
     from planfly.api.reporting import report as report
-    from planfly.api.wind_limits import winds as winds
+    from planfly.api.running import Round as Round
+    from planfly.api.running import RunResult as RunResult
+    from planfly.api.running import run as run
+    from planfly.api.serving import serve as serve
     from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
-    from planfly.campaigns.campaign_result import campaign as campaign
     from planfly.campaigns.dispersions import SpreadError as SpreadError
     from planfly.campaigns.find_winds import WindsFound as WindsFound
     from planfly.campaigns.worker_pool import SchedulerError as SchedulerError
+    from planfly.imported_flights import ImportedFlight as ImportedFlight
+    from planfly.paper import PaperTables as PaperTables
+    from planfly.paper import paper_tables as paper_tables
     from planfly.pipeline import PlanThenFly as PlanThenFly
+    from planfly.stages import progress as progress
     from planner.plan import Plan as Plan
+    from world.errors import ArgumentError as ArgumentError
     from world.errors import FlightError as FlightError
     from world.errors import LogError as LogError
     from world.errors import MissionError as MissionError
@@ -73,23 +110,97 @@ _HOMES = {
     name: module
     for module, names in {
         "flight.simulation.track": ("Track",),
-        "logs.recording.reader": ("FlightLog", "read_log"),
+        "logs.recording.reader": (
+            "FlightLog",
+            "read_log",
+        ),
+        "logs.views.replay.instruments": ("Instruments",),
+        "logs.views.replay.timeline": ("TimelineEntry",),
         "logs.views.report.compare": ("Comparison",),
         "logs.verdict.findings": ("Verdict",),
-        "planfly.api.flying": ("ExportedFiles", "FlownMission", "WrittenReport", "check", "fly"),
-        "planfly.api.optimising": ("BestFound", "Optimiser", "optimise"),
-        "planfly.api.planning": ("aircraft", "plan", "plan_then_fly", "scenarios"),
-        "planfly.api.reporting": ("compare", "export", "figures", "report"),
-        "planfly.api.wind_limits": ("winds",),
-        "planfly.campaigns.campaign_result": ("CampaignResult", "campaign"),
+        "planfly.api.aircraft": (
+            "AircraftNumbers",
+            "aircraft",
+            "describe_aircraft",
+            "new_aircraft",
+        ),
+        "planfly.api.campaigns": (
+            "CampaignFlight",
+            "campaign",
+            "campaign_flight",
+            "winds",
+        ),
+        "planfly.api.exporting": (
+            "ExportedFiles",
+            "export",
+        ),
+        "planfly.api.flying": (
+            "FlownMission",
+            "Judged",
+            "check",
+            "fly",
+            "judge",
+            "plan_then_fly",
+        ),
+        "planfly.api.imported": (
+            "Reflown",
+            "import_log",
+            "recover",
+            "refly",
+        ),
+        "planfly.api.optimising": (
+            "BestFound",
+            "Optimiser",
+            "optimise",
+        ),
+        "planfly.api.planning": (
+            "plan",
+            "replan",
+            "scenarios",
+            "what_blocks",
+        ),
+        "planfly.api.replaying": (
+            "instruments",
+            "movie",
+            "play_to_foxglove",
+            "play_to_stations",
+            "timeline",
+        ),
+        "planfly.api.reporting": (
+            "WrittenReport",
+            "compare",
+            "figures",
+            "foxglove_layout",
+            "report",
+        ),
+        "planfly.api.running": (
+            "Round",
+            "RunResult",
+            "run",
+        ),
+        "planfly.api.serving": ("serve",),
+        "planfly.campaigns.campaign_result": ("CampaignResult",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_winds": ("WindsFound",),
         "planfly.campaigns.dispersions": ("SpreadError",),
+        "planfly.imported_flights": ("ImportedFlight",),
+        "planfly.paper": (
+            "PaperTables",
+            "paper_tables",
+        ),
         "planfly.pipeline": ("PlanThenFly",),
+        "planfly.stages": ("progress",),
         "planner.plan": ("Plan",),
         "world.errors": (
-            *("FlightError", "LogError", "MissionError", "ParameterError", "PlanflyError", "ScenarioError"),
-            *("StartError", "TerrainError"),
+            "ArgumentError",
+            "FlightError",
+            "LogError",
+            "MissionError",
+            "ParameterError",
+            "PlanflyError",
+            "ScenarioError",
+            "StartError",
+            "TerrainError",
         ),
     }.items()
     for name in names

@@ -1,16 +1,17 @@
 """The command line: arguments in, one line for an error, an exit code out.  Heavy imports wait for the command."""
 
-import argparse
 import os
 import sys
 from collections.abc import Sequence
 
+from planfly.commands.registry import build_parser, find_command
 from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
 from planfly.terminal.command_parser import coloured
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
-from planfly.terminal.output import open_standard_streams, printable, tolerate_closed_output
-from planfly.terminal.parser import build_parser
+from planfly.terminal.output import asked_output, open_standard_streams, printable, tolerate_closed_output
+from planfly.terminal.results import error_text
 from planfly.terminal.signal_watch import end_process, ended_by_signals
+from world.errors import PlanflyError
 from world.interruption import Interrupted
 
 
@@ -39,30 +40,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _outcome(argv: Sequence[str] | None) -> int:
+    line = build_parser()
     try:
-        return _command(build_parser().parse_args(argv))
+        args = line.parse_args(argv)
+        try:
+            with tolerate_closed_output(), asked_output(args):
+                return find_command(args.command)(args)
+        except PlanflyError as error:
+            return _fail(BAD_INPUT, error_text(error, line.commands[args.command]))
     except OSError as error:
         return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
     except Interrupted as interrupted:
         return _fail(128 + interrupted.number, "interrupted")
     except KeyboardInterrupt:
         return _fail(INTERRUPTED, "interrupted")
-
-
-def _command(args: argparse.Namespace) -> int:
-    # Imported here: pydantic and numba take longer than --help may.
-    from planfly.commands.registry import find_command
-    from planfly.first_start import warm_up
-    from planfly.kernel_units.unit_kernels import COMMAND_UNITS
-    from planfly.terminal.answers.giving import asked_output
-    from world.errors import PlanflyError
-
-    try:
-        kernels = warm_up(*COMMAND_UNITS.get(args.command, ()))
-        with tolerate_closed_output(), asked_output(args), kernels:
-            return find_command(args.command)(args)
-    except PlanflyError as error:
-        return _fail(BAD_INPUT, error)
 
 
 def _fail(code: int, message: object) -> int:

@@ -1,4 +1,4 @@
-"""The first start after an install: what compiles is said, shared between processes, and counted."""
+"""The first start after an install: kernels are compiled in two processes before the work begins, and counted."""
 
 import contextlib
 import functools
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 from planfly.kernel_units.unit_kernels import kernels_of
-from planfly.terminal.output import progress, say
+from planfly.stages import is_received, say, stage
 from world.compile_events import tell_before_compiling
 
 # ----------------------------------------------------------------------
@@ -27,28 +27,28 @@ PROGRAM = ("-P", "-m", "planfly.kernel_units")
 _OVER = ""
 
 
-def compile_units(units: list[str], folder: Path, tell: Callable[[int], None]) -> None:
+def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
     """Have units compiled into a cache folder; return when all are done, or given up.
 
-    units: longest first.  tell: called with how many of their kernels are ready.
+    units: longest first.  on_ready: called with how many of their kernels are ready.
     The processes end with this call, however it ends, and with this process.
     """
-    waiting, said = deque(units), queue.SimpleQueue[str]()
+    waiting, lines = deque(units), queue.SimpleQueue[str]()
     count = min(PROCESSES, len(units), os.cpu_count() or 1)
     helpers = [_start(folder) for _ in range(count)]
-    leaders = [threading.Thread(target=_lead, args=(helper, waiting, said), daemon=True) for helper in helpers]
+    leaders = [threading.Thread(target=_lead, args=(helper, waiting, lines), daemon=True) for helper in helpers]
     try:
         for leader in leaders:
             leader.start()
         ready: set[str] = set()
         over = 0
         while over < count:
-            line = said.get()
+            line = lines.get()
             over += line == _OVER
             word, _, name = line.partition(" ")
             if word == "ready" and name not in ready:
                 ready.add(name)
-                tell(len(ready))
+                on_ready(len(ready))
     finally:
         for helper in helpers:
             helper.kill()
@@ -71,28 +71,28 @@ def _start(folder: Path) -> "subprocess.Popen[str]":
     )
 
 
-def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", said: "queue.SimpleQueue[str]") -> None:
-    """Give a process one unit after another, and hand on what it says; nothing, at its end."""
-    asked, answers = helper.stdin, helper.stdout
+def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", lines: "queue.SimpleQueue[str]") -> None:
+    """Give a process one unit after another, and pass its lines on; an empty one at its end."""
+    requests, answers = helper.stdin, helper.stdout
     # It may have died, or the other one was quicker.
     with contextlib.suppress(OSError, IndexError):
-        while asked is not None and answers is not None:
-            asked.write(f"{waiting.popleft()}\n")
+        while requests is not None and answers is not None:
+            requests.write(f"{waiting.popleft()}\n")
             line = "ready"
             while line.startswith("ready"):
                 line = answers.readline()
-                said.put(line.strip() or "died")
+                lines.put(line.strip() or "died")
             if not line:
                 break
-    for pipe in (asked, answers):
+    for pipe in (requests, answers):
         with contextlib.suppress(OSError):
             if pipe is not None:
                 pipe.close()
-    said.put(_OVER)
+    lines.put(_OVER)
 
 
 # ----------------------------------------------------------------------
-# Before the first kernel is compiled it is said, and the kernels that the work needs are compiled side by side.
+# Warm-up: when the first kernel has to be compiled, all that the work needs are compiled side by side.
 
 _Taken = ParamSpec("_Taken")
 _Given = TypeVar("_Given")
@@ -104,21 +104,21 @@ _shared: set[str] = set()
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Say once what is compiled meanwhile, before it begins; where all is in the cache this costs nothing.
+    """Compile the kernels of units when the work inside first needs one that is not in the cache, and report it once.
 
-    units: of `planfly.kernel_units`, longest first: what the work will call.  They are compiled in two processes, and
-    counted, before the work goes on; where the cache cannot be written they are compiled as they are called.
+    units: of `planfly.kernel_units`, longest first: what the work will call.  They are compiled in two processes before
+    the work goes on; where the cache cannot be written they are compiled as they are called.
     """
-    said = False
+    reported = False
 
-    def tell() -> None:
-        nonlocal said
-        if not said:
-            said = True
-            _say_and_share([unit for unit in units if unit not in _shared])
+    def compile_first() -> None:
+        nonlocal reported
+        if not reported:
+            reported = True
+            _report_and_compile([unit for unit in units if unit not in _shared])
             _shared.update(units)
 
-    with tell_before_compiling(tell):
+    with tell_before_compiling(compile_first):
         yield
 
 
@@ -136,7 +136,7 @@ def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_
     return decorate
 
 
-def _say_and_share(units: list[str]) -> None:
+def _report_and_compile(units: list[str]) -> None:
     # Whoever compiles has imported it.
     from world.kernels import cache_folder
 
@@ -144,13 +144,14 @@ def _say_and_share(units: list[str]) -> None:
     if not _can_write(folder):
         say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them")
         return
-    if not units or not sys.executable:
+    if not (units and sys.executable and is_received()):
         say(f"{TITLE} ...")
+    if not units or not sys.executable:
         return
-    whole = len(kernels_of(tuple(units)))
-    with progress(TITLE) as advance:
-        advance(0, whole, f"0 of {whole}")
-        compile_units(units, folder, lambda done: advance(done, whole, f"{done} of {whole}"))
+    total = len(kernels_of(tuple(units)))
+    with stage(TITLE) as advance:
+        advance(0, total, f"0 of {total}")
+        compile_units(units, folder, lambda done: advance(done, total, f"{done} of {total}"))
 
 
 def _can_write(folder: Path) -> bool:

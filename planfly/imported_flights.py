@@ -154,7 +154,7 @@ def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[
             )
         return read_mission(options.plan), f"of {options.plan.name}", None
     if flight.mission is None:
-        raise LogError(f"{path}: holds no mission: --plan MISSION names the one that was to be flown", file=path)
+        raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
     found = flight.mission
     when = f", at {found.time:.1f} s" if found.time > 0.0 else ""
     return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None

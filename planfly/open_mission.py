@@ -1,4 +1,4 @@
-"""Opening whatever a person brings: a plan, or a mission file with or without a scenario."""
+"""Open a plan, or a mission file with or without a scenario; and judge a flight log."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +11,9 @@ from flight.mission.items import Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission_files.formats import read_fence, read_mission
 from flight.simulation.setup import FlightSetup
+from logs.recording.reader import FlightLog
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight
 from logs.verdict.rules.fence_rule import zone_test
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.pipeline import make_setup
@@ -23,7 +26,7 @@ from world.scenario import Scenario, load_scenario, with_zones
 from world.scenario_tables import ZoneTable
 
 # ----------------------------------------------------------------------
-# Fences that a command names beside its mission or log: files of fence items, and of zones.
+# Fences named beside a mission or log: files of fence items, and of zones.
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +57,7 @@ class NamedFences:
 
 
 def read_named_fences(files: Sequence[str]) -> NamedFences:
-    """Read what the options ``--fence`` name, by the suffix of each.
+    """Read named files of fences and zones, by the suffix of each.
 
     Raises MissionError or ScenarioError for a file that cannot be read, that holds no fence, or one whose shapes are
     none.
@@ -149,6 +152,20 @@ def is_log(path: Path) -> bool:
     except OSError as error:
         raise PlanflyError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     return head == MCAP_MAGIC or path.suffix.lower() == ".mcap"
+
+
+# How a flight ended whose log does not hold its end.
+CUT_SHORT = "the log ends before the flight does"
+
+
+def judge_log(log: FlightLog) -> Verdict:
+    """The verdict on a log's flight, of the rows it holds."""
+    return judge_flight(log.setup, log.track, log.ended or CUT_SHORT, whole=log.complete, reference=log.reference)
+
+
+def loss_text(log: FlightLog) -> str:
+    """What is missing in a log, in a line; "" for one that is complete."""
+    return "" if log.complete else f"{log.source}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"
 
 
 def open_mission(

@@ -17,10 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planfly.airframe import load_airframe
+from planfly.arguments import check_arguments
 from planfly.pipeline import Advance, make_plan
+from planfly.stages import stage
+from planfly.targets import prepare_folder, refuse_folder
 from planner.plan import Objective, Violation
 from planner.search.algorithms import find_algorithm
-from world.files import write_whole
+from world.files import hold, write_whole
 from world.interruption import children_ignore_sigint, end_children, end_with_parent
 from world.scenario import Scenario, load_scenario, with_planner
 
@@ -151,7 +154,7 @@ def plan_section(
     algorithm: shown in place of the paper's; the strip and the baselines always run beside it.  jobs: processes,
     by default one for each core that this process may use.  Raises ScenarioError for an unknown algorithm.
     """
-    names = [find_algorithm(algorithm, "--algorithm").name]
+    names = [find_algorithm(algorithm, "algorithm").name]
     names += [name for name in (STRIP, *BASELINES) if name not in names]
     tasks = [(threats, name, seed) for threats in problems for name in names for seed in range(1, seeds + 1)]
     count = min(len(tasks), jobs or usable_cores())
@@ -233,7 +236,7 @@ def _column(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Fl
 
 
 # ----------------------------------------------------------------------
-# What ``planfly paper`` leaves: the table on the terminal, and JSON, CSV and figures in a folder.
+# What it leaves: the table on the terminal, and JSON, CSV and figures in a folder.
 
 PAPER_SCHEMA = "planfly.paper/1"
 # Files that any command may write; older ones of these names are cleared first.
@@ -353,3 +356,53 @@ def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
         for threats, groups in by_problem.items()
     }
     write_png(draw_convergence(histories), folder / "convergence.png")
+
+
+# ----------------------------------------------------------------------
+# All of it in one call.
+
+
+@dataclass(frozen=True, slots=True)
+class PaperTables:
+    """What `planfly.paper_tables` returns.
+
+    rows: the table, a row for each problem and algorithm.  plans: what it is made of.
+    """
+
+    rows: tuple[TableRow, ...]
+    plans: tuple[SeededPlan, ...]
+
+
+def paper_tables(
+    problems: Sequence[int] = PROBLEMS,
+    *,
+    runs: int = 15,
+    algorithm: str = PAPER,
+    jobs: int | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+) -> PaperTables:
+    """Plan section V of the paper again: seeded plans of its problems in three encodings.
+
+    problems: numbers of threats, out of 7, 15, 30 and 60.  runs: seeds 1..runs of each.
+    algorithm: beside the two baselines.  jobs: processes; None for one a core.
+    out: a folder for tables and figures; None writes none.  overwrite: whether results that lie there are replaced.
+
+    A script that calls it does so under ``if __name__ == "__main__":``, for the processes import it.
+    Raises a `planfly.PlanflyError` for bad input.
+    """
+    check_arguments(problems=tuple(problems), runs=runs, jobs=jobs)
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        refuse_folder(folder, overwrite)
+    with stage("planning") as advance:
+        plans = plan_section(problems, runs, algorithm, jobs, advance)
+    rows = table(plans)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        with hold(folder):
+            prepare_folder(folder, tuple(file_names(PROBLEMS)))
+            write_tables(folder, rows, plans)
+            with stage("drawing"):
+                write_figures(folder, plans)
+    return PaperTables(tuple(rows), tuple(plans))

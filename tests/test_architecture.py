@@ -254,7 +254,7 @@ def placeless_errors(tree: ast.AST, kinds: set[str]) -> Iterator[str]:
 
 
 def test_every_error_carries_its_file_or_field_apart() -> None:
-    """By keyword, or through `PlanflyError.at`, `of_option` or `from_error`: a program need not take the line apart."""
+    """By keyword, or through `PlanflyError.at`, `of_argument` or `from_error`: programs need not parse the line."""
     # A flight that cannot begin: its first argument is the file.
     kinds = error_kinds() - {"StartError"}
     assert len(kinds) > 9

@@ -7,7 +7,8 @@
     ├── FlightError     an aircraft model or a start condition
     │   └── StartError  a flight that cannot begin as its mission has it: `fly` makes a verdict of it
     ├── ParameterError  a file of an autopilot's parameters
-    └── LogError        a flight log
+    ├── LogError        a flight log
+    └── ArgumentError   an argument of a call that is out of its range: a ValueError, too
 
 Each message is one line: the file, the line or field, the value, and the allowed range.  The command
 line prints it and ends with exit code 2.  "Not flyable" and "no feasible path" are results, not errors.
@@ -25,6 +26,7 @@ class PlanflyError(Exception):
     field: the key, column or option in it; "" where not known, or where it is the file as a whole.
     value: what is there; None where not known, or where nothing is.
     allowed: what is expected instead, in words; "" where the message alone says so.
+    argument: the keyword of the call that is wrong; "" where it is a file's content.
 
     >>> error = PlanflyError("a.toml: wind.speed_mps: 41.0: allowed 0..40", file="a.toml", field="wind.speed_mps")
     >>> str(error), error.file, error.field, error.value, error.allowed
@@ -36,6 +38,7 @@ class PlanflyError(Exception):
     ) -> None:
         super().__init__(message)
         self.file, self.field, self.value, self.allowed = str(file), field, value, allowed
+        self.argument = ""
 
     @classmethod
     def at(cls, file: str | Path, field: str, value: Any, allowed: str, *, shown: str | None = None) -> Self:
@@ -54,20 +57,23 @@ class PlanflyError(Exception):
         return cls(text, file=file, field=field, value=value, allowed=allowed)
 
     @classmethod
-    def of_option(
-        cls, option: str, value: Any, allowed: str, *, shown: str | None = None, file: str | Path = ""
+    def of_argument(
+        cls, argument: str, value: Any, allowed: str, *, shown: str | None = None, file: str | Path = ""
     ) -> Self:
-        """An error of an option of the command line.
+        """An error of an argument of a call, by its keyword; the command line names its option instead.
 
-        shown: the value as the message has it; None for as it prints.  file: that the option is about, if any.
+        shown: the value as the message has it; None for as it prints, "" for not at all.
+        file: that the argument is about, if any.
 
-        >>> error = FlightError.of_option("--bind", "127.0.0.1:70000", "a port 0..65535 is expected")
+        >>> error = FlightError.of_argument("bind", "127.0.0.1:70000", "a port 0..65535 is expected")
         >>> print(error, "|", error.field, "|", error.value)
-        --bind 127.0.0.1:70000: a port 0..65535 is expected | --bind | 127.0.0.1:70000
+        bind 127.0.0.1:70000: a port 0..65535 is expected | bind | 127.0.0.1:70000
         """
         begin = f"{file}: " if str(file) else ""
-        text = f"{begin}{option} {value if shown is None else shown}: {allowed}"
-        return cls(text, file=file, field=option, value=value, allowed=allowed)
+        what = argument if shown == "" else f"{argument} {value if shown is None else shown}"
+        error = cls(f"{begin}{what}: {allowed}", file=file, field=argument, value=value, allowed=allowed)
+        error.argument = argument
+        return error
 
     @classmethod
     def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
@@ -127,3 +133,7 @@ class StartError(FlightError):
 
 class LogError(PlanflyError):
     """A flight log cannot be read."""
+
+
+class ArgumentError(PlanflyError, ValueError):
+    """An argument of a call is out of its range."""

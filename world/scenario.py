@@ -253,7 +253,7 @@ def from_spec(
         spec, base = _with_terrain(spec, terrain, source, base), None
     raster = None
     if spec.terrain.kind == "dem" and ground is None:
-        raster, table = _open_terrain(spec.terrain, source if terrain is None else "--terrain", base)
+        raster, table = _open_terrain(spec.terrain, source if terrain is None else "terrain", base)
         spec = spec.model_copy(update={"terrain": table})
     if spec.origin is not None:
         origin = GeoOrigin(spec.origin.lat_deg, spec.origin.lon_deg)
@@ -295,7 +295,7 @@ def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
 def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
     """Replace the terrain by a file, and keep the map where it is: its origin may be the old tile's centre."""
     changes: dict[str, Any] = {
-        "terrain": checked_table(lambda: TerrainTable(kind="dem", path=terrain), "--terrain"),
+        "terrain": checked_table(lambda: TerrainTable(kind="dem", path=terrain), "terrain"),
     }
     if spec.origin is None and spec.terrain.kind == "dem":
         centre = _open_terrain(spec.terrain, source, base)[0].centre

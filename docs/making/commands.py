@@ -5,9 +5,9 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import CommandParser
 from planfly.terminal.exit_codes import EXIT_CODES
-from planfly.terminal.parser import build_parser
 
 _ENTRY = re.compile(r"^  (\S.*?)(?:  +(\S.*))?$")
 

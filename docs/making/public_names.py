@@ -6,8 +6,22 @@ import planfly
 
 # Functions in the order in which a script calls them; other names follow.
 _ORDER = (
-    *("plan", "fly", "plan_then_fly", "check", "read_log", "figures", "report", "compare", "export", "campaign"),
-    *("winds", "scenarios", "aircraft", "optimise"),
+    *(
+        "plan",
+        "replan",
+        "what_blocks",
+        "fly",
+        "plan_then_fly",
+        "run",
+        "check",
+        "judge",
+        "read_log",
+        "figures",
+        "report",
+    ),
+    *("compare", "export", "foxglove_layout", "timeline", "instruments", "movie", "play_to_foxglove"),
+    *("play_to_stations", "import_log", "refly", "recover", "campaign", "campaign_flight", "winds", "serve"),
+    *("scenarios", "aircraft", "describe_aircraft", "new_aircraft", "paper_tables", "optimise", "progress"),
 )
 _TITLES = {"function": "Functions", "class": "Classes", "error": "Errors"}
 

@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from planfly.terminal.answers.giving import ANSWERS, schema_text
+from planfly.commands.registry import answering_commands, schema_text
 
 
 def schema_tables(command: str) -> str:
@@ -13,11 +13,6 @@ def schema_tables(command: str) -> str:
     for name, one in schema.get("$defs", {}).items():
         parts.append(f"**{name}**: {one.get('description', '')}\n\n{_table(one)}")
     return "\n\n".join(parts)
-
-
-def answering_commands() -> list[str]:
-    """The commands that have a schema."""
-    return list(ANSWERS)
 
 
 def _table(schema: dict[str, Any]) -> str:

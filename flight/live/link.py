@@ -327,26 +327,26 @@ def check_access(access: Access) -> None:
     """Check that whoever can reach the vehicle from another machine is protected against.
 
     Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and one to send to needs a key
-    or must be on that list.  Raises FlightError, which names the option to give.
+    or must be on that list.  Raises FlightError, which names the argument to give.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
     Traceback (most recent call last):
-    world.errors.FlightError: --bind 0.0.0.0:14551: beyond this machine: give --sign-key FILE or --allow IP,IP, ...
+    world.errors.FlightError: bind 0.0.0.0:14551: beyond this machine: give `sign_key` or `allow`, ...
     """
-    for name, (host, port) in (("--bind", access.bind), *(("--to", address) for address in access.to)):
+    for name, (host, port) in (("bind", access.bind), *(("to", address) for address in access.to)):
         if is_loopback(host) or access.key is not None:
             continue
-        if name == "--bind" and not access.allowed:
-            allowed = "beyond this machine: give --sign-key FILE or --allow IP,IP, or bind to 127.0.0.1"
-            raise FlightError.of_option(name, f"{host}:{port}", allowed)
-        if name == "--to" and host not in access.allowed:
-            allowed = f"beyond this machine: give --sign-key FILE or --allow {host}"
-            raise FlightError.of_option(name, f"{host}:{port}", allowed)
+        if name == "bind" and not access.allowed:
+            allowed = "beyond this machine: give `sign_key` or `allow`, or bind to 127.0.0.1"
+            raise FlightError.of_argument(name, f"{host}:{port}", allowed)
+        if name == "to" and host not in access.allowed:
+            allowed = f"beyond this machine: give `sign_key`, or `allow` {host}"
+            raise FlightError.of_argument(name, f"{host}:{port}", allowed)
     far = [f"{host}:{port}" for host, port in access.to if not is_loopback(host)]
     if far and is_loopback(access.bind[0]):
         allowed = f"cannot reach {far[0]} from there; bind to an address of this machine's network, or 0.0.0.0"
-        raise FlightError.of_option("--bind", f"{access.bind[0]}:{access.bind[1]}", allowed)
+        raise FlightError.of_argument("bind", f"{access.bind[0]}:{access.bind[1]}", allowed)
 
 
 def is_loopback(host: str) -> bool:
@@ -382,8 +382,7 @@ class Link:
         except OSError as error:
             self._socket.close()
             host, port = access.bind
-            message = f"--bind {host}:{port}: {error.strerror}"
-            raise FlightError(message, field="--bind", value=f"{host}:{port}") from error
+            raise FlightError.of_argument("bind", f"{host}:{port}", str(error.strerror)) from error
         self._socket.setblocking(False)
 
     def close(self) -> None:

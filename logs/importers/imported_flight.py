@@ -220,7 +220,7 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
     chosen = choose_part(parts)
     if number is not None:
         if not 1 <= number <= len(parts):
-            raise LogError.of_option("--flight", number, f"it holds flights 1..{len(parts)}", file=raw.source)
+            raise LogError.of_argument("flight", number, f"it holds flights 1..{len(parts)}", file=raw.source)
         chosen = number - 1
     others = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != chosen)
     return _cut(raw, places, parts[chosen], chosen + 1, len(parts), others)

@@ -1,40 +1,46 @@
 """Fly a mission, and judge one, or a flight."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from flight.autopilots.arduplane_sitl.process import check_binary
 from flight.mission.items import Mission
-from flight.simulation.setup import FlightSetup
+from flight.simulation.setup import FlightSetup, VerticalDatum
 from flight.simulation.track import Track
+from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from planfly import pipeline
 from planfly.api.planning import Wind, changed_scenario
-from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits
+from planfly.arguments import check_arguments
+from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_text
 from planfly.first_start import with_warm_up
-from planfly.kernel_units.unit_kernels import FLYING
+from planfly.kernel_units.unit_kernels import BOTH, FLYING
 from planfly.open_mission import (
     NamedFences,
     OpenedMission,
     ScenarioChange,
     is_log,
+    judge_log,
+    loss_text,
     open_mission,
     open_planned,
     read_named_fences,
 )
-from planfly.pipeline import fly_and_judge
-from planfly.terminal.results import judge_log
+from planfly.pipeline import autopilot_log, fly_and_judge
+from planfly.stages import stage
+from planfly.targets import file_target, refuse_existing
 from planner.plan import Plan
 from world.errors import ScenarioError
-from world.html_table import html_table
 from world.scenario import over_terrain
 from world.scenario_tables import Guidance, Navigation
 
 # ----------------------------------------------------------------------
-# What the verbs give: frozen data, short to print, a table in a notebook.
+# What the functions return: frozen data, short to print, a table in a notebook.
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -47,6 +53,7 @@ class FlownMission:
     ended: how it ended, "completed" or the reason why not.
     events: what the log holds beside the rows.
     log: the file that it is recorded in; None where none was asked for, or nothing flown.
+    autopilot_log: ArduPilot SITL's own log beside it, if it flew.
     """
 
     setup: FlightSetup
@@ -55,6 +62,7 @@ class FlownMission:
     ended: str
     events: tuple[LogEvent, ...] = ()
     log: Path | None = None
+    autopilot_log: Path | None = None
 
     @property
     def mission(self) -> Mission:
@@ -63,7 +71,7 @@ class FlownMission:
 
     @property
     def plan(self) -> Plan | None:
-        """The plan that it is of; None for a mission that a person brought."""
+        """The plan that it is of; None for a mission file."""
         return self.setup.plan
 
     @property
@@ -80,32 +88,28 @@ class FlownMission:
 
 
 @dataclass(frozen=True, slots=True)
-class WrittenReport:
-    """What `planfly.report` and `planfly.compare` wrote.
+class Judged:
+    """What `planfly.judge` returns.
 
-    page: the HTML page, which needs no other file.  files: it and the pictures beside it.
+    setup: everything that decides the flight.
+    verdict: whether it flies, with a finding for every rule and place.
+    loss: what of a flight log could not be read, in a line; "" where nothing is missing.
+    lossy: whether some of a log could not be read.
     """
 
-    page: Path
-    files: tuple[Path, ...]
-
-    def _repr_html_(self) -> str:
-        """How a notebook shows it."""
-        return html_table(f"Report {self.page}", [(file.name,) for file in self.files])
-
-
-@dataclass(frozen=True, slots=True)
-class ExportedFiles:
-    """What `planfly.export` wrote.
-
-    files: in the order asked for.  notes: what of the source they do not hold, a line each.
-    """
-
-    files: tuple[Path, ...]
-    notes: tuple[str, ...] = ()
+    setup: FlightSetup
+    verdict: Verdict
+    loss: str = ""
+    lossy: bool = False
 
 
 FencePaths = str | Path | Sequence[str | Path]
+
+
+# ----------------------------------------------------------------------
+# Fly.
+
+plan_then_fly = with_warm_up(*BOTH)(pipeline.plan_then_fly)
 
 
 @with_warm_up(*FLYING)
@@ -128,16 +132,18 @@ def fly(
     log_hz: Literal[10, 20, 30, 60] = 60,
     max_hours: float = MAX_HOURS,
     max_log: float = MAX_MEGABYTES,
+    overwrite: bool = True,
 ) -> FlownMission:
     """Fly a plan or a mission file in JSBSim, and judge the flight.
 
     mission: a `Plan`, or the path of a plan.json, .waypoints or .plan file.
-    log: where to write the flight as MCAP, replaced if it exists; None writes none.
+    log: where to write the flight as MCAP; {name} and {seed} in it stand for the mission's name and the seed; None
+    writes none.  overwrite: whether an existing file is replaced.
     scenario: to fly it in, a name or a TOML file; None for the plan's own, or one made around the mission.
     terrain: an elevation file in place of the scenario's.  fence: files of fences and zones beside its own.
     seed: of the turbulence; None takes the plan's, the scenario's, or 1.
     wind, turbulence, aircraft, airspeed, params, guidance, nav: as of `planfly.plan`.
-    autopilot: the program of a real ArduPlane, which then flies.
+    autopilot: the program of ArduPilot SITL, which then flies.
     log_hz: rows a second in the log.  max_hours, max_log: where a flight ends that would go on, h and MB.
 
     A plan that cannot be flown is a verdict, not an error; bad input raises a `planfly.PlanflyError`.
@@ -147,24 +153,104 @@ def fly(
     >>> flown.ended, flown.verdict.flyable, flown.setup.scenario.wind.speed
     ('completed', True, 4.0)
     """
-    opened = _opened(
-        mission, scenario, terrain, seed, fence,
-        lambda world: changed_scenario(
-            world, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
-            guidance=guidance, nav=nav,
-        ),
-    )  # fmt: skip
+    check_arguments(seed=seed, log_hz=log_hz, max_hours=max_hours, max_log=max_log)
     program = None if autopilot is None else Path(autopilot)
     if program is not None:
         check_binary(program)
-    target = None if log is None else Path(log)
-    most = FlightLimits(max_hours, max_log)
-    flown = fly_and_judge(opened.setup, opened.airframe, target, every=60 // log_hz, autopilot=program, limits=most)
-    kept = target if len(flown.track) else None
-    return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, kept)
+    change = partial(
+        changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
+        guidance=guidance, nav=nav, autopilot=autopilot,
+    )  # fmt: skip
+    opened = _opened(mission, scenario, terrain, seed, fence, change)
+    target = None if log is None else _log_target(log, opened, mission, program, overwrite)
+    limits = FlightLimits(max_hours, max_log)
+    with stage(f"flying {flight_text(opened.setup)}") as advance:
+        flown = fly_and_judge(
+            opened.setup, opened.airframe, target, advance, every=60 // log_hz, autopilot=program, limits=limits
+        )
+    target = target if len(flown.track) else None
+    own = None if target is None or program is None else autopilot_log(target)
+    return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, own)
+
+
+def _log_target(
+    log: str | Path, opened: OpenedMission, mission: Plan | str | Path, program: Path | None, overwrite: bool
+) -> Path:
+    """The log to write; it and the log that a program writes beside it may be replaced.  Raises PlanflyError."""
+    source = None if isinstance(mission, Plan) else Path(mission)
+    target = file_target(log, opened.name, opened.setup.seed, overwrite=overwrite, source=source)
+    if program is not None:
+        refuse_existing(autopilot_log(target), overwrite, source)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return target
+
+
+# ----------------------------------------------------------------------
+# Judge without flying.
+
+# Why a log takes no other world.
+_AS_FLOWN = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+_WHERE_FLOWN = "a log is judged in the scenario it carries; only `terrain` replaces its ground"
 
 
 @with_warm_up()
+def judge(
+    what: FlightLog | FlownMission | Plan | str | Path,
+    *,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    plan: str | Path | None = None,
+    flight: int | None = None,
+    datum: VerticalDatum | None = None,
+) -> Judged:
+    """Judge without flying, as `planfly.check` does, and keep what the verdict is about.
+
+    what: a flight log or its path, an autopilot's log, what `planfly.fly` gave, a `Plan`, or the path of a plan.json,
+    .waypoints or .plan.
+    scenario, wind, turbulence, aircraft, airspeed, params, guidance: of a plan or mission, as of `planfly.fly`; a
+    flight is judged as it was flown.
+    terrain, fence: in place of the ground, and beside the fences, that it carries.
+    plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
+
+    Raises a `planfly.PlanflyError` for bad input.
+
+    >>> import planfly
+    >>> judged = planfly.judge(planfly.plan("tight", seed=1))
+    >>> judged.verdict.level, judged.setup.scenario.name, judged.loss
+    ('geometric', 'tight', '')
+    """
+    flown_with: dict[str, Any] = {"wind": wind, "turbulence": turbulence, "aircraft": aircraft}
+    flown_with |= {"airspeed": airspeed, "params": params}
+    if isinstance(what, str | Path) and is_imported_log(Path(what)):
+        # Imported here: no other check needs the libraries that read other programs' logs.
+        from planfly.api.imported import read_imported
+
+        found = read_imported(
+            what, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence,
+            aircraft=aircraft, airspeed=airspeed, params=params, guidance=guidance, flight=flight, datum=datum,
+        )  # fmt: skip
+        return Judged(found.setup, found.verdict, lossy=found.lossy)
+    source = _source_of(what)
+    _refuse(source, {"plan": plan, "flight": flight, "datum": datum}, "goes with an imported log, not with this file")
+    fences = named_fences(fence)
+    if isinstance(what, str | Path) and is_log(Path(what)):
+        what = read_log(what)
+    if isinstance(what, FlightLog | FlownMission):
+        _refuse(source, flown_with | {"guidance": guidance}, _AS_FLOWN)
+        _refuse(source, {"scenario": scenario}, _WHERE_FLOWN)
+        return _judge_flight(what, terrain, fences)
+    change = partial(changed_scenario, guidance=guidance, **flown_with)
+    setup = _opened(what, scenario, terrain, None, fences, change).setup
+    return Judged(setup, judge_geometry(setup))
+
+
 def check(
     what: FlightLog | FlownMission | Plan | str | Path,
     *,
@@ -176,13 +262,14 @@ def check(
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    plan: str | Path | None = None,
+    flight: int | None = None,
+    datum: VerticalDatum | None = None,
 ) -> Verdict:
     """Judge without flying: a flight by its log, or a plan or mission by its geometry alone.
 
-    what: a flight log or its path, what `planfly.fly` gave, a `Plan`, or the path of a plan.json, .waypoints or .plan.
-    scenario, wind, turbulence, aircraft, airspeed, params: of a plan or mission, as of `planfly.fly`; a flight is
-    judged as it was flown.
-    terrain, fence: in place of the ground, and beside the fences, that it carries.
+    The arguments are those of `planfly.judge`, which also returns what the verdict is about.
 
     Raises a `planfly.PlanflyError` for bad input.
 
@@ -191,39 +278,38 @@ def check(
     >>> verdict.level, verdict.flyable
     ('geometric', False)
     """
-    given = {
-        "scenario": scenario, "wind": wind, "turbulence": turbulence, "aircraft": aircraft, "airspeed": airspeed,
-        "params": params,
-    }  # fmt: skip
-    if isinstance(what, str | Path) and is_log(Path(what)):
-        what = read_log(what)
-    if isinstance(what, FlightLog | FlownMission):
-        source = what.source if isinstance(what, FlightLog) else what.setup.mission.source
-        for name, value in given.items():
-            if value is not None:
-                allowed = "a flight is judged in the world, and with the aircraft, that it was flown with"
-                raise ScenarioError(
-                    f"{source}: {name}: {allowed}", file=source, field=name, value=value, allowed=allowed
-                )
-        return _check_flight(what, terrain, _fences(fence))
-    opened = _opened(
-        what, scenario, terrain, None, fence,
-        lambda world: changed_scenario(
-            world, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params
-        ),
-    )  # fmt: skip
-    return judge_geometry(opened.setup)
+    return judge(
+        what, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence, aircraft=aircraft,
+        airspeed=airspeed, params=params, guidance=guidance, plan=plan, flight=flight, datum=datum,
+    ).verdict  # fmt: skip
 
 
-def _check_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Verdict:
+def _source_of(what: FlightLog | FlownMission | Plan | str | Path) -> str:
+    """The file that is judged, as messages name it."""
+    if isinstance(what, FlightLog):
+        return what.source
+    if isinstance(what, FlownMission):
+        return what.setup.mission.source
+    return what.scenario.name if isinstance(what, Plan) else str(what)
+
+
+def _refuse(source: str, given: Mapping[str, Any], allowed: str) -> None:
+    """Refuse keywords that do not go with what is judged.  Raises ScenarioError."""
+    for name, value in given.items():
+        if value is not None:
+            raise ScenarioError.of_argument(name, value, allowed, shown="", file=source)
+
+
+def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
     setup = flight.setup
     if terrain is not None:
         setup = setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
     if fences.items or fences.zones:
         setup = replace(setup.in_scenario(fences.on_scenario(setup.scenario)), mission=fences.on_mission(setup.mission))
     if isinstance(flight, FlightLog):
-        return judge_log(replace(flight, setup=setup))
-    return flight.verdict if setup is flight.setup else judge_flight(setup, flight.track, flight.ended)
+        return Judged(setup, judge_log(replace(flight, setup=setup)), loss_text(flight), not flight.complete)
+    verdict = flight.verdict if setup is flight.setup else judge_flight(setup, flight.track, flight.ended)
+    return Judged(setup, verdict)
 
 
 def _opened(
@@ -231,16 +317,17 @@ def _opened(
     scenario: str | Path | None,
     terrain: str | Path | None,
     seed: int | None,
-    fence: FencePaths,
+    fence: FencePaths | NamedFences,
     change: ScenarioChange,
 ) -> OpenedMission:
     world, ground = (None if name is None else str(name) for name in (scenario, terrain))
-    fences = _fences(fence)
+    fences = fence if isinstance(fence, NamedFences) else named_fences(fence)
     if isinstance(mission, Plan):
         return open_planned(mission, world, ground, seed=seed, change=change, fences=fences)
     return open_mission(Path(mission), world, ground, seed=seed, change=change, fences=fences)
 
 
-def _fences(files: FencePaths) -> NamedFences:
+def named_fences(files: FencePaths) -> NamedFences:
+    """The fences of one file or of several.  Raises MissionError or ScenarioError."""
     given = [files] if isinstance(files, str | Path) else files
     return read_named_fences([str(file) for file in given])

@@ -77,23 +77,23 @@ class Optimiser:
         Raises ValueError for another number of rows than was asked for, or of columns than before.
         """
         asked = self._search.ask()
-        told = _columns("values", values, len(asked))
+        given = _columns("values", values, len(asked))
         broken = np.empty((len(asked), 0)) if violations is None else _columns("violations", violations, len(asked))
-        if not told.shape[1]:
+        if not given.shape[1]:
             raise ValueError("values: no columns: one an objective is expected")
-        scores = np.concatenate([np.maximum(broken, 0.0), told], axis=1)
+        scores = np.concatenate([np.maximum(broken, 0.0), given], axis=1)
         if self._levels and (scores.shape[1] != self._scores.shape[1] or broken.shape[1] != self._violations):
             raise ValueError("values, violations: other numbers of columns than before")
         if not self._levels:
             self._violations = broken.shape[1]
-            self._levels = _levels(broken.shape[1], told.shape[1])
+            self._levels = _levels(broken.shape[1], given.shape[1])
             self._scores = np.empty((0, scores.shape[1]))
         self.evaluations += len(asked)
         self._keep(asked, scores)
         self._search.tell(scores)
 
     def _keep(self, points: Floats, scores: Floats) -> None:
-        """Keep what nothing that was told of is preferred to, the least first objective first."""
+        """Keep the points to which no other is preferred, the least first objective first."""
         every, known = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
         first = np.flatnonzero(ranks(known, self._levels) == 0)
         order = first[np.argsort(known[first, self._violations], kind="stable")][: self._most]
@@ -101,7 +101,7 @@ class Optimiser:
 
     @property
     def best(self) -> BestFound:
-        """The best point told of; of several objectives the one of `front` that is best in the first.
+        """The best point evaluated; of several objectives the one of `front` that is best in the first.
 
         Raises ValueError before the first `tell`.
         """
@@ -109,9 +109,9 @@ class Optimiser:
 
     @property
     def front(self) -> tuple[BestFound, ...]:
-        """The points that nothing told of is preferred to, as many as the population at most."""
+        """The points to which no evaluated one is preferred, as many as the population at most."""
         if not self._levels:
-            raise ValueError("nothing was told yet: ask() and tell() come first")
+            raise ValueError("nothing has been evaluated yet: call ask() and tell() first")
         v = self._violations
         return tuple(
             BestFound(x.copy(), row[v:].copy(), row[:v].copy())

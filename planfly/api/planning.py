@@ -1,31 +1,74 @@
-"""Plan a path, and what it is planned for: scenarios and aircraft."""
+"""Plan a path, again in flight too, and list the scenarios to plan in."""
 
 import math
 import time
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import overload
 
-from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft
-from planfly import pipeline
+from flight.autopilots.catalog import program_autopilot
 from planfly.airframe import choose_seed, load_airframe
+from planfly.arguments import check_arguments, is_wind
 from planfly.first_start import with_warm_up
-from planfly.kernel_units.unit_kernels import BOTH, PLANNING
-from planner.plan import Plan, plan_json
+from planfly.kernel_units.unit_kernels import PLANNING
+from planfly.stages import stage
+from planfly.targets import file_target
+from planner.plan import Plan, plan_json, read_plan
+from planner.search.explain_failure import explain_failure
 from planner.search.plan_path import plan_path
-from world.files import write_whole
-from world.scenario import Scenario, embedded_scenarios, load_scenario, with_flight, with_planner, with_wind
+from planner.search.replan import replan as replan_path
+from planner.search.replan import same_mission
+from planner.search.search_state import StopCondition
+from world.errors import ArgumentError, ScenarioError
+from world.files import whole_path, write_whole
+from world.scenario import (
+    Scenario,
+    embedded_scenarios,
+    load_scenario,
+    with_flight,
+    with_planner,
+    with_threats,
+    with_wind,
+)
 from world.scenario_tables import Guidance, Navigation
 
 # ----------------------------------------------------------------------
-# A scenario as a script names it, with the changes that its keywords ask for.
+# A scenario as a call names it, with the changes that its keywords ask for.
 
 # Speed, m/s, and where it comes from, degrees.
 Wind = tuple[float, float]
 
 
-def opened_scenario(scenario: Scenario | str | Path) -> Scenario:
-    """An embedded name, a TOML file's path, or a scenario as it is.  Raises ScenarioError or TerrainError."""
-    return scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
+def opened_scenario(scenario: Scenario | str | Path, terrain: str | Path | None = None) -> Scenario:
+    """An embedded name, a TOML file's path, or a scenario as it is.  Raises ScenarioError or TerrainError.
+
+    terrain: an elevation file in place of its own.
+    """
+    if isinstance(scenario, Scenario):
+        return scenario
+    return load_scenario(str(scenario), None if terrain is None else str(terrain))
+
+
+def flight_entries(
+    *,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    nav: Navigation | None = None,
+    autopilot: str | Path | None = None,
+) -> dict[str, str | float | None]:
+    """Entries of a scenario's [flight] that the keywords of a call state; None for those that were not given."""
+    return {
+        # A `Path` is a folder, and is passed on so that it is known for one.
+        "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
+        "airspeed_mps": airspeed,
+        "autopilot": None if autopilot is None else program_autopilot(Path(autopilot)).name,
+        "guidance": guidance,
+        "nav": nav,
+        # Whatever folder the scenario is in.
+        "params": None if params is None else whole_path(Path(params)),
+    }
 
 
 def changed_scenario(
@@ -38,37 +81,33 @@ def changed_scenario(
     params: str | Path | None = None,
     guidance: Guidance | None = None,
     nav: Navigation | None = None,
+    autopilot: str | Path | None = None,
 ) -> Scenario:
     """A scenario in other weather, or flown otherwise; None keeps what it has.
 
     wind: speed, m/s, and where it comes from, degrees.  aircraft: a name, or a folder.  airspeed: m/s.
-    params: a file of ArduPlane's parameters.  Raises ScenarioError for what a scenario file may not have either.
+    params: a file of ArduPlane's parameters.  autopilot: an ArduPlane's program.
+    Raises ScenarioError for what a scenario file may not have either.
 
     >>> changed = changed_scenario(load_scenario("tight"), wind=(8.0, 270.0), airspeed=28.0)
     >>> changed.wind.speed, changed.flight.airspeed_mps
     (8.0, 28.0)
     """
-    speed, source = (None, None) if wind is None else wind
-    flown = with_flight(
-        scenario,
-        aircraft=None if aircraft is None else _named(aircraft),
-        airspeed_mps=airspeed,
-        params=None if params is None else str(Path(params).resolve()),
-        guidance=guidance,
-        nav=nav,
+    speed, from_deg = (None, None) if wind is None else wind
+    if speed is not None and from_deg is not None and not is_wind(0.0, from_deg):
+        raise ArgumentError.of_argument("wind", wind, "degrees from north that it blows from, -360..360, are expected")
+    entries = flight_entries(
+        aircraft=aircraft, airspeed=airspeed, params=params, guidance=guidance, nav=nav, autopilot=autopilot
     )
-    return with_wind(flown, speed, None if source is None else math.radians(source), turbulence)
-
-
-def _named(aircraft: str | Path) -> str:
-    """A name as it is; a folder, which a `Path` always is, so that it is known for one."""
-    return str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft
+    from_course = None if from_deg is None else math.radians(from_deg)
+    return with_wind(with_flight(scenario, **entries), speed, from_course, turbulence)
 
 
 # ----------------------------------------------------------------------
 # Plan a path.
 
-plan_then_fly = with_warm_up(*BOTH)(pipeline.plan_then_fly)
+# A threat that has popped up: east and north, kill and detection radius, m; a radius of 0 for none.
+Threat = tuple[float, float, float, float]
 
 
 @with_warm_up(*PLANNING)
@@ -87,6 +126,8 @@ def plan(
     guidance: Guidance | None = None,
     nav: Navigation | None = None,
     out: str | Path | None = None,
+    overwrite: bool = True,
+    stop: Callable[[], bool] | None = None,
 ) -> Plan:
     """Plan a path across a scenario's terrain and threats, within what its aircraft can fly.
 
@@ -97,7 +138,9 @@ def plan(
     wind: speed, m/s, and where it comes from, degrees; turbulence: "none", "light" or "moderate".
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of ArduPlane's parameters.
     guidance: planfly's own law ("path", "l1", "vector-field") in place of ArduPlane's.  nav: "perfect", "rtk", "gnss".
-    out: where to write it as plan.json, replaced if it exists.
+    out: where to write it as plan.json; {name} and {seed} in it stand for the scenario's name and the seed.
+    overwrite: whether an existing file is replaced.
+    stop: asked between generations; once it is true, the best path so far is given.
 
     No feasible path is a plan that says so (`Plan.feasible`, `Plan.safe`), not an error; bad input raises a
     `planfly.PlanflyError`.
@@ -109,23 +152,130 @@ def plan(
     >>> path.waypoints.shape
     (22, 3)
     """
-    world = changed_scenario(
-        opened_scenario(scenario), wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed,
-        params=params, guidance=guidance, nav=nav,
+    change = partial(
+        changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
+        guidance=guidance, nav=nav,
     )  # fmt: skip
-    if budget is not None:
-        world = with_planner(world, "budget", budget=budget)
-    until = None if seconds is None else time.monotonic() + seconds
-    made = plan_path(
-        world,
-        load_airframe(world).limits,
-        seed=choose_seed(world, seed),
-        algorithm=algorithm,
-        stop=lambda: "budget" if until is not None and time.monotonic() >= until else "",
-    )
+    check_arguments(seed=seed, budget=budget, seconds=seconds)
+    world = _with_budget(change(opened_scenario(scenario)), budget)
+    return _planned(world, scenario, None, seed, algorithm, seconds, out, overwrite, stop)
+
+
+@with_warm_up(*PLANNING)
+def replan(
+    scenario: Scenario | str | Path,
+    old: Plan | str | Path,
+    at_leg: int,
+    *,
+    threats: Sequence[Threat] = (),
+    seed: int | None = None,
+    algorithm: str | None = None,
+    budget: int | None = None,
+    seconds: float | None = None,
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    nav: Navigation | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = True,
+    stop: Callable[[], bool] | None = None,
+) -> Plan:
+    """Plan again in flight: the legs that are flown stay, and what follows goes around threats that have popped up.
+
+    scenario: as of `planfly.plan`; threats that only the old plan knew are kept.
+    old: the plan that is being flown, or its file.  at_leg: the leg that is about to be flown, from 0.
+    threats: new ones: east, north, kill radius and detection radius of each, m; a radius of 0 for none.
+    The other keywords are as of `planfly.plan`.
+    Raises a `planfly.PlanflyError` for bad input, and for a plan of another mission.
+
+    >>> import planfly
+    >>> path = planfly.plan("tight", seed=1)
+    >>> again = planfly.replan("tight", path, 3, seed=1)
+    >>> again.flown_legs, bool((again.waypoints[:4] == path.waypoints[:4]).all())
+    (3, True)
+    """
+    change = partial(
+        changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
+        guidance=guidance, nav=nav,
+    )  # fmt: skip
+    check_arguments(seed=seed, budget=budget, seconds=seconds, at_leg=at_leg)
+    world = _with_budget(change(opened_scenario(scenario)), budget)
+    flown = old if isinstance(old, Plan) else read_plan(Path(old))
+    same_mission(world, flown)
+    return _planned(
+        _with_new_threats(world, flown, threats), scenario, (flown, at_leg), seed, algorithm, seconds, out, overwrite,
+        stop,
+    )  # fmt: skip
+
+
+def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
+    return scenario if budget is None else with_planner(scenario, "budget", budget=budget)
+
+
+def _with_new_threats(scenario: Scenario, old: Plan, threats: Sequence[Threat]) -> Scenario:
+    """A scenario with those of the old plan's threats that it lacks, and with new ones.  Raises ScenarioError."""
+    for east, north, _, _ in threats:
+        if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
+            place = f"east {east:g} m, north {north:g} m: outside the terrain that is known"
+            raise ScenarioError.of_argument("threats", (east, north), place, shown="")
+    kept = [table for table in old.scenario.spec.threats if table not in scenario.spec.threats]
+    return with_threats(scenario, threats, "threats", kept)
+
+
+def _planned(
+    world: Scenario,
+    source: Scenario | str | Path,
+    flown: tuple[Plan, int] | None,
+    seed: int | None,
+    algorithm: str | None,
+    seconds: float | None,
+    out: str | Path | None,
+    overwrite: bool,
+    stop: Callable[[], bool] | None,
+) -> Plan:
+    """Search, and write the plan.  flown: the plan that is being flown and the leg to plan from; None for a new one."""
+    number, target = choose_seed(world, seed), None
     if out is not None:
-        write_whole(Path(out), plan_json(made))
+        read = None if isinstance(source, Scenario) else Path(source)
+        target = file_target(out, world.name, number, overwrite=overwrite, source=read)
+    limits, ends = load_airframe(world).limits, _stop_condition(seconds, stop)
+    with stage(f"planning {world.name}") as advance:
+        if flown is None:
+            made = plan_path(world, limits, seed=number, algorithm=algorithm, progress=advance, stop=ends)
+        else:
+            old, leg = flown
+            made = replan_path(world, limits, old, leg, seed=number, algorithm=algorithm, progress=advance, stop=ends)
+    if target is not None:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(target, plan_json(made))
     return made
+
+
+def _stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
+    """What a search asks between generations: "interrupted", "budget" after so many seconds, or "" to go on."""
+    deadline = None if seconds is None else time.monotonic() + seconds
+
+    def ends() -> str:
+        if stop is not None and stop():
+            return "interrupted"
+        return "budget" if deadline is not None and time.monotonic() >= deadline else ""
+
+    return ends
+
+
+def what_blocks(plan: Plan) -> tuple[str, ...]:
+    """What is in the way of a plan that is not feasible, a line each; nothing for a feasible one.
+
+    >>> import planfly
+    >>> planfly.what_blocks(planfly.plan("tight", seed=1))
+    ()
+    """
+    if plan.feasible:
+        return ()
+    return tuple(explain_failure(plan, load_airframe(plan.scenario).limits))
 
 
 def scenarios() -> dict[str, str]:
@@ -136,28 +286,3 @@ def scenarios() -> dict[str, str]:
     'jacksboro'
     """
     return {name: spec.description for name, spec in embedded_scenarios().items()}
-
-
-# ----------------------------------------------------------------------
-# The aircraft that planfly knows, and one's own.
-
-
-@overload
-def aircraft() -> dict[str, Aircraft]: ...
-@overload
-def aircraft(name: str | Path) -> Aircraft: ...
-def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
-    """An aircraft by its name, or by the folder of one's own: masses, speeds and limits, in SI units and radians.
-
-    name: None for all embedded ones by name.
-    Raises a `planfly.PlanflyError` for a name that is none and a folder that holds no aircraft.
-
-    >>> import planfly
-    >>> planfly.aircraft("aerosonde").airspeed
-    25.0
-    >>> list(planfly.aircraft())
-    ['aerosonde', 'c172x']
-    """
-    if name is None:
-        return {known: load_aircraft(known) for known in aircraft_names()}
-    return find_aircraft(str(name.resolve()) if isinstance(name, Path) else name)

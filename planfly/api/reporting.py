@@ -1,37 +1,46 @@
-"""Figures, reports and comparisons of flights, and their missions in other files' forms."""
+"""Figures, reports and comparisons of flights."""
 
-import argparse
-import contextlib
-import io
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs.recording.foxglove_scene import layout_text
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
-from logs.views.report.compare import Comparison, compare_logs
-from planfly.api.flying import ExportedFiles, FlownMission, WrittenReport
-from planfly.open_mission import open_planned
-from planfly.terminal.results import (
-    COMPARE_FILES,
-    LOG_FIGURES,
-    judge_log,
-    prepare_folder,
-    refuse_existing,
-    refuse_folder,
-)
-from planner.plan import Plan, plan_json
-from world.errors import PlanflyError
-from world.files import temporary_folder, write_whole
+from logs.views.report.compare import Comparison, compare_logs, write_comparison
+from planfly.api.flying import FlownMission
+from planfly.first_start import with_warm_up
+from planfly.open_mission import judge_log, open_planned
+from planfly.stages import stage
+from planfly.targets import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
+from planner.plan import Plan
+from world.files import write_whole
+from world.html_table import html_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Source = FlightLog | FlownMission | Plan | str | Path
-# What a script writes to have results replaced.
-_ASK = "overwrite=True"
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenReport:
+    """What `planfly.report` wrote.
+
+    page: the HTML page, which needs no other file.  files: it and the pictures beside it.
+    verdict: of the flight or plan that it shows.
+    """
+
+    page: Path
+    files: tuple[Path, ...]
+    verdict: Verdict | None = None
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return html_table(f"Report {self.page}", [(file.name,) for file in self.files])
 
 
 class _Shown(NamedTuple):
@@ -45,6 +54,7 @@ class _Shown(NamedTuple):
     versions: dict[str, str] | None = None
 
 
+@with_warm_up()
 def figures(source: Source) -> "dict[str, Figure]":
     """The pictures of a flight, or of a plan that was not flown, as matplotlib figures by name.
 
@@ -64,11 +74,19 @@ def figures(source: Source) -> "dict[str, Figure]":
     return draw_figures(shown.setup, shown.track, shown.verdict)
 
 
-def report(source: Source, out: str | Path, *, svg: bool = False, overwrite: bool = False) -> WrittenReport:
+@with_warm_up()
+def report(
+    source: Source,
+    out: str | Path,
+    *,
+    svg: bool = False,
+    overwrite: bool = False,
+    command: str = "planfly.report",
+) -> WrittenReport:
     """Write ``report.html`` and its figures into a folder, made if it is missing.
 
     source: as of `planfly.figures`.  out: the folder.  svg: the figures as SVG, too.
-    overwrite: whether results that lie there may be replaced.
+    overwrite: whether results that lie there may be replaced.  command: the line that repeats it, for the page.
     Raises a `planfly.PlanflyError` for bad input, and for a folder that holds anything.
 
     >>> import planfly, tempfile
@@ -81,16 +99,40 @@ def report(source: Source, out: str | Path, *, svg: bool = False, overwrite: boo
     from logs.views.report.page import write_report
 
     shown = _shown(source)
-    folder = _prepared(out, LOG_FIGURES, overwrite)
-    files = write_report(
-        folder, shown.setup, shown.track, shown.verdict, ended=shown.ended, events=shown.events, svg=svg,
-        versions=shown.versions or package_versions(), command="planfly.report",
-    )  # fmt: skip
-    return WrittenReport(folder / "report.html", tuple(files))
+    folder = clean_folder(out, LOG_FIGURES, overwrite=overwrite)
+    with stage("drawing"):
+        files = write_report(
+            folder, shown.setup, shown.track, shown.verdict, ended=shown.ended, events=shown.events, svg=svg,
+            versions=shown.versions or package_versions(), command=command,
+        )  # fmt: skip
+    return WrittenReport(folder / "report.html", tuple(files), shown.verdict)
 
 
-def compare(first: FlightLog | str | Path, second: FlightLog | str | Path, out: str | Path | None = None, *,
-            svg: bool = False, overwrite: bool = False) -> Comparison:  # fmt: skip
+def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
+    """Write the layout file with which Foxglove shows flight logs.
+
+    overwrite: whether an existing file is replaced.
+    Raises a `planfly.PlanflyError` for a file that cannot be written.
+
+    >>> import planfly, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     planfly.foxglove_layout(Path(folder) / "layout.json").name
+    'layout.json'
+    """
+    refuse_existing(Path(file), overwrite)
+    write_whole(Path(file), layout_text())
+    return Path(file)
+
+
+@with_warm_up()
+def compare(
+    first: FlightLog | str | Path,
+    second: FlightLog | str | Path,
+    out: str | Path | None = None,
+    *,
+    svg: bool = False,
+    overwrite: bool = False,
+) -> Comparison:
     """Two flights judged and measured alike.
 
     first, second: flight logs, or their paths.
@@ -107,60 +149,10 @@ def compare(first: FlightLog | str | Path, second: FlightLog | str | Path, out: 
     logs = [log if isinstance(log, FlightLog) else read_log(log) for log in (first, second)]
     found = compare_logs(*logs, names=(Path(logs[0].source).name, Path(logs[1].source).name))
     if out is not None:
-        from logs.views.report.compare import write_comparison
-
-        write_comparison(_prepared(out, COMPARE_FILES, overwrite), found, svg=svg)
+        folder = clean_folder(out, COMPARE_FILES, overwrite=overwrite)
+        with stage("drawing"):
+            write_comparison(folder, found, svg=svg)
     return found
-
-
-def export(source: FlightLog | FlownMission | Plan | str | Path, *files: str | Path, fence: str | Path | None = None,
-           overwrite: bool = False) -> ExportedFiles:  # fmt: skip
-    """Write a plan, a mission or a flight in the forms that the files' suffixes name.
-
-    source: a plan, a flight with a log, or the path of a plan.json, mission file or log.
-    files: .waypoints, .plan, .fence, .rally, .kml, .gpx.  fence: a file of fences or zones beside its own.
-    overwrite: whether files that are there may be replaced.
-    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
-
-    >>> import planfly, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     written = planfly.export(planfly.plan("tight", seed=1), f"{folder}/m.waypoints", Path(folder) / "m.kml")
-    ...     [file.suffix for file in written.files]
-    ['.waypoints', '.kml']
-    """
-    if not files:
-        raise PlanflyError("export: no file: one at least is expected", field="files")
-    targets = tuple(Path(file) for file in files)
-    for target in targets:
-        refuse_existing(target, overwrite, ask=_ASK)
-    with contextlib.ExitStack() as place:
-        path = _as_file(source, place)
-        options = argparse.Namespace(
-            plan=str(path), files=[str(file) for file in targets], fence=[] if fence is None else [str(fence)],
-            overwrite=overwrite,
-        )  # fmt: skip
-        # One road for both doors; what it prints are the notes.
-        from planfly.commands.export import export as export_command
-
-        notes = place.enter_context(contextlib.redirect_stderr(io.StringIO()))
-        with contextlib.redirect_stdout(io.StringIO()):
-            export_command(options)
-        return ExportedFiles(targets, tuple(notes.getvalue().splitlines()))
-
-
-def _as_file(source: FlightLog | FlownMission | Plan | str | Path, place: contextlib.ExitStack) -> Path:
-    """The file that a source is, or one made for it while the place is open."""
-    if isinstance(source, Plan):
-        file = place.enter_context(temporary_folder("planfly-export-")) / "plan.json"
-        write_whole(file, plan_json(source))
-        return file
-    if isinstance(source, FlightLog):
-        return Path(source.source)
-    if isinstance(source, FlownMission):
-        if source.log is None:
-            raise PlanflyError("export: a flight without a log: fly(..., log=FILE) writes one", field="source")
-        return source.log
-    return Path(source)
 
 
 def _shown(source: Source) -> _Shown:
@@ -171,10 +163,3 @@ def _shown(source: Source) -> _Shown:
         return _Shown(source.setup, source.verdict, source.track, source.ended, source.events)
     log = source if isinstance(source, FlightLog) else read_log(source)
     return _Shown(log.setup, judge_log(log), log.track, log.ended, log.events, log.versions)
-
-
-def _prepared(out: str | Path, files: tuple[str, ...], overwrite: bool) -> Path:
-    folder = Path(out)
-    refuse_folder(folder, overwrite, ask=_ASK)
-    prepare_folder(folder, files)
-    return folder

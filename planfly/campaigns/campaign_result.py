@@ -1,7 +1,7 @@
-"""Campaigns for Python: fly one, and read what came of it."""
+"""What a campaign gives: its result, its goal, and the command line that repeats it."""
 
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,25 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.campaign_base import open_campaign
-from planfly.campaigns.dispersions import default_dispersions, read_dispersions
+from planfly.arguments import check_arguments
 from planfly.campaigns.find_winds import USUAL_WIND_FLIGHTS, WindsGoal
-from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goal
-from planfly.campaigns.report import campaign_folder, finish_campaign
 from planfly.campaigns.statistics.decision import USUAL_CONFIDENCE, Answer, Goal, Interval
-from planfly.campaigns.summary import CampaignSummary, campaign_lines, summarise
-from planfly.campaigns.tables import DATABASE, read_shapes, read_table
-from planfly.campaigns.worker_pool import Workers, in_own_process
+from planfly.campaigns.summary import CampaignSummary, campaign_lines
+from planfly.campaigns.tables import read_shapes
+from world.errors import ArgumentError
 from world.html_table import html_table
 
 # ----------------------------------------------------------------------
 # The command line that repeats a campaign or a search for winds, for its page.
 
-# Options that decide what is flown, beside the goal's; of the command line's usual values nothing is said.
-OPTIONS = (
-    *("seed", "spread", "scenario", "terrain", "fence", "aircraft", "airspeed", "wind", "turbulence"),
-    *("params", "guidance", "nav"),
-)
+# What the command line takes by itself: nothing is said of these values.
 _USUAL = {"confidence": 0.95, "directions": 16, "most": 20.0}
 
 
@@ -142,79 +135,14 @@ class CampaignResult:
         return html_table(campaign_lines(self.summary)[0], self.by_rule.items(), ("rule", "flights that it fails"))
 
 
-def campaign(
-    target: str | Path,
-    *,
-    spread: Path | str | None = None,
-    flights: int | None = None,
-    prove: float | None = None,
-    at_least: float | None = None,
-    confidence: float | None = None,
-    seed: int | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    out: Path | str | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
-) -> CampaignResult:
-    """Fly a mission many times, each time as `planfly fly` would in its own wind, aircraft, terrain and start.
-
-    target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
-    spread: a TOML file of what varies; None takes planfly's default.
-    flights: how many; None takes 300, or, with ``prove``, 5,000 at most.  Without flights, ``prove`` and ``at_least`` a
-    campaign that is resumed goes on with its own.
-    prove: a probability: fly until it is reached or missed, whichever comes first.  at_least: one to answer after all
-    flights.  Not both.
-    confidence: of each bound; None takes 0.95, or what it was of a campaign that is resumed.
-    seed: of plan and draws; None takes the scenario's, or 1.
-    workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
-    out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
-    overwrite: replace it.
-
-    A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
-    Raises ValueError for numbers that are none, and a `planfly.PlanflyError` for bad input.
-
-    >>> campaign("paper-07", prove=1.5)
-    Traceback (most recent call last):
-    ...
-    ValueError: prove: 1.5: at least 0.5 and below 1 is expected
-    """
-    goal = make_goal(flights, prove, at_least, confidence)
-    chosen = default_dispersions() if spread is None else read_dispersions(Path(spread))
-    with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as asked:
-        folder = asked.folder
-        if resume:
-            unasked = (flights, prove, at_least) == (None, None, None)
-            goal = resumed_goal(None if unasked else goal, folder, confidence)
-        base = asked.open(lambda plan: in_own_process(open_campaign, str(target), chosen, planned=plan, seed=seed))
-        with open_store(base, goal, folder, resume=resume) as store:
-            estimate = fly_campaign(base, goal, Workers(workers, scheduler), store)
-            summary = summarise(base, goal, estimate, store) if out is None else None
-        if summary is None:
-            command = campaign_line(str(target), goal, {"seed": base.seed, "spread": spread})
-            summary = finish_campaign(base, goal, estimate, folder, command)
-        table = folder / DATABASE
-        return CampaignResult(summary, read_table(table), None if out is None else table)
-
-
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
-    """The goal that options come to.  Raises ValueError for numbers that are none.
+    """The goal that keywords come to.  Raises ArgumentError for numbers out of their ranges.
 
     >>> make_goal(None, 0.99, None, None)
     Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)
     """
     if prove is not None and at_least is not None:
-        raise ValueError("prove and at_least: give one of them")
-    for name, value in _shares(prove, at_least, confidence):
-        if value is not None and not 0.5 <= value < 1.0:
-            raise ValueError(f"{name}: {value}: at least 0.5 and below 1 is expected")
-    if flights is not None and not 1 <= flights <= 10_000_000:
-        raise ValueError(f"flights: {flights}: 1 to 10,000,000 is expected")
+        raise ArgumentError("`prove` and `at_least`: give one of them", field="prove", value=prove)
+    check_arguments(prove=prove, at_least=at_least, confidence=confidence, flights=flights)
     number = flights or (USUAL_FLIGHTS if prove is None else MAX_FLIGHTS)
     return Goal(prove if prove is not None else at_least, prove is not None, number, confidence or USUAL_CONFIDENCE)
-
-
-def _shares(
-    prove: float | None, at_least: float | None, confidence: float | None
-) -> Iterable[tuple[str, float | None]]:
-    return (("prove", prove), ("at_least", at_least), ("confidence", confidence))

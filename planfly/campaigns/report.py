@@ -43,7 +43,7 @@ from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, Store, refuse_hel
 from planfly.campaigns.worker_pool import in_own_process
 from planfly.pipeline import Advance, make_setup
 from planner.plan import plan_json
-from world.errors import PlanflyError
+from world.errors import ArgumentError, PlanflyError
 from world.files import write_whole
 
 # Flights whose way is drawn, at most: of more a picture shows no more.
@@ -171,18 +171,16 @@ class OutputDirectory:
 
     table: name of the file of flights.
     resume: go on with the campaign that is there.  overwrite: replace it.
-    asks: how either is asked for, for the lines that refuse.
     """
 
     folder: Path
     table: str
     resume: bool
     overwrite: bool
-    asks: tuple[str, str] = ("resume=True", "overwrite=True")
 
     def refuse(self) -> None:
         """Refuse a folder that is a file, or has other contents than were asked for.  Raises PlanflyError."""
-        folder, (resume, overwrite) = self.folder, self.asks
+        folder = self.folder
         if self.resume:
             if not (folder / self.table).is_file():
                 raise PlanflyError(f"{folder / self.table}: no campaign there to go on with", file=folder / self.table)
@@ -193,11 +191,11 @@ class OutputDirectory:
             return
         if (folder / self.table).exists():
             raise PlanflyError(
-                f"{folder}: holds a campaign; {resume} goes on with it, {overwrite} replaces it", file=folder
+                f"{folder}: holds a campaign; resume=True goes on with it, overwrite=True replaces it", file=folder
             )
         if any((folder / name).exists() for name in CAMPAIGN_FILES):
-            raise PlanflyError(f"{folder}: holds another campaign; {overwrite} replaces it", file=folder)
-        raise PlanflyError(f"{folder}: exists and is not empty; {overwrite} replaces its results", file=folder)
+            raise PlanflyError(f"{folder}: holds another campaign; overwrite=True replaces it", file=folder)
+        raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 
     def open(self, opened: Callable[[Path | None], CampaignBase]) -> CampaignBase:
         """The mission, and the folder ready for it: cleared, or with what is to be gone on with.
@@ -220,13 +218,14 @@ class OutputDirectory:
 def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwrite: bool) -> Iterator[OutputDirectory]:
     """A campaign's folder; out: None for one that is removed at the end.
 
-    Raises ValueError for a campaign to resume without a folder.
+    Raises ArgumentError for a campaign to resume without a folder.
     """
     if out is not None:
         yield OutputDirectory(Path(out), table, resume, overwrite)
         return
     if resume:
-        raise ValueError("resume: out is missing: the folder of what is to be gone on with")
+        allowed = "`out` is missing: the folder of what is to be gone on with"
+        raise ArgumentError.of_argument("resume", resume, allowed, shown="")
     with tempfile.TemporaryDirectory() as name:
         yield OutputDirectory(Path(name), table, resume=False, overwrite=False)
 

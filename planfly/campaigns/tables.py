@@ -449,6 +449,12 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
     return table
 
 
+def count_flights(path: Path) -> int:
+    """How many flights a table of either kind has.  Raises StoreError for a file that is none of ours or is held."""
+    with _opened(path) as connection:
+        return int(connection.execute("SELECT COUNT(*) FROM flights").fetchone()[0])
+
+
 def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
     """What a campaign keeps of each flight's way, in the order of flights; NaN for flights that have none.
 

@@ -132,8 +132,7 @@ def connected(workers: Workers) -> Iterator[Any]:
             try:
                 client = cluster_types.Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
             except (OSError, TimeoutError, ValueError) as error:
-                message = f"--scheduler {address}: no scheduler answers: {error}"
-                raise SchedulerError(message, field="--scheduler", value=address) from error
+                raise SchedulerError.of_argument("scheduler", address, f"no scheduler answers: {error}") from error
             with client:
                 yield client
             return
@@ -194,8 +193,7 @@ def _local_cluster(cluster_types: Any, number: int, folder: Path) -> Any:
             env={"TMPDIR": str(folder)},
         )
     except (RuntimeError, OSError) as error:
-        message = f"--workers {number}: could not be started: {error}"
-        raise SchedulerError(message, field="--workers", value=number) from error
+        raise SchedulerError.of_argument("workers", number, f"could not be started: {error}") from error
 
 
 def checked_address(address: str) -> str:
@@ -208,7 +206,7 @@ def checked_address(address: str) -> str:
     >>> checked_address("tcp://10.0.0.7:8786")
     Traceback (most recent call last):
     ...
-    planfly.campaigns.worker_pool.SchedulerError: --scheduler tcp://10.0.0.7:8786: plain TCP beyond loopback; ...
+    planfly.campaigns.worker_pool.SchedulerError: scheduler tcp://10.0.0.7:8786: plain TCP beyond loopback; ...
     """
     whole = address if "://" in address else f"tcp://{address}"
     try:
@@ -218,10 +216,10 @@ def checked_address(address: str) -> str:
         host = port = None
     if not host or not port or parts.scheme not in ("tcp", "tls"):
         allowed = "tcp://HOST:PORT on this machine, or tls://HOST:PORT, is expected"
-        raise SchedulerError.of_option("--scheduler", address, allowed)
+        raise SchedulerError.of_argument("scheduler", address, allowed)
     if parts.scheme == "tcp" and not _is_loopback(host):
         allowed = "plain TCP beyond loopback; use tls://, with certificates in dask's configuration"
-        raise SchedulerError.of_option("--scheduler", address, allowed)
+        raise SchedulerError.of_argument("scheduler", address, allowed)
     return whole
 
 

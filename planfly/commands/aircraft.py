@@ -3,23 +3,24 @@
 import argparse
 import math
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planfly.terminal.answers.giving import give_answer
+import planfly
+from planfly.terminal.arguments import aircraft_words, completed
+from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.output import progress
-from planfly.terminal.results import RESULTS, prepare_folder, print_warnings, refuse_folder
+from planfly.terminal.options import call, result_options
+from planfly.terminal.output import give_answer
+from planfly.terminal.results import print_warnings
 from world.errors import PlanflyError
-from world.files import write_whole
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from aircraft.catalog import Aircraft
     from aircraft.envelope import Envelope
     from flight.dynamics.characteristics import Mode, TrimRow
-    from planfly.terminal.answers.answer_data import AircraftNumbers
+    from planfly import AircraftNumbers
 
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
 _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
@@ -27,121 +28,86 @@ _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
 _WIND = 10.0
 
 
+def aircraft_options(line: LineParser) -> None:
+    """The parser of ``planfly aircraft``."""
+    parser = line.command(
+        "aircraft",
+        "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list them",
+        "planfly aircraft aerosonde --out aerosonde",
+        "planfly aircraft --new ./mine --from aerosonde",
+    )
+    completed(
+        parser.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)"),
+        aircraft_words,
+    )
+    parser.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
+    own = parser.group("an aircraft of your own")
+    own.add_argument("--new", dest="folder", metavar="FOLDER", help="make its folder, which must not exist yet")
+    completed(
+        own.add_argument(
+            "--from", dest="source", metavar="NAME", help="with --new: the aircraft to start from (default: aerosonde)"
+        ),
+        aircraft_words,
+    )
+    result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced)")
+
+
 def aircraft(args: argparse.Namespace) -> int:
     """List the embedded aircraft, print and draw the one that is named, or make a folder for a new one."""
-    from aircraft.catalog import aircraft_names, load_aircraft
-
-    if args.new is not None:
+    if args.folder is not None:
         return _make_folder(args)
     if args.source is not None:
-        allowed = "goes with --new FOLDER, the folder to make"
-        raise PlanflyError(f"--from: {allowed}", field="--from", value=args.source, allowed=allowed)
+        allowed = "goes with `folder` FOLDER, the folder to make"
+        raise PlanflyError.of_argument("source", args.source, allowed, shown="")
     if args.name is None:
-        for name in aircraft_names():
-            known = load_aircraft(name)
-            print(f"{name:<12} {known.title}: {known.mass:.5g} kg, cruises at {known.airspeed:g} m/s")
-        give_answer(args, lambda: aircraft_answer([load_aircraft(name) for name in aircraft_names()]))
+        listed = list(planfly.aircraft().values())
+        for known in listed:
+            print(f"{known.name:<12} {known.title}: {known.mass:.5g} kg, cruises at {known.airspeed:g} m/s")
+        give_answer(args, lambda: _answer(listed))
         return FLYABLE
-    chosen, identity = _find(args.name)
-    lacking = _check_steering(chosen)
-    folder = Path(args.out) if args.out else RESULTS / f"aircraft-{chosen.name}"
-    if args.out:
-        refuse_folder(folder, args.overwrite)
-    # Everything is worked out before anything is written.
-    numbers = _work_out(chosen, motor_braking=args.motor_braking)
-    pictures = _print_and_draw(chosen, identity, numbers)
-    print_warnings(lacking)
-    prepare_folder(folder, tuple(pictures))
-    for name, data in pictures.items():
-        write_whole(folder / name, data)
-        print(f"picture   {folder / name}")
-    files = [str(folder / name) for name in pictures]
-    give_answer(args, lambda: aircraft_answer([chosen], numbers, identity, lacking, files))
+    out = args.out or "runs/aircraft-{name}"
+    numbers = call(planfly.describe_aircraft, args, out=out, overwrite=args.overwrite or args.out is None)
+    _print_numbers(numbers)
+    print_warnings(numbers.lacking)
+    for file in numbers.files:
+        print(f"picture   {file}")
+    give_answer(args, lambda: _answer([numbers.aircraft], numbers))
     return FLYABLE
 
 
-def aircraft_answer(
-    chosen: "Sequence[Aircraft]",
-    numbers: "AircraftNumbers | None" = None,
-    identity: str = "",
-    lacking: "Sequence[str]" = (),
-    files: "Sequence[str]" = (),
-) -> object:
-    """Return what --json writes: of one aircraft with its numbers, or of several without."""
-    # Imported here: schemas take pydantic.
-    from planfly.terminal.answers.answer_data import AircraftAnswer, aircraft_detail, aircraft_entry
+def _answer(chosen: "Sequence[Aircraft]", numbers: "AircraftNumbers | None" = None) -> object:
+    """What --json writes: of one aircraft with its numbers, or of several without."""
+    from planfly.terminal.answers import AircraftAnswer, aircraft_detail, aircraft_entry
 
-    detail = None if numbers is None else aircraft_detail(numbers, identity, lacking, files)
+    detail = None if numbers is None else aircraft_detail(numbers)
     return AircraftAnswer(exit_code=FLYABLE, aircraft=[aircraft_entry(one, detail) for one in chosen])
 
 
-def _find(name: str) -> "tuple[Aircraft, str]":
-    """The aircraft of a name or in a folder, and the hash of its model.  Raises PlanflyError."""
-    from aircraft.catalog import find_aircraft, model_hash
-    from world.files import whole_path
-    from world.scenario_tables import names_folder
-
-    if names_folder(name) and not Path(name).exists():
-        message = f"{name}: no such folder; planfly aircraft --new {shlex.quote(name)} makes it"
-        raise PlanflyError(message, file=name)
-    chosen = find_aircraft(whole_path(Path(name)) if names_folder(name) else name)
-    return chosen, model_hash(chosen)
-
-
 def _make_folder(args: argparse.Namespace) -> int:
-    from aircraft.catalog import make_own_folder
-
     if args.name is not None:
         message = f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with"
-        raise PlanflyError(message, field="--new", value=args.new)
-    folder = Path(args.new)
-    source, _ = _find(args.source or "aerosonde")
-    files = make_own_folder(folder, source)
+        raise PlanflyError(message, field="--new", value=args.folder)
+    folder, source = Path(args.folder), args.source or "aerosonde"
+    made = call(planfly.new_aircraft, args)
+    files = sorted(file.name for file in made.folder.iterdir())
     shown = folder if folder.is_absolute() else f"./{folder}"
-    print(f"aircraft  {shown}/ ({', '.join(files)}), as {source.name}")
-    give_answer(args, lambda: aircraft_answer([_find(str(folder.absolute()))[0]]))
+    print(f"aircraft  {shown}/ ({', '.join(files)}), as {Path(source).name}")
+    give_answer(args, lambda: _answer([made]))
     print(f"next      planfly aircraft {shlex.quote(str(shown))}, and --aircraft {shlex.quote(str(shown))} flies it")
     return FLYABLE
 
 
-def _check_steering(chosen: "Aircraft") -> list[str]:
-    """What lacks for a flight; raises PlanflyError for gains, parameters or servos that are there and broken."""
-    from flight.autopilots.catalog import AUTOPILOTS
-
-    return [lacking for kind in AUTOPILOTS for lacking in kind.missing_files(chosen)]
-
-
-def _work_out(chosen: "Aircraft", *, motor_braking: bool) -> "AircraftNumbers":
-    from flight.dynamics.characteristics import modes_at, step_responses, trim_table
-    from flight.dynamics.envelope_tables import load_envelope
-    from planfly.terminal.answers.answer_data import AircraftNumbers
-
-    with progress(f"trimming {chosen.name}"):
-        envelope = load_envelope(chosen, motor_braking=motor_braking)
-        trims = trim_table(chosen)
-        modes = {row.trim.airspeed: modes_at(chosen, row.trim.airspeed) for row in trims}
-        return AircraftNumbers(envelope, trims, modes, modes_at(chosen, chosen.airspeed), step_responses(chosen))
-
-
-def _print_and_draw(chosen: "Aircraft", identity: str, numbers: "AircraftNumbers") -> dict[str, bytes]:
+def _print_numbers(numbers: "AircraftNumbers") -> None:
     from flight.dynamics.characteristics import TRIM_AMSL
-    from logs.views.aircraft import draw_envelope, draw_steps, draw_trims
-    from logs.views.drawing import png_bytes
 
-    envelope, trims, modes, cruise, steps = numbers
+    chosen, envelope = numbers.aircraft, numbers.envelope
     print(f"{chosen.name}: {chosen.title}")
-    print(f"  model    {identity[:16]}")
+    print(f"  model    {numbers.model_sha256[:16]}")
     _print_limits(chosen, envelope)
-    _print_trims(trims, TRIM_AMSL)
-    _print_modes(cruise, chosen.airspeed, TRIM_AMSL)
+    _print_trims(numbers.trims, TRIM_AMSL)
+    _print_modes(numbers.cruise, chosen.airspeed, TRIM_AMSL)
     _print_envelope(chosen, envelope)
     _print_turns(chosen)
-    with progress("drawing"):
-        return {
-            "envelope.png": png_bytes(draw_envelope(chosen, envelope)),
-            "trims.png": png_bytes(draw_trims(chosen, trims, modes)),
-            "steps.png": png_bytes(draw_steps(chosen, steps)),
-        }
 
 
 def _print_limits(chosen: "Aircraft", envelope: "Envelope") -> None:

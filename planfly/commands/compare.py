@@ -3,21 +3,41 @@
 import argparse
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from logs.recording.reader import read_log
-from logs.views.report.compare import Comparison, compare_logs, difference_lines
-from planfly.terminal.answers.giving import give_answer
+import planfly
+from planfly.targets import COMPARE_FILES
+from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.output import progress
-from planfly.terminal.results import COMPARE_FILES, prepare_folder, refuse_folder, warn_of_loss
+from planfly.terminal.options import log_argument, result_options
+from planfly.terminal.output import give_answer
+from planfly.terminal.results import warn_of_loss
+
+if TYPE_CHECKING:
+    from planfly import Comparison
+
+
+def compare_options(line: LineParser) -> None:
+    """The parser of ``planfly compare``."""
+    parser = line.command(
+        "compare",
+        "compare two flights: a table of differences, and pictures",
+        "planfly compare calm.mcap windy.mcap --out both",
+    )
+    log_argument(parser, "first", "A.mcap")
+    log_argument(parser, "second", "B.mcap", "another")
+    parser.add_argument("--svg", action="store_true", help="also write the pictures as SVG")
+    result_options(parser, "write pictures and compare.html there (default: the table alone)")
 
 
 def compare(args: argparse.Namespace) -> int:
     """Print the differences, and draw them where a folder is named; 3 if either log is cut short."""
-    first, second = Path(args.first), Path(args.second)
-    logs = [read_log(first), read_log(second)]
-    comparison = compare_logs(*logs, names=(first.name, second.name))
-    files = _draw(comparison, Path(args.out), args) if args.out else []
+    from logs.views.report.compare import difference_lines
+
+    logs = [planfly.read_log(Path(file)) for file in (args.first, args.second)]
+    comparison = planfly.compare(logs[0], logs[1], args.out, svg=args.svg, overwrite=args.overwrite)
+    made = [] if args.out is None else [Path(args.out) / name for name in COMPARE_FILES]
+    files = [file for file in made if file.exists()]
     print("\n".join(difference_lines(comparison)))
     for file in files:
         print(f"compare   {file}")
@@ -29,8 +49,8 @@ def compare(args: argparse.Namespace) -> int:
     return code
 
 
-def _answer(comparison: Comparison, files: list[Path], code: int) -> object:
-    from planfly.terminal.answers.answer_data import CompareAnswer, QuantityPair
+def _answer(comparison: "Comparison", files: list[Path], code: int) -> object:
+    from planfly.terminal.answers import CompareAnswer, QuantityPair
 
     def number(value: float) -> float | None:
         return value if math.isfinite(value) else None
@@ -46,13 +66,3 @@ def _answer(comparison: Comparison, files: list[Path], code: int) -> object:
         notes=list(comparison.notes),
         files=[str(file) for file in files],
     )
-
-
-def _draw(comparison: Comparison, folder: Path, args: argparse.Namespace) -> list[Path]:
-    # matplotlib loads for pictures alone.
-    from logs.views.report.compare import write_comparison
-
-    refuse_folder(folder, args.overwrite)
-    prepare_folder(folder, COMPARE_FILES)
-    with progress("drawing"):
-        return write_comparison(folder, comparison, svg=args.svg)

@@ -4,35 +4,49 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from planfly.paper import PROBLEMS, file_names, plan_section, table, table_text, write_figures, write_tables
-from planfly.terminal.answers.giving import give_answer
+import planfly
+from planfly.arguments import CHOICES
+from planfly.targets import RESULTS
+from planfly.terminal.arguments import number, problems
+from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.output import progress
-from planfly.terminal.results import RESULTS, prepare_folder, refuse_folder
-from world.files import hold
+from planfly.terminal.options import call, result_options
+from planfly.terminal.output import give_answer
+
+
+def paper_options(line: LineParser) -> None:
+    """The parser of ``planfly paper``."""
+    parser = line.command(
+        "paper",
+        "plan the paper's section V again: tables and figures of seeded plans in three encodings",
+        "planfly paper --problems 7,60 --runs 5 --out my-paper",
+    )
+    parser.add_argument(
+        "--problems", metavar="N,...", type=problems, default=CHOICES["problems"],
+        help="numbers of threats (default: 7,15,30,60)",
+    )  # fmt: skip
+    parser.add_argument("--runs", metavar="N", type=number("runs"), default=15, help="seeds 1..N of each (default: 15)")
+    parser.add_argument(
+        "--algorithm", metavar="A", default="umda",
+        help="the algorithm beside the two baselines (default: umda, the paper's)",
+    )  # fmt: skip
+    parser.add_argument("--jobs", metavar="N", type=number("jobs"), help="processes (default: one a core)")
+    result_options(parser, "where tables and figures go (default: runs/paper, replaced)")
 
 
 def paper(args: argparse.Namespace) -> int:
     """Plan, write and print; 0 whatever the table holds: no path in it is an answer too."""
     folder = Path(args.out) if args.out else RESULTS / "paper"
-    if args.out:
-        refuse_folder(folder, args.overwrite)
-    with progress("planning") as advance:
-        plans = plan_section(args.problems, args.runs, args.algorithm, args.jobs, advance)
-    rows = table(plans)
-    folder.mkdir(parents=True, exist_ok=True)
-    with hold(folder):
-        prepare_folder(folder, tuple(file_names(PROBLEMS)))
-        write_tables(folder, rows, plans)
-        with progress("drawing"):
-            write_figures(folder, plans)
-    print(table_text(rows))
+    made = call(planfly.paper_tables, args, out=folder, overwrite=args.overwrite or args.out is None)
+    from planfly.paper import table_text
+
+    print(table_text(made.rows))
     print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
 
     def answer() -> object:
-        from planfly.terminal.answers.answer_data import PaperAnswer, PaperRow
+        from planfly.terminal.answers import PaperAnswer, PaperRow
 
-        return PaperAnswer(exit_code=FLYABLE, folder=str(folder), rows=[PaperRow(**asdict(row)) for row in rows])
+        return PaperAnswer(exit_code=FLYABLE, folder=str(folder), rows=[PaperRow(**asdict(row)) for row in made.rows])
 
     give_answer(args, answer)
     return FLYABLE

@@ -1,40 +1,44 @@
-"""``planfly recover``: an unfinished or damaged log made whole, as far as it can be read."""
+"""``planfly recover``: a new log of what can be read of an unfinished or damaged one."""
 
 import argparse
 from pathlib import Path
 
-from logs.recording.reader import FlightLog
-from logs.recording.recover import recover_log
-from planfly.terminal.answers.giving import give_answer
+import planfly
+from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.results import refuse_existing, warn_of_loss
-from world.errors import PlanflyError
-from world.files import write_whole
+from planfly.terminal.options import call, log_argument, result_options
+from planfly.terminal.output import give_answer
+from planfly.terminal.results import warn_of_loss
+
+
+def recover_options(line: LineParser) -> None:
+    """The parser of ``planfly recover``."""
+    parser = line.command(
+        "recover",
+        "write what can be read of an unfinished or damaged log as a new, complete one",
+        "planfly recover flight.mcap --out whole.mcap",
+    )
+    log_argument(parser)
+    result_options(parser, "the new log (default: <log>-recovered.mcap beside it)", "FILE")
 
 
 def recover(args: argparse.Namespace) -> int:
-    """Write what can be read as a new log; nothing is written for a log that is whole."""
+    """Write what can be read as a new log; nothing is written for a log that is complete."""
     source = Path(args.log)
     target = Path(args.out) if args.out else source.with_name(f"{source.stem}-recovered.mcap")
-    if args.out is None and target.exists() and not args.overwrite:
-        raise PlanflyError(f"{target}: exists; --overwrite replaces it, --out names another", file=target)
-    refuse_existing(target, args.overwrite)
-    recovered = recover_log(source)
-    if recovered is None:
+    log = call(planfly.recover, args, out=target)
+    if log is None:
         print(f"{source}: complete: there is nothing to recover, and nothing was written")
-        give_answer(args, lambda: _answer(None, None))
+        give_answer(args, lambda: _answer(None, None, None))
         return FLYABLE
-    write_whole(target, recovered.data)
-    log = recovered.log
     print(f"log       {target} ({len(log.track)} rows, to {log.end_time:.1f} s)")
     warn_of_loss(log)
-    give_answer(args, lambda: _answer(target, log))
+    give_answer(args, lambda: _answer(target, len(log.track), log.end_time))
     return LOSS
 
 
-def _answer(target: Path | None, log: FlightLog | None) -> object:
-    from planfly.terminal.answers.answer_data import RecoverAnswer
+def _answer(target: Path | None, rows: int | None, end: float | None) -> object:
+    from planfly.terminal.answers import RecoverAnswer
 
-    if target is None or log is None:
-        return RecoverAnswer(exit_code=FLYABLE, log=None, rows=None, end_s=None)
-    return RecoverAnswer(exit_code=LOSS, log=str(target), rows=len(log.track), end_s=log.end_time)
+    code = FLYABLE if target is None else LOSS
+    return RecoverAnswer(exit_code=code, log=None if target is None else str(target), rows=rows, end_s=end)

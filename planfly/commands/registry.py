@@ -1,53 +1,132 @@
-"""The commands by name.  A command's module is imported when the command is given, and no other's."""
+"""The commands: one list, of which the parser, the help, the schemas and the dispatch are made.
+
+A command is a module here with two functions: ``NAME_options`` adds its parser to the line, and ``NAME`` takes the
+parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels that it needs.
+All modules are light: what a command works with is imported when it is given.
+"""
 
 import argparse
+import json
 from collections.abc import Callable
 from importlib import import_module
+from typing import Any, NamedTuple
+
+from planfly import __version__
+from planfly.terminal.command_parser import LineParser
 
 CommandFunction = Callable[[argparse.Namespace], int]
 
-COMMAND_NAMES = (
-    "run",
-    "plan",
-    "export",
-    "fly",
-    "check",
-    "aircraft",
-    "serve",
-    "replay",
-    "recover",
-    "report",
-    "compare",
-    "paper",
-    "campaign",
-    "winds",
-    "import",
-    "refly",
-    "scenarios",
-    "help",
-    "completion",
+
+class Command(NamedTuple):
+    """A command of the line.
+
+    section: the heading that it stands below in ``planfly --help``.
+    answer: what it answers with --json, a class of `planfly.terminal.answers`; "" for a command without it.
+    module, function: in this package; "" where they have the command's name.
+    """
+
+    name: str
+    section: str
+    answer: str = ""
+    module: str = ""
+    function: str = ""
+
+    def load(self, ending: str = "") -> Any:
+        """The command's function; with the ending "_options" the one that adds its parser."""
+        module = import_module(f"planfly.commands.{self.module or self.name}")
+        return getattr(module, (self.function or self.name) + ending)
+
+
+_FLY, _LOOK, _OTHERS = "plan and fly", "judge and show", "logs of autopilots"
+_MANY, _AIRCRAFT, _HELP = "many flights", "aircraft and scenarios", "help"
+
+COMMANDS = (
+    Command("run", _FLY, "RunAnswer"),
+    Command("plan", _FLY, "PlanAnswer"),
+    Command("export", _FLY, "ExportAnswer"),
+    Command("fly", _FLY, "FlyAnswer"),
+    Command("serve", _FLY),
+    Command("check", _LOOK, "VerdictDocument"),
+    Command("report", _LOOK, "ReportAnswer"),
+    Command("compare", _LOOK, "CompareAnswer"),
+    Command("replay", _LOOK, "ReplayAnswer"),
+    Command("recover", _LOOK, "RecoverAnswer"),
+    Command("import", _OTHERS, "ImportAnswer", "imported_logs", "import_log"),
+    Command("refly", _OTHERS, "ReflyAnswer", "imported_logs"),
+    Command("campaign", _MANY, "CampaignDocument", "campaigns"),
+    Command("winds", _MANY, "WindsDocument", "campaigns"),
+    Command("paper", _MANY, "PaperAnswer"),
+    Command("aircraft", _AIRCRAFT, "AircraftAnswer"),
+    Command("scenarios", _AIRCRAFT, "ScenariosAnswer", "shell"),
+    Command("help", _HELP, module="shell", function="show_help"),
+    Command("completion", _HELP, module="shell"),
 )
-# Commands that share a module, or whose name is a keyword of Python: the module in this package, and the function.
-_FUNCTIONS = {
-    "import": ("imported_logs", "import_log"),
-    "refly": ("imported_logs", "refly"),
-    "help": ("shell", "show_help"),
-    "completion": ("shell", "completion"),
-    "scenarios": ("shell", "scenarios"),
-}
+
+_FIRST_STEPS = """\
+first steps:
+  planfly run jacksboro                        plan, fly, judge and report the demo
+  planfly fly mission.waypoints --terrain DEM  fly a mission of your own over your elevation file
+  planfly help fly                             everything about one command"""
+
+
+def build_parser() -> LineParser:
+    """The parser of the whole command line."""
+    line = LineParser(
+        __version__,
+        "Will this plan really fly?  Plans a fixed-wing path over terrain and threats,\n"
+        "flies it (or any mission file) in JSBSim, and gives a verdict with numbers.",
+        _FIRST_STEPS,
+    )
+    for command in COMMANDS:
+        line.section(command.section)
+        command.load("_options")(line)
+    return line
 
 
 def find_command(name: str) -> CommandFunction:
     """The function that carries a command out: parsed arguments to exit code.
 
-    Its results go to standard output, its progress to standard error.  Raises KeyError for a name that is not
-    one of `COMMAND_NAMES`.
+    Its results go to standard output, its progress to standard error.  Raises KeyError for a name that is none.
 
     >>> find_command("scenarios").__module__
     'planfly.commands.shell'
     """
-    if name not in COMMAND_NAMES:
+    function: CommandFunction = _named(name).load()
+    return function
+
+
+def _named(name: str) -> Command:
+    return {command.name: command for command in COMMANDS}[name]
+
+
+# ----------------------------------------------------------------------
+# The JSON schemas of what the commands answer.
+
+_DRAFT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def answering_commands() -> list[str]:
+    """The commands that have ``--json``."""
+    return [command.name for command in COMMANDS if command.answer]
+
+
+def answer_schema(name: str) -> dict[str, Any]:
+    """The JSON schema, draft 2020-12, of a command's answer.  Raises KeyError for a command without one.
+
+    >>> sorted(answer_schema("scenarios")["properties"])
+    ['exit_code', 'scenarios', 'schema']
+    """
+    # Imported here: nobody else needs schemas.
+    from pydantic import TypeAdapter
+
+    from planfly.terminal import answers
+
+    if name not in answering_commands():
         raise KeyError(name)
-    module, function = _FUNCTIONS.get(name, (name, name))
-    command: CommandFunction = getattr(import_module(f"planfly.commands.{module}"), function)
-    return command
+    made = TypeAdapter(getattr(answers, _named(name).answer)).json_schema(mode="serialization")
+    return {"$schema": _DRAFT, **made, "title": f"planfly {name} --json"}
+
+
+def schema_text(name: str) -> str:
+    """The schema as the text of a file."""
+    return json.dumps(answer_schema(name), indent=1) + "\n"

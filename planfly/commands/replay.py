@@ -1,52 +1,103 @@
 """``planfly replay``: a flight from its log, on the terminal, as a film, or to other programs."""
 
 import argparse
-import math
 import shutil
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from logs.recording.reader import FlightLog, read_log
-from planfly.terminal.answers.giving import give_answer
+import planfly
+from planfly.terminal.arguments import number, time_or_stations
+from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
+from planfly.terminal.options import (
+    call,
+    log_argument,
+    own_link_options,
+    print_at_once,
+    result_options,
+    stop_signals,
+)
+from planfly.terminal.output import give_answer
 from planfly.terminal.results import warn_of_loss
-from world.errors import LogError, PlanflyError
+from world.errors import PlanflyError
 
-# Numbers that may be meant as ports that ground stations listen at.
-_PORTS = range(1024, 65536)
+if TYPE_CHECKING:
+    from planfly import FlightLog
+
 # Frames a second on a terminal.
 _RATE = 10.0
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 _HOME, _TO_LINE_END, _TO_END = "\x1b[H", "\x1b[K", "\x1b[J"
 
 
+def replay_options(line: LineParser) -> None:
+    """The parser of ``planfly replay``."""
+    parser = line.command(
+        "replay",
+        "replay a flight from its log alone: as instruments on a terminal, as a timeline elsewhere",
+        "planfly replay flight.mcap --speed 20 --from 60",
+        "planfly replay flight.mcap --to 127.0.0.1:14550",
+    )
+    parser.alias("end", "--to")
+    log_argument(parser)
+    part = parser.group("which part, how fast")
+    part.add_argument("--from", dest="start", metavar="S", type=number("start"), help="from this time of the flight, s")
+    part.add_argument(
+        "--to",
+        metavar="S|IP:PORT,...",
+        type=time_or_stations,
+        help="to this time of the flight, s; or play the log to the ground stations that listen there",
+    )
+    part.add_argument(
+        "--speed",
+        metavar="X",
+        type=number("speed"),
+        help="at X times real time (default: 1 on a terminal and to Foxglove; a film of 20 s; otherwise at once)",
+    )
+    part.add_argument("--at-once", action="store_true", help="the timeline at once, on a terminal too")
+    other = parser.group("other ways to see it")
+    other.add_argument(
+        "--movie", metavar="FILE|DIR", help="draw it: FILE.gif, FILE.mp4 (needs ffmpeg), or DIR for PNG frames"
+    )
+    other.add_argument(
+        "--foxglove",
+        action="store_true",
+        help="play it to Foxglove on this machine over WebSocket; needs the extra planfly[foxglove], and a viewer that"
+        " speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
+    )
+    other.add_argument(
+        "--port", metavar="N", type=number("port"), default=8765, help="of --foxglove (default: 8765; 0: any)"
+    )
+    other.add_argument(
+        "--wait", metavar="S", type=number("wait"),
+        help="wait S seconds for a ground station (default: 10) or for Foxglove (default: forever)",
+    )  # fmt: skip
+    own_link_options(parser, bind="127.0.0.1:0")
+    result_options(parser)
+
+
 def replay(args: argparse.Namespace) -> int:
     """Instruments on a terminal, the timeline elsewhere, or what the options name; 3 for a log that is cut short."""
-    if bool(args.foxglove) + bool(args.movie) + isinstance(args.to, str) > 1:
+    stations = isinstance(args.to, str)
+    if bool(args.foxglove) + bool(args.movie) + stations > 1:
         options = "--foxglove, --movie, --to IP:PORT"
         raise PlanflyError(f"{options}: one of them is expected", field=options, allowed="one of them is expected")
-    log = read_log(Path(args.log))
-    # Each target loads what it alone needs.
-    if isinstance(args.to, str):
-        from planfly.replays.live import play
-
-        play(log, args)
+    log = planfly.read_log(Path(args.log))
+    if not stations:
+        args.end = args.to
+    if stations or args.foxglove:
+        play = planfly.play_to_stations if stations else planfly.play_to_foxglove
+        with stop_signals() as stop:
+            call(play, args, log=log, stop=stop, on_message=print_at_once)
+    elif args.movie:
+        for file in call(planfly.movie, args, log=log, out=args.movie)[:3]:
+            print(f"movie     {file}")
+    elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
+        _show_instruments(log, args)
     else:
-        start, end = _part(log, args)
-        if args.movie:
-            from planfly.replays.movie import write_movie
-
-            for file in write_movie(log, args, start, end)[:3]:
-                print(f"movie     {file}")
-        elif args.foxglove:
-            from planfly.replays.live import serve_log
-
-            serve_log(args, start, end)
-        elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
-            _show_instruments(log, start, end, args.speed or 1.0)
-        else:
-            _print_timeline(log, start, end, args.speed)
+        _print_timeline(log, args)
     if not log.complete:
         warn_of_loss(log)
     code = FLYABLE if log.complete else LOSS
@@ -54,54 +105,36 @@ def replay(args: argparse.Namespace) -> int:
     return code
 
 
-def _answer(args: argparse.Namespace, log: FlightLog, code: int) -> object:
+def _answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
     """The timeline of the part that is replayed, all of it where it goes to ground stations."""
-    from logs.views.replay.timeline import timeline
-    from planfly.terminal.answers.answer_data import ReplayAnswer, TimelineEvent
+    from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
-    start, end = (-math.inf, math.inf) if isinstance(args.to, str) else _part(log, args)
-    events = [TimelineEvent(time_s=one.time, kind=one.kind, text=one.text) for one in timeline(log)]
-    part = [event for event in events if start <= event.time_s <= end]
-    return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=part)
+    entries = planfly.timeline(log) if isinstance(args.to, str) else call(planfly.timeline, args, log=log)
+    events = [TimelineEvent(time_s=one.time, kind=one.kind, text=one.text) for one in entries]
+    return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=events)
 
 
-def _part(log: FlightLog, args: argparse.Namespace) -> tuple[float, float]:
-    """Start and end of what is replayed, s of the flight.  Raises LogError where there is nothing between them."""
-    start = args.start if args.start is not None else float(log.track.time[0])
-    end = log.end_time if args.to is None else min(args.to, log.end_time)
-    ends = f"the log ends at {log.end_time:.1f} s"
-    if args.to is not None and args.to > log.end_time and args.to in _PORTS:
-        allowed = f"{ends}; if a port is meant, name its address, too: --to 127.0.0.1:{args.to:g}"
-        raise LogError.of_option("--to", args.to, allowed, shown=f"{args.to:g}", file=args.log)
-    if start > log.end_time:
-        raise LogError.of_option("--from", start, ends, shown=f"{start:g}", file=args.log)
-    if end < start:
-        allowed = f"at or after --from, {start:g} s, is expected"
-        raise LogError.of_option("--to", end, allowed, shown=f"{end:g}", file=args.log)
-    return start, end
-
-
-def _print_timeline(log: FlightLog, start: float, end: float, speed: float | None) -> None:
-    """Print the timeline, at ``speed`` times real time or at once."""
+def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
+    """Print the timeline, at ``--speed`` times real time or at once."""
     from flight.live.link import RunningClock
-    from logs.views.replay.timeline import entry_lines, timeline
+    from logs.views.replay.timeline import entry_lines
 
-    played = RunningClock()
-    for entry in timeline(log):
-        if start <= entry.time <= end:
-            while speed and (ahead := (entry.time - start) / speed - played()) > 0.0:
-                time.sleep(min(ahead, 1.0 / _RATE))
-            print("\n".join(entry_lines(entry)), flush=bool(speed))
+    speed = args.speed
+    entries = call(planfly.timeline, args, log=log)
+    start, played = args.start or float(log.track.time[0]), RunningClock()
+    for entry in entries:
+        while speed and (ahead := (entry.time - start) / speed - played()) > 0.0:
+            time.sleep(min(ahead, 1.0 / _RATE))
+        print("\n".join(entry_lines(entry)), flush=bool(speed))
 
 
-def _show_instruments(log: FlightLog, start: float, end: float, speed: float) -> None:
+def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     """Show frames until the end or an interruption; the last one stays on the terminal."""
     from flight.live.link import RunningClock
-    from logs.views.replay.instruments import make_instruments
+    from planfly.api.replaying import replayed_part
 
-    instruments = make_instruments(log)
-    played = RunningClock()
-    now = start
+    (now, end), speed = replayed_part(log, args.start, args.end), args.speed or 1.0
+    instruments, start, played = planfly.instruments(log), now, RunningClock()
     print(_ENTER, end="")
     try:
         while now < end:

@@ -2,69 +2,71 @@
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from logs.recording.foxglove_scene import layout_text
-from logs.recording.reader import read_log
-from logs.verdict.findings import Verdict
-from planfly.terminal.answers.giving import give_answer
+import planfly
+from planfly.terminal.arguments import completed, files
+from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE
-from planfly.terminal.output import progress
-from planfly.terminal.results import (
-    LOG_FIGURES,
-    judge_log,
-    prepare_folder,
-    refuse_existing,
-    refuse_folder,
-    warn_of_loss,
-    write_pictures,
-)
+from planfly.terminal.options import result_options
+from planfly.terminal.output import give_answer
+from planfly.terminal.results import warn_of_loss
 from world.errors import PlanflyError
-from world.files import write_whole
+
+if TYPE_CHECKING:
+    from planfly import Verdict
+
+
+def report_options(line: LineParser) -> None:
+    """The parser of ``planfly report``."""
+    parser = line.command(
+        "report",
+        "draw the figures and write report.html from a log alone, or write the layout for Foxglove",
+        "planfly report flight.mcap --out report --svg",
+    )
+    completed(parser.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log"), files("mcap"))
+    parser.add_argument("--svg", action="store_true", help="also write the figures as SVG")
+    parser.add_argument("--layout", metavar="FILE", help="write the layout file for Foxglove there, and nothing else")
+    result_options(parser, "where the files go (default: <log>-report beside the log, replaced)")
 
 
 def report(args: argparse.Namespace) -> int:
     """Draw and write; the exit code is the verdict's, or 3 for a log that is cut short."""
     if args.layout:
-        return _write_layout(Path(args.layout), args)
+        return _write_layout(args)
     if args.log is None:
         print("planfly report: a log, or --layout FILE, is expected (see planfly report --help)", file=sys.stderr)
         return BAD_INPUT
     source = Path(args.log)
-    log = read_log(source)
-    folder = Path(args.out) if args.out else source.with_name(f"{source.stem}-report")
-    verdict = judge_log(log)
-    if args.out:
-        refuse_folder(folder, args.overwrite)
-    prepare_folder(folder, LOG_FIGURES)
-    with progress("drawing"):
-        files = write_pictures(
-            folder, log.setup, log.track, verdict, log.ended, f"planfly report {args.log}", log.versions, log.events,
-            svg=args.svg,
-        )  # fmt: skip
-    for file in files:
+    log = planfly.read_log(source)
+    written = planfly.report(
+        log, args.out or source.with_name(f"{source.stem}-report"), svg=args.svg,
+        overwrite=args.overwrite or args.out is None, command=f"planfly report {args.log}",
+    )  # fmt: skip
+    for file in written.files:
         print(f"report    {file}")
-    code = FLYABLE if verdict.flyable else NOT_FLYABLE
+    code = FLYABLE if written.verdict is not None and written.verdict.flyable else NOT_FLYABLE
     if not log.complete:
         warn_of_loss(log)
         code = LOSS
-    give_answer(args, lambda: _answer(files, verdict, code))
+    give_answer(args, lambda: _answer(written.files, written.verdict, code))
     return code
 
 
-def _answer(files: list[Path], verdict: Verdict | None, code: int) -> object:
-    from planfly.terminal.answers.answer_data import ReportAnswer, verdict_document
+def _answer(written: Sequence[Path], verdict: "Verdict | None", code: int) -> object:
+    from planfly.terminal.answers import ReportAnswer, verdict_document
 
     document = None if verdict is None else verdict_document(verdict)
-    return ReportAnswer(exit_code=code, files=[str(file) for file in files], verdict=document)
+    return ReportAnswer(exit_code=code, files=[str(file) for file in written], verdict=document)
 
 
-def _write_layout(target: Path, args: argparse.Namespace) -> int:
+def _write_layout(args: argparse.Namespace) -> int:
     if args.log is not None:
         message = f"{args.log}: --layout writes the layout alone; name no log with it"
-        raise PlanflyError(message, file=args.log, field="--layout", value=str(target))
-    refuse_existing(target, args.overwrite)
-    write_whole(target, layout_text())
-    print(f"layout    {target}")
-    give_answer(args, lambda: _answer([target], None, FLYABLE))
+        raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)
+    file = planfly.foxglove_layout(args.layout, overwrite=args.overwrite)
+    print(f"layout    {file}")
+    give_answer(args, lambda: _answer([file], None, FLYABLE))
     return FLYABLE

@@ -3,15 +3,33 @@
 import argparse
 import sys
 
-from planfly.terminal.answers.giving import give_answer
-from planfly.terminal.arguments import shell_script
+import planfly
+from planfly.terminal.arguments import SHELLS, completed, shell_script
+from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE
-from planfly.terminal.parser import build_parser
+from planfly.terminal.options import json_option
+from planfly.terminal.output import give_answer
 from world.files import did_you_mean
-from world.scenario import embedded_scenarios
+
+_COMPLETION = """\
+to complete in this shell, and in those to come:
+  bash   eval "$(planfly completion bash)", in ~/.bashrc
+  zsh    eval "$(planfly completion zsh)", in ~/.zshrc after compinit
+  fish   planfly completion fish > ~/.config/fish/completions/planfly.fish"""
 
 # ----------------------------------------------------------------------
 # ``planfly completion``: the script by which a shell completes.
+
+
+def completion_options(line: LineParser) -> None:
+    """The parser of ``planfly completion``."""
+    parser = line.command(
+        "completion",
+        "print the script with which a shell completes planfly's commands, options and names",
+        "planfly completion bash",
+    )
+    parser.more = lambda: _COMPLETION
+    parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help="bash, zsh or fish")
 
 
 def completion(args: argparse.Namespace) -> int:
@@ -24,8 +42,23 @@ def completion(args: argparse.Namespace) -> int:
 # ``planfly help``: what a command does, or the JSON schema of its answer.
 
 
+def show_help_options(line: LineParser) -> None:
+    """The parser of ``planfly help``."""
+    parser = line.command(
+        "help", "show the help of a command, or list the commands", "planfly help fly", "planfly help fly --schema"
+    )
+    completed(
+        parser.add_argument("topic", metavar="COMMAND", nargs="?", help="a command (default: all of them)"),
+        lambda prefix, **_: [name for name in line.commands if name.startswith(prefix)],
+    )
+    parser.add_argument("--schema", action="store_true", help="the JSON schema of what the command's --json writes")
+
+
 def show_help(args: argparse.Namespace) -> int:
     """Print the help of a command, of all, or a schema; 2 for a command that there is not."""
+    # Imported here: the registry lists this module.
+    from planfly.commands.registry import answering_commands, build_parser, schema_text
+
     line = build_parser()
     if args.topic is None:
         if args.schema:
@@ -35,10 +68,8 @@ def show_help(args: argparse.Namespace) -> int:
     if args.topic not in line.commands:
         return _refuse(f"{args.topic!r}: no such command{did_you_mean(args.topic, line.commands)}")
     if args.schema:
-        from planfly.terminal.answers.giving import ANSWERS, schema_text
-
-        if args.topic not in ANSWERS:
-            return _refuse(f"--schema: {args.topic} has no --json; these have: {', '.join(ANSWERS)}")
+        if args.topic not in answering_commands():
+            return _refuse(f"--schema: {args.topic} has no --json; these have: {', '.join(answering_commands())}")
         print(schema_text(args.topic), end="")
         return FLYABLE
     line.commands[args.topic].print_help()
@@ -54,16 +85,22 @@ def _refuse(why: str) -> int:
 # ``planfly scenarios``: the embedded scenarios, one line each.
 
 
+def scenarios_options(line: LineParser) -> None:
+    """The parser of ``planfly scenarios``."""
+    parser = line.command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
+    json_option(parser.group("results"), "scenarios")
+
+
 def scenarios(args: argparse.Namespace) -> int:
     """Name and description of each embedded scenario, on standard output."""
-    known = embedded_scenarios()
-    for name, spec in known.items():
-        print(f"{name:<12} {spec.description}")
+    known = planfly.scenarios()
+    for name, description in known.items():
+        print(f"{name:<12} {description}")
 
     def answer() -> object:
-        from planfly.terminal.answers.answer_data import ScenarioEntry, ScenariosAnswer
+        from planfly.terminal.answers import ScenarioEntry, ScenariosAnswer
 
-        entries = [ScenarioEntry(name=name, description=spec.description) for name, spec in known.items()]
+        entries = [ScenarioEntry(name=name, description=description) for name, description in known.items()]
         return ScenariosAnswer(exit_code=FLYABLE, scenarios=entries)
 
     give_answer(args, answer)

@@ -1,4 +1,4 @@
-"""A unit done, and told meanwhile which of its kernels are ready."""
+"""Do a unit of work, and report which of its kernels are ready."""
 
 import functools
 import os
@@ -83,8 +83,8 @@ UNITS: dict[str, Callable[[], None]] = {
 }
 
 
-def do_unit(unit: str, tell: Callable[[str], None]) -> None:
-    """Do a unit of work; tell ``ready KERNEL`` for each of its kernels, as soon as the next is being compiled.
+def do_unit(unit: str, report: Callable[[str], None]) -> None:
+    """Do a unit of work; report ``ready KERNEL`` for each of its kernels, as soon as the next is being compiled.
 
     Raises KeyError for a name that is no unit's.
     """
@@ -93,7 +93,7 @@ def do_unit(unit: str, tell: Callable[[str], None]) -> None:
     def tell_ready() -> None:
         for name in [one for one in waiting if is_ready(one)]:
             waiting.remove(name)
-            tell(f"ready {name}")
+            report(f"ready {name}")
 
     with tell_before_compiling(tell_ready):
         UNITS[unit]()

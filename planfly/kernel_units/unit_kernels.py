@@ -87,16 +87,6 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
 PLANNING = ("scores", "shortening", "certificates", "routes", "paper")
 FLYING = ("flight",)
 BOTH = ("scores", "flight", "shortening", "certificates", "routes", "paper")
-# Of the commands; what no unit compiles is compiled where it is called.
-COMMAND_UNITS: dict[str, tuple[str, ...]] = {
-    "run": BOTH,
-    "plan": PLANNING,
-    "fly": FLYING,
-    "serve": FLYING,
-    "refly": FLYING,
-    "campaign": BOTH,
-    "winds": BOTH,
-}
 
 
 def kernels_of(units: tuple[str, ...]) -> frozenset[str]:

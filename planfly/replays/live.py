@@ -1,16 +1,15 @@
-"""A log played as if it were flown now: to Foxglove on this machine, and into a ground station."""
+"""A log played as if it were flown now: to Foxglove on this machine, and into ground stations."""
 
-import argparse
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
 
-from flight.live.link import Link, RunningClock
+from flight.live.link import Access, Link, RunningClock
 from flight.live.telemetry import (
     ACTIVE,
     AUTO,
@@ -28,12 +27,14 @@ from flight.simulation.airborne import LocalMap
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog, LogChannel, LogMessage, log_channels, log_messages
 from logs.recording.state_channel import EPOCH_NS
-from planfly.terminal.options import Stopped, link_access, stop_signals
-from planfly.terminal.results import CUT_SHORT
+from planfly.open_mission import CUT_SHORT
 from world.errors import FlightError, PlanflyError
 
+Stopped = Callable[[], bool]
+OnMessage = Callable[[str], None]
+
 # ----------------------------------------------------------------------
-# ``planfly replay --foxglove``: a log played to Foxglove over a WebSocket that only this machine reaches.
+# A log played to Foxglove over a WebSocket that only this machine reaches.
 #
 # The server is foxglove-sdk's: it speaks the WebSocket subprotocol `foxglove.sdk.v1` alone, and refuses a viewer that
 # asks for its older name `foxglove.websocket.v1`.
@@ -45,33 +46,42 @@ SUBPROTOCOL = "foxglove.sdk.v1"
 _POLL, _SUBSCRIBING = 0.005, 0.05
 
 
-def serve_log(args: argparse.Namespace, start: float, end: float) -> None:
+def play_to_foxglove(
+    log: FlightLog,
+    start: float,
+    end: float,
+    *,
+    speed: float,
+    port: int,
+    wait: float | None,
+    stopped: Stopped,
+    on_message: OnMessage,
+) -> None:
     """Play a log's messages from ``start`` to ``end`` (s) to the clients of a Foxglove server.
 
-    It waits for the first client that subscribes.  Who subscribes later is sent the scenes as they are then.
+    It waits for the first client that subscribes, ``wait`` s at most; a later one is sent the scenes as they are then.
     Raises PlanflyError where foxglove-sdk is not installed, FlightError where nobody comes in time, OSError for a
     port in use.
     """
     try:
         import foxglove
     except ImportError as error:
-        message = "--foxglove: the package foxglove-sdk is not installed (extra: planfly[foxglove])"
-        raise PlanflyError(message, field="--foxglove") from error
-    log = Path(args.log)
-    broadcast = _Broadcast(foxglove, log_channels(log))
+        message = "the package foxglove-sdk is not installed (extra: planfly[foxglove])"
+        raise PlanflyError.of_argument("foxglove", None, message, shown="") from error
+    file = Path(log.source)
+    broadcast = _Broadcast(foxglove, log_channels(file))
     try:
         server = foxglove.start_server(
-            name=f"planfly {Path(args.log).name}", host=_HOST, port=args.port, server_listener=broadcast,
+            name=f"planfly {file.name}", host=_HOST, port=port, server_listener=broadcast,
             capabilities=[foxglove.Capability.Time], context=broadcast.context,
         )  # fmt: skip
     except RuntimeError as error:
-        raise OSError(0, str(error), f"{_HOST}:{args.port}") from error
-    print(f"foxglove  ws://{_HOST}:{server.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})", flush=True)
+        raise OSError(0, str(error), f"{_HOST}:{port}") from error
+    on_message(f"foxglove  ws://{_HOST}:{server.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})")
     try:
-        with stop_signals() as stopped:
-            messages = broadcast.up_to(log_messages(log), round(start * 1e9) + EPOCH_NS)
-            _wait(broadcast, args.wait, stopped)
-            _play(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, args.speed or 1.0, stopped)
+        messages = broadcast.up_to(log_messages(file), round(start * 1e9) + EPOCH_NS)
+        _wait(broadcast, wait, stopped)
+        _play(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, stopped)
     finally:
         server.stop()
 
@@ -80,7 +90,7 @@ def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> N
     waited = RunningClock()
     while not broadcast.listeners and not stopped():
         if timeout is not None and waited() > timeout:
-            raise FlightError(f"--foxglove: nobody has subscribed within {timeout:g} s", field="--foxglove")
+            raise FlightError.of_argument("foxglove", timeout, f"nobody has subscribed within {timeout:g} s", shown="")
         time.sleep(_POLL)
 
 
@@ -170,15 +180,14 @@ class _Broadcast:
 
 
 # ----------------------------------------------------------------------
-# ``planfly replay --to``: a log played into a ground station, as if it were flown now.
-
-# Seconds to wait for a ground station unless told otherwise.
-_TIMEOUT = 10.0
+# A log played into ground stations.
 
 
-def play(log: FlightLog, args: argparse.Namespace) -> None:
-    """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers."""
-    link, wait = Link(link_access(args)), _TIMEOUT if args.wait is None else args.wait
+def play_to_stations(
+    log: FlightLog, access: Access, *, speed: float, wait: float, stopped: Stopped, on_message: OnMessage
+) -> None:
+    """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers in ``wait`` s."""
+    link = Link(access)
     snapshots = SnapshotMaker(log.setup, LocalMap.around(log.setup))
     track = log.track
     rows = track_rows(track)
@@ -187,30 +196,27 @@ def play(log: FlightLog, args: argparse.Namespace) -> None:
     status = Status(start, home, battery=log.setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
     items = log.setup.route.items
     status.total = int(max(items.max(), 0))
-    player = _Player(link, status)
+    player = _Player(link, status, on_message)
     try:
-        with stop_signals() as stopped:
-            player.wait(wait, stopped)
-            if not link.peers:
-                message = f"--to {args.to}: no ground station has answered within {wait:g} s"
-                raise FlightError(message, field="--to", value=args.to)
-            begun, k = link.clock(), 0
-            player.announce(f"replay of {args.log} at {args.speed or 1.0:g}x")
-            while k < len(rows) - 1 and not stopped():
-                k = min(
-                    len(rows) - 1,
-                    int(np.searchsorted(track.time, (link.clock() - begun) * (args.speed or 1.0), side="right")),
-                )
-                snapshot = snapshots.snapshot(rows[k])
-                if snapshot.finite:
-                    status.snapshot = snapshot
-                    status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
-                player.step(0.01)
-            if log.ended == "completed" and k == len(rows) - 1:
-                status.mission_state = COMPLETE
-            status.armed = status.flying = False
-            player.announce(f"replay over: {log.ended or CUT_SHORT}")
-            player.rest(1.5, stopped)
+        player.wait(wait, stopped)
+        if not link.peers:
+            asked = ",".join(f"{host}:{port}" for host, port in access.to)
+            raise FlightError.of_argument("to", asked, f"no ground station has answered within {wait:g} s")
+        begun, k = link.clock(), 0
+        player.announce(f"replay of {log.source} at {speed:g}x")
+        while k < len(rows) - 1 and not stopped():
+            played = (link.clock() - begun) * speed
+            k = min(len(rows) - 1, int(np.searchsorted(track.time, played, side="right")))
+            snapshot = snapshots.snapshot(rows[k])
+            if snapshot.finite:
+                status.snapshot = snapshot
+                status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
+            player.step(0.01)
+        if log.ended == "completed" and k == len(rows) - 1:
+            status.mission_state = COMPLETE
+        status.armed = status.flying = False
+        player.announce(f"replay over: {log.ended or CUT_SHORT}")
+        player.rest(1.5, stopped)
     finally:
         link.close()
 
@@ -218,15 +224,15 @@ def play(log: FlightLog, args: argparse.Namespace) -> None:
 class _Player:
     """Telemetry of a log, without a vehicle behind it."""
 
-    def __init__(self, link: Link, status: Status) -> None:
-        self._link, self._status = link, status
+    def __init__(self, link: Link, status: Status, on_message: OnMessage) -> None:
+        self._link, self._status, self._on_message = link, status, on_message
         self._born = link.clock()
         self._hello = 0.0
         self._texts = 0
 
     def announce(self, text: str) -> None:
-        """Send a text to the stations, and print it."""
-        print(text, flush=True)
+        """Send a text to the stations, and on_message it here."""
+        self._on_message(text)
         self._texts += 1
         for peer in self._link.peers.values():
             for piece in status_texts(text, INFO, self._texts):

@@ -1,6 +1,5 @@
-"""``planfly replay --movie``: the frames of a flight as a GIF, an MP4 or a folder of PNG files."""
+"""The frames of a flight as a GIF, an MP4 or a folder of PNG files."""
 
-import argparse
 import contextlib
 import errno
 import io
@@ -17,8 +16,8 @@ from PIL import Image, ImageColor
 from logs.recording.reader import FlightLog
 from logs.theme import drawn_colours
 from logs.views.replay.movie_frames import RATE, MovieFrames
-from planfly.terminal.output import progress
-from planfly.terminal.results import refuse_existing, refuse_folder
+from planfly.stages import stage
+from planfly.targets import refuse_existing, refuse_folder
 from world.errors import PlanflyError
 from world.files import temporary_folder, write_whole
 
@@ -32,27 +31,29 @@ _CLEAR = 255
 SUFFIXES = (".gif", ".mp4")
 
 
-def write_movie(log: FlightLog, args: argparse.Namespace, start: float, end: float) -> list[Path]:
-    """Write what ``args.movie`` names: a .gif or .mp4 file, or a folder for frame-0000.png and on.
+def write_movie(
+    log: FlightLog, target: Path, start: float, end: float, *, speed: float | None, overwrite: bool
+) -> list[Path]:
+    """Write a .gif or .mp4 file, or a folder for frame-0000.png and on.
 
+    start, end: of the flight, s.  speed: times real time; None for a film of 20 s.
     Raises PlanflyError for a target that exists, too many frames, and an .mp4 without ffmpeg.
     """
-    target = Path(args.movie)
     kind = target.suffix.lower()
     if kind in SUFFIXES:
-        refuse_existing(target, args.overwrite)
+        refuse_existing(target, overwrite)
     elif kind:
         allowed = f"{', '.join(SUFFIXES)} or a folder is expected"
-        raise PlanflyError.at(target, "--movie", kind, allowed, shown="")
+        raise PlanflyError.of_argument("movie", kind, allowed, shown="", file=target)
     else:
-        refuse_folder(target, args.overwrite)
+        refuse_folder(target, overwrite)
     if kind == ".mp4" and shutil.which("ffmpeg") is None:
         allowed = "an .mp4 needs ffmpeg, which is not installed; a .gif or a folder does not"
-        raise PlanflyError.at(target, "--movie", kind, allowed, shown="")
-    film = MovieFrames(log.setup, log.track, start, end, args.speed or max(1.0, (end - start) / _LASTS))
+        raise PlanflyError.of_argument("movie", kind, allowed, shown="", file=target)
+    film = MovieFrames(log.setup, log.track, start, end, speed or max(1.0, (end - start) / _LASTS))
     if len(film) > _MAX_FRAMES:
-        allowed = f"at most {_MAX_FRAMES:,}; raise --speed"
-        raise PlanflyError.at(target, "--movie", len(film), allowed, shown=f"{len(film):,} frames")
+        allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,}; raise `speed`"
+        raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
     if not kind:
         return _write_folder(target, film)
     write_whole(target, _gif(film) if kind == ".gif" else _mp4(film))
@@ -60,7 +61,7 @@ def write_movie(log: FlightLog, args: argparse.Namespace, start: float, end: flo
 
 
 def _shown(film: MovieFrames) -> Iterator[Image.Image]:
-    with progress("drawing") as advance:
+    with stage("drawing") as advance:
         for number, frame in enumerate(film.frames(), 1):
             yield Image.fromarray(frame)
             advance(number, len(film), f"frame {number} of {len(film)}")
@@ -137,7 +138,7 @@ def _mp4(film: MovieFrames) -> bytes:
             "-r", str(RATE), "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(out),
         ]  # fmt: skip
         with (
-            progress("drawing") as advance,
+            stage("drawing") as advance,
             subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages) as encoder,
         ):
             entry = encoder.stdin

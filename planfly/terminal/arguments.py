@@ -1,54 +1,39 @@
 """Arguments of the command line as values, and what a shell proposes for them."""
 
 import argparse
+import contextlib
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 from logs.importers.open_log import SUFFIXES
+from planfly.arguments import CHOICES, RANGES, is_wind
 
 # ----------------------------------------------------------------------
-# Texts of the command line as values: each refuses what it cannot take, saying what it expects.
+# Texts of the command line as values, within the ranges of the API's keywords.
 
 
-def seed(text: str) -> int:
-    """Seed: a whole number."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = -1
-    if not 0 <= value < 2**63:
-        raise argparse.ArgumentTypeError(f"{text!r}: a whole number from 0 to 2^63 - 1 is expected")
-    return value
+def number(keyword: str) -> Callable[[str], Any]:
+    """What turns a text into the number that a keyword of the API may be.
 
+    >>> number("seed")("3"), number("max_hours")("1.5")
+    (3, 1.5)
+    """
+    allowed = RANGES[keyword]
 
-def count(text: str) -> int:
-    """Rounds, 0 to 20."""
-    if not (text.isascii() and text.isdigit() and int(text) <= 20):
-        raise argparse.ArgumentTypeError(f"{text!r}: a whole number from 0 to 20 is expected")
-    return int(text)
+    def parse(text: str) -> float:
+        value: float = math.nan
+        if not allowed.whole:
+            with contextlib.suppress(ValueError):
+                value = float(text)
+        elif text.isascii() and text.isdigit():
+            value = int(text)
+        if not allowed.allows(value):
+            raise argparse.ArgumentTypeError(f"{text!r}: {allowed.expected}")
+        return value
 
-
-def positive(text: str) -> float:
-    """Number above 0."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 < value <= 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r}: a number above 0, up to 1,000,000, is expected")
-    return value
-
-
-def speedup(text: str) -> float:
-    """Times real time that a served flight may fly at."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.1 <= value <= 100.0:
-        raise argparse.ArgumentTypeError(f"{text!r}: a number from 0.1 to 100 is expected")
-    return value
+    return parse
 
 
 def wind(text: str) -> tuple[float, float]:
@@ -56,55 +41,32 @@ def wind(text: str) -> tuple[float, float]:
     try:
         speed, source = (float(part) for part in text.split(","))
     except ValueError:
-        speed, source = -1.0, 0.0
-    if not (0.0 <= speed <= 40.0 and -360.0 <= source <= 360.0):
+        speed, source = math.nan, 0.0
+    if not is_wind(speed, source):
         raise argparse.ArgumentTypeError(
             f"{text!r}: SPEED,FROM is expected: m/s from 0 to 40, degrees from north that it blows from (-360..360)"
         )
     return speed, source
 
 
-def flight_time(text: str) -> float:
-    """Time of a flight, s."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value <= 1e7:
-        raise argparse.ArgumentTypeError(f"{text!r}: seconds, from 0 to 10,000,000, are expected")
-    return value
-
-
 def time_or_stations(text: str) -> float | str:
     """A time of the flight, or where ground stations listen: an address has a colon."""
-    return text if ":" in text else flight_time(text)
+    if ":" in text:
+        return text
+    time: float = number("end")(text)
+    return time
 
 
 def budget(text: str) -> tuple[int | None, float | None]:
     """Evaluations, or seconds where the text ends in s."""
     try:
         if text.endswith("s"):
-            seconds = float(text[:-1])
-            if 0.0 < seconds <= 1e6:
-                return None, seconds
-        elif 4 <= int(text) <= 10**10:
-            return int(text), None
-    except ValueError:
-        pass
-    raise argparse.ArgumentTypeError(
-        f"{text!r}: a number of evaluations (4..10^10), or of seconds such as 2.5s (up to 1,000,000s), is expected"
-    )
-
-
-def leg(text: str) -> int:
-    """Leg of a plan, from 0."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = -1
-    if not 0 <= value <= 10_000:
-        raise argparse.ArgumentTypeError(f"{text!r}: a leg's number is expected, from 0")
-    return value
+            return None, number("seconds")(text[:-1])
+        return number("budget")(text), None
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: a number of evaluations (4..10^10), or of seconds such as 2.5s (up to 1,000,000s), is expected"
+        ) from None
 
 
 def threat(text: str) -> tuple[float, float, float, float]:
@@ -122,28 +84,11 @@ def threat(text: str) -> tuple[float, float, float, float]:
 
 def problems(text: str) -> tuple[int, ...]:
     """Numbers of threats out of the paper's four."""
-    allowed = (7, 15, 30, 60)
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
-    if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(allowed):
+    if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):
         raise argparse.ArgumentTypeError(f"{text!r}: numbers of threats out of 7,15,30,60 are expected")
     return tuple(numbers)
-
-
-def positive_count(text: str) -> int:
-    """Whole number from 1."""
-    value = int(text) if text.isdecimal() else 0
-    if not 1 <= value <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r}: a whole number from 1 to 1,000 is expected")
-    return value
-
-
-def port(text: str) -> int:
-    """Number of a TCP port, or 0."""
-    value = int(text) if text.isdecimal() else -1
-    if not 0 <= value <= 65535:
-        raise argparse.ArgumentTypeError(f"{text!r}: a port, 0..65535, is expected")
-    return value
 
 
 # ----------------------------------------------------------------------

@@ -4,7 +4,7 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, NoReturn, Protocol, TextIO
 
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
@@ -73,15 +73,36 @@ class CommandParser(argparse.ArgumentParser):
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(formatter_class=help_formatter, **settings)
+        self._aliases: dict[str, str] = {}
+        # What the help says between the examples and the exit codes; made when it is printed.
+        self.more: Callable[[], str] = str
 
     def error(self, message: str) -> NoReturn:
         """One line, as for every other bad input."""
         line = f"{self.prog}: {message} (see {self.prog} --help)"
         self.exit(BAD_INPUT, coloured(line, "bad", sys.stderr) + "\n")
 
+    def format_help(self) -> str:
+        """The help, with what is made for it alone."""
+        epilog, more = self.epilog, self.more()
+        if more:
+            self.epilog = (epilog or "").replace(EXIT_CODES, f"{more}\n\n{EXIT_CODES}")
+        text = super().format_help()
+        self.epilog = epilog
+        return text
+
     def group(self, title: str, description: str | None = None) -> OptionTaker:
         """Options that stand together in the help, under a title."""
         return self.add_argument_group(title, description)
+
+    def alias(self, keyword: str, option: str) -> None:
+        """State that an option also stands for a keyword of the API that is not its destination."""
+        self._aliases[keyword] = option
+
+    def keywords(self) -> dict[str, str]:
+        """The option that states each keyword of the API."""
+        named = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
+        return named | self._aliases
 
     def options(self) -> list[str]:
         """The long options that it takes."""
@@ -99,22 +120,33 @@ class LineParser(CommandParser):
         )
         self.add_argument("--version", action="version", version=f"planfly {version}")
         self.commands: dict[str, CommandParser] = {}
+        self._sections: dict[str, argparse._ArgumentGroup] = {}
+        self._section = ""
         # prog is named: to find it out argparse would lay out a help.
         self._parsers = self.add_subparsers(
             dest="command", metavar="COMMAND", required=True, parser_class=CommandParser, prog="planfly",
-            title="commands",
         )  # fmt: skip
+        # Shown in sections instead.
+        self._positionals._group_actions.clear()
 
-    def command(self, name: str, summary: str, *examples: str, more: str = "") -> CommandParser:
-        """Make the parser of a command.  more: what its help says after the examples."""
+    def section(self, title: str) -> None:
+        """Have the commands that follow listed below a title."""
+        self._section = title
+
+    def command(self, name: str, summary: str, *examples: str) -> CommandParser:
+        """Make the parser of a command.  summary: what it does; examples: lines of its help."""
         shown = f"\n{' ' * len('example: ')}".join(examples)
         made: CommandParser = self._parsers.add_parser(
             name,
             help=summary,
             description=summary[0].upper() + summary[1:] + ".",
-            epilog=f"example: {shown}\n\n" + (f"{more}\n\n" if more else "") + EXIT_CODES,
+            epilog=f"example: {shown}\n\n{EXIT_CODES}",
         )
         self.commands[name] = made
+        if self._section not in self._sections:
+            self._sections[self._section] = self.add_argument_group(self._section)
+        # The line of the list of commands that argparse has just made.
+        self._sections[self._section]._group_actions.append(self._parsers._choices_actions[-1])
         return made
 
     def parse_args(  # type: ignore[override]

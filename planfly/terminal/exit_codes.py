@@ -2,9 +2,9 @@
 
 EXIT_CODES = """\
 exit codes: 0 flyable
-            1 our fault or the machine's
-            2 bad usage or bad input (nothing was written)
-            3 done with a stated loss (an unfinished or damaged log), or undecided
+            1 internal or system error
+            2 incorrect usage or invalid input, nothing written
+            3 finished with a reported loss (a damaged log), or undecided
             4 not flyable, or no feasible plan
             130 and 143 ended by SIGINT (Ctrl-C) and SIGTERM, within a second"""
 

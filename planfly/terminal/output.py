@@ -1,19 +1,21 @@
-"""Standard output that outlives its reader, and progress on standard error."""
+"""What a command prints: standard output that outlives its reader, progress on standard error, and the answer."""
 
+import argparse
 import contextlib
 import io
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
-if TYPE_CHECKING:
-    from planfly.pipeline import Advance
-
+from planfly.stages import Advance, Receiver, received_by
+from planfly.targets import refuse_existing
+from world.errors import PlanflyError
+from world.files import write_whole
 
 # ----------------------------------------------------------------------
 # Standard output that outlives its reader: ``planfly check M | head -1`` still ends with the verdict's exit code.
@@ -113,35 +115,14 @@ def tolerate_closed_output() -> Iterator[None]:
 # ----------------------------------------------------------------------
 # Progress: a bar on a terminal, plain lines elsewhere; on standard error, so that results can be piped.
 
-_silent: ContextVar[bool] = ContextVar("silent", default=False)
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
 @contextmanager
-def silent_progress() -> Iterator[None]:
-    """Report nothing meanwhile."""
-    token = _silent.set(True)
-    try:
-        yield
-    finally:
-        _silent.reset(token)
-
-
-def _say_nothing(_done: float, _whole: float, _remark: str = "") -> None:
-    pass
-
-
-def say(line: str) -> None:
-    """A line about the work, where progress is reported."""
-    if not _silent.get():
-        print(line, file=sys.stderr, flush=True)
-
-
-@contextmanager
-def progress(title: str) -> Iterator["Advance"]:
-    """Report a stage of work; the caller reports how much of how much is done, and a remark."""
-    if _silent.get():
-        yield _say_nothing
-        return
+def progress(title: str) -> Iterator[Advance]:
+    """Show a stage of work; the work reports how much of how much is done, and a remark."""
     if not sys.stderr.isatty():
         yield from _lines(title)
         return
@@ -149,8 +130,8 @@ def progress(title: str) -> Iterator["Advance"]:
 
     with tqdm(total=100, desc=title, bar_format="{desc:<22} {bar:30} {percentage:3.0f} %{postfix}", leave=True) as bar:
 
-        def advance(done: float, whole: float, remark: str = "") -> None:
-            share = 100.0 * done / whole if whole > 0 else 100.0
+        def advance(done: float, total: float, remark: str = "") -> None:
+            share = 100.0 * done / total if total > 0 else 100.0
             bar.update(max(0.0, min(100.0, share) - bar.n))
             if remark:
                 bar.set_postfix_str(remark)
@@ -159,17 +140,91 @@ def progress(title: str) -> Iterator["Advance"]:
         bar.update(100 - bar.n)
 
 
-def _lines(title: str) -> Iterator["Advance"]:
+def _lines(title: str) -> Iterator[Advance]:
     """A line when work begins and one when it is done; none for input that is refused before it begins."""
     started = time.monotonic()
     last: str | None = None
 
-    def remember(_done: float, _whole: float, remark: str = "") -> None:
+    def remember(_done: float, _total: float, remark: str = "") -> None:
         nonlocal last
         if last is None:
-            print(f"{title} ...", file=sys.stderr, flush=True)
+            _say(f"{title} ...")
         last = remark
 
     yield remember
     end = f": {last}" if last else ""
-    print(f"{title}: done in {time.monotonic() - started:.1f} s{end}", file=sys.stderr, flush=True)
+    _say(f"{title}: done in {time.monotonic() - started:.1f} s{end}")
+
+
+def _ignore(*_: object) -> None:
+    pass
+
+
+ON_STANDARD_ERROR = Receiver(progress, _say)
+SILENT = Receiver(lambda _title: contextlib.nullcontext(_ignore), _ignore)
+
+
+# ----------------------------------------------------------------------
+# Where a command's lines and its answer go: ``--json FILE``, ``--json -`` and ``--quiet``.
+
+
+def answer_text(answer: object) -> str:
+    """An answer as the text of a file; what is no number is null."""
+    # Imported here: nobody else needs schemas.
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(type(answer)).dump_json(answer, indent=1).decode() + "\n"
+
+
+STANDARD_OUTPUT = "-"
+# The standard output of the command under way, while what it prints goes elsewhere.
+_output: ContextVar[TextIO | None] = ContextVar("output", default=None)
+
+
+@contextlib.contextmanager
+def asked_output(args: argparse.Namespace) -> Iterator[None]:
+    """Print a command's lines where its options ask: nowhere, or beside standard output where the answer goes there.
+
+    Raises PlanflyError for a file to answer into that exists, or that the command reads.
+    """
+    answer, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
+    if answer not in (None, STANDARD_OUTPUT):
+        _refuse_inputs(Path(answer), args)
+        refuse_existing(Path(answer), getattr(args, "overwrite", False))
+    token = _output.set(sys.stdout)
+    try:
+        with contextlib.ExitStack() as opened:
+            opened.enter_context(received_by(SILENT if quiet else ON_STANDARD_ERROR))
+            if quiet:
+                nowhere = opened.enter_context(Path(os.devnull).open("w", encoding="utf-8"))
+                opened.enter_context(contextlib.redirect_stdout(nowhere))
+            elif answer == STANDARD_OUTPUT:
+                opened.enter_context(contextlib.redirect_stdout(sys.stderr))
+            yield
+    finally:
+        _output.reset(token)
+
+
+def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) -> None:
+    """Write what a command answers, where it was asked for; it is made only then.
+
+    answer: gives an instance of a class of `planfly.terminal.answers`, or its text.
+    """
+    target = getattr(args, "json", None)
+    if target is None:
+        return
+    made = answer()
+    text = made if isinstance(made, str) else answer_text(made)
+    if target == STANDARD_OUTPUT:
+        print(text, end="", file=_output.get() or sys.stdout)
+    else:
+        write_whole(Path(target), text)
+
+
+def _refuse_inputs(target: Path, args: argparse.Namespace) -> None:
+    """Refuse to answer into a file that the command line names otherwise, too."""
+    named = [value for key, value in vars(args).items() if isinstance(value, str) and key not in ("json", "command")]
+    for name in named:
+        with contextlib.suppress(OSError):
+            if target.exists() and target.samefile(name):
+                raise PlanflyError(f"{target}: is the input itself; name another file to write", file=target)

@@ -195,7 +195,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
     >>> from world.scenario import with_threats
-    >>> guarded = with_threats(load_scenario("hard-07"), [(5000.0, 5000.0, 8000.0, 0.0)], "--add-threat")
+    >>> guarded = with_threats(load_scenario("hard-07"), [(5000.0, 5000.0, 8000.0, 0.0)], "threats")
     >>> path = np.stack([guarded.start, guarded.destination])
     >>> certificate = Certificate(0.1, np.inf, 0.1, 9.0, -50.0, -50.0, ())
     >>> found = np.array([0, 0, 1, 1]), np.zeros(4)

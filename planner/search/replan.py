@@ -48,7 +48,7 @@ def replan(
     >>> limits = load_airframe(scenario).limits
     >>> old = plan_path(scenario, limits, seed=1)
     >>> east, north, _ = old.waypoints[6]
-    >>> now = with_threats(scenario, [(east, north, 300.0, 0.0)], "--add-threat")
+    >>> now = with_threats(scenario, [(east, north, 300.0, 0.0)], "threats")
     >>> new = replan(now, limits, old, 3, seed=1)
     >>> new.safe, new.flown_legs, np.array_equal(new.waypoints[:4], old.waypoints[:4])
     (True, 3, True)
@@ -58,7 +58,7 @@ def replan(
     """
     count = len(old.waypoints)
     if not 0 <= leg < count - 1:
-        raise MissionError.of_option("leg", leg, f"the plan has legs 0..{count - 2}", file=scenario.name)
+        raise MissionError.of_argument("at_leg", leg, f"the plan has legs 0..{count - 2}", file=scenario.name)
     same_mission(scenario, old)
     _outside(scenario, old, leg)
     rest = with_waypoints(old.waypoints[leg:], max(MIN_WAYPOINTS, count - leg))

@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from planfly.commands.registry import build_parser
 
 import planfly
 from logs.verdict import tolerances
 from logs.verdict.rules.registry import RULES
 from planfly.terminal.exit_codes import EXIT_CODES
-from planfly.terminal.parser import build_parser
 from tests.docs.page_blocks import PAGES, ROOT
 
 sys.path.insert(0, str(ROOT / "docs"))

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import pytest
 
+from planfly import cli
 from planfly.cli import main
-from planfly.commands import registry
 from world.errors import ScenarioError
 
 
@@ -32,7 +32,7 @@ def test_an_error_is_one_line_and_its_code(
     def fail(_args: argparse.Namespace) -> int:
         raise met
 
-    monkeypatch.setattr(registry, "find_command", lambda _: fail)
+    monkeypatch.setattr(cli, "find_command", lambda _: fail)
     assert main(["scenarios"]) == code
     printed = capsys.readouterr()
     assert (printed.out, printed.err) == ("", line)
@@ -42,7 +42,7 @@ def test_a_fault_of_our_own_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> No
     def fail(_args: argparse.Namespace) -> int:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(registry, "find_command", lambda _: fail)
+    monkeypatch.setattr(cli, "find_command", lambda _: fail)
     with pytest.raises(ZeroDivisionError):
         main(["scenarios"])
 
@@ -54,7 +54,7 @@ def test_the_commands_own_code_is_the_process_exit_code(monkeypatch: pytest.Monk
         taken.append(name)
         return lambda _args: 4
 
-    monkeypatch.setattr(registry, "find_command", find)
+    monkeypatch.setattr(cli, "find_command", find)
     assert main(["check", "m.plan"]) == 4
     assert taken == ["check"]
 

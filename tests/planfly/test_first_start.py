@@ -11,7 +11,8 @@ import pytest
 from planfly import first_start
 from planfly.first_start import warm_up
 from planfly.kernel_units.unit_kernels import kernels_of
-from planfly.terminal.output import silent_progress
+from planfly.stages import received_by
+from planfly.terminal.output import ON_STANDARD_ERROR, SILENT
 from world.compile_events import kernel_is_compiled
 
 ROOT = Path(__file__).parents[2]
@@ -46,7 +47,7 @@ def shared(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]:
 
 def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     whole = len(kernels_of(("scores", "paper")))
-    with warm_up("scores", "paper"):
+    with received_by(ON_STANDARD_ERROR), warm_up("scores", "paper"):
         assert capsys.readouterr().err == ""
         assert numba.njit(lambda a: a + 1)(1) == 2
         begun, done = capsys.readouterr().err.splitlines()
@@ -64,10 +65,10 @@ def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], caps
 
 
 def test_nothing_is_said_in_silence(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
-    with silent_progress(), warm_up("scores"):
+    with received_by(SILENT), warm_up("scores"):
         kernel_is_compiled()
     assert shared == [["scores"]]
-    with silent_progress(), warm_up():
+    with received_by(SILENT), warm_up():
         kernel_is_compiled()
     assert capsys.readouterr().err == ""
 
@@ -82,7 +83,7 @@ def test_a_cache_that_cannot_be_written_is_named(
 ) -> None:
     folder = Path("/proc/none/kernels")
     monkeypatch.setattr("world.kernels.cache_folder", lambda: folder)
-    with warm_up("scores"):
+    with received_by(ON_STANDARD_ERROR), warm_up("scores"):
         kernel_is_compiled()
     said = f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them\n"
     assert (capsys.readouterr().err, shared) == (said, [])

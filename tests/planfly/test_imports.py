@@ -6,7 +6,7 @@ import sys
 
 _PLANNING = """
 import json, sys
-import planfly.commands.plan
+import planfly.api.planning, planfly.commands.plan
 print(json.dumps([name for name in sys.argv[1:] if name in sys.modules]))
 """
 HEAVY = (

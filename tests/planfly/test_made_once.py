@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import planfly
 from flight.live.flight_process import (
     EndFlight,
     FlightJudged,
@@ -25,7 +26,7 @@ from flight.live.flight_process import (
 )
 from logs.views import drawing
 from planfly.cli import main
-from planfly.commands.registry import COMMAND_NAMES, find_command
+from planfly.commands.registry import build_parser
 from planfly.served_flights import ServedFlights, ServeOptions
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
@@ -76,8 +77,9 @@ def counted(function: Callable[..., Any], entered: Counter[str]) -> Callable[...
 def entered(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     """Stages entered since the test began, and how often each."""
     # What a command imports by itself would keep the counting function after the test.
-    for name in COMMAND_NAMES:
-        find_command(name)
+    build_parser()
+    for name in planfly.__all__:
+        getattr(planfly, name)
     for room in ("logs.views.report.page", "logs.views.replay.timeline"):
         import_module(room)
     # What is drawn enters stages as ever; to render it takes longer than all of them.

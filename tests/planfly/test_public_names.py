@@ -15,16 +15,31 @@ from tests.soak import SOAK
 
 ROOT = Path(planfly.__file__).parents[1]
 VERBS = {
-    *("plan", "fly", "plan_then_fly", "check", "read_log", "figures", "report", "compare", "export"),
-    *("campaign", "winds", "scenarios", "aircraft", "optimise"),
+    *(
+        "plan",
+        "replan",
+        "what_blocks",
+        "fly",
+        "plan_then_fly",
+        "run",
+        "check",
+        "judge",
+        "read_log",
+        "figures",
+        "report",
+    ),
+    *("compare", "export", "foxglove_layout", "timeline", "instruments", "movie", "play_to_foxglove"),
+    *("play_to_stations", "import_log", "refly", "recover", "campaign", "campaign_flight", "winds", "serve"),
+    *("scenarios", "aircraft", "describe_aircraft", "new_aircraft", "paper_tables", "optimise", "progress"),
 }
 RESULTS = {
-    *("BestFound", "CampaignResult", "Comparison", "ExportedFiles", "FlightLog", "FlownMission", "Optimiser", "Plan"),
-    *("PlanThenFly", "Track", "Verdict", "WindsFound", "WrittenReport"),
+    *("AircraftNumbers", "BestFound", "CampaignFlight", "CampaignResult", "Comparison", "ExportedFiles", "FlightLog"),
+    *("FlownMission", "ImportedFlight", "Instruments", "Judged", "Optimiser", "PaperTables", "Plan", "PlanThenFly"),
+    *("Reflown", "Round", "RunResult", "TimelineEntry", "Track", "Verdict", "WindsFound", "WrittenReport"),
 }
 ERRORS = {
     *("PlanflyError", "FlightError", "LogError", "MissionError", "ParameterError", "ScenarioError", "StartError"),
-    *("TerrainError", "SchedulerError", "SpreadError"),
+    *("TerrainError", "SchedulerError", "SpreadError", "ArgumentError"),
 }
 
 

@@ -19,10 +19,10 @@ from logs.verdict.findings import Fact, Finding, make_finding, verdict_json
 from logs.verdict.places import Place
 from logs.verdict.wording import deciding_text
 from planfly.airframe import load_airframe
+from planfly.open_mission import judge_log
 from planfly.pipeline import JudgedFlight, fly_and_judge
 from planfly.reference_flights import airframe_answer, deciding_parameter, find_deciding_parameter
 from planfly.served_flights import ServedLog
-from planfly.terminal.results import judge_log
 from tests.setups import setup_maker
 
 LEG = Place("leg", 4)

@@ -10,6 +10,7 @@ import world.errors
 from planfly.cli import main
 from planfly.commands import shell
 from world.errors import (
+    ArgumentError,
     FlightError,
     LogError,
     MissionError,
@@ -26,7 +27,7 @@ KINDS = (ScenarioError, TerrainError, MissionError, FlightError, ParameterError,
 def test_every_error_is_a_planfly_error() -> None:
     members = [kind for _, kind in inspect.getmembers(world.errors, inspect.isclass)]
     defined = [kind for kind in members if kind.__module__ == "world.errors"]
-    assert set(defined) == {PlanflyError, StartError, *KINDS}
+    assert set(defined) == {PlanflyError, StartError, ArgumentError, *KINDS}
     assert all(issubclass(kind, PlanflyError) for kind in defined)
 
 
@@ -35,11 +36,13 @@ def test_no_error_hides_a_fault_of_the_program() -> None:
     for kind in KINDS:
         assert kind.__mro__ == (kind, PlanflyError, Exception, BaseException, object)
     assert StartError.__mro__[1:] == FlightError.__mro__
+    # Callers may take a number that is out of its range for what Python calls it.
+    assert ArgumentError.__mro__[1:-1] == (PlanflyError, ValueError, Exception, BaseException)
 
 
 def test_the_tree_in_the_docstring_names_each_error() -> None:
     tree = (world.errors.__doc__ or "").splitlines()
-    for kind in (StartError, *KINDS):
+    for kind in (StartError, ArgumentError, *KINDS):
         assert sum(kind.__name__ in line for line in tree) == 1
 
 
@@ -69,10 +72,10 @@ def test_a_value_that_is_not_there_is_left_out_of_the_line() -> None:
 
 
 @pytest.mark.parametrize(("file", "begin"), [("", ""), (Path("a.mcap"), "a.mcap: ")])
-def test_an_error_of_an_option_names_it_and_its_file(file: str | Path, begin: str) -> None:
-    error = LogError.of_option("--to", 5.0, "the log ends at 4.0 s", shown="5", file=file)
-    assert str(error) == f"{begin}--to 5: the log ends at 4.0 s"
-    assert (error.file, error.field, error.value) == (str(file), "--to", 5.0)
+def test_an_error_of_an_argument_names_it_and_its_file(file: str | Path, begin: str) -> None:
+    error = LogError.of_argument("to", 5.0, "the log ends at 4.0 s", shown="5", file=file)
+    assert str(error) == f"{begin}to 5: the log ends at 4.0 s"
+    assert (error.file, error.field, error.value) == (str(file), "to", 5.0)
     assert error.allowed == "the log ends at 4.0 s"
 
 

@@ -366,11 +366,11 @@ def test_strangers_and_others_are_counted(link: Link) -> None:
 @pytest.mark.parametrize(
     ("access", "word"),
     [
-        (Access(("0.0.0.0", 0), ()), "--bind 0.0.0.0"),
-        (Access(("127.0.0.1", 0), (("192.0.2.1", 14550),)), "--to 192.0.2.1"),
-        (Access(("0.0.0.0", 0), (("192.0.2.1", 14550),), frozenset({"192.0.2.2"})), "--allow 192.0.2.1"),
-        (Access(("127.0.0.1", 0), (("192.0.2.1", 14550),), frozenset({"192.0.2.1"})), "--bind 127.0.0.1"),
-        (Access(("127.0.0.1", 0), (("192.0.2.1", 14550),), key=KEY), "--bind 127.0.0.1"),
+        (Access(("0.0.0.0", 0), ()), "bind 0.0.0.0"),
+        (Access(("127.0.0.1", 0), (("192.0.2.1", 14550),)), "to 192.0.2.1"),
+        (Access(("0.0.0.0", 0), (("192.0.2.1", 14550),), frozenset({"192.0.2.2"})), "`allow` 192.0.2.1"),
+        (Access(("127.0.0.1", 0), (("192.0.2.1", 14550),), frozenset({"192.0.2.1"})), "bind 127.0.0.1"),
+        (Access(("127.0.0.1", 0), (("192.0.2.1", 14550),), key=KEY), "bind 127.0.0.1"),
     ],
 )
 def test_beyond_this_machine_only_with_protection(access: Access, word: str) -> None:

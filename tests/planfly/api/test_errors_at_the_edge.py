@@ -118,7 +118,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "a scheduler": (
         lambda: planfly.campaign(_file("a.waypoints", _MISSION), scheduler="udp://host"),
-        _Known("", "--scheduler", "udp://host", "tcp://HOST:PORT"),
+        _Known("", "scheduler", "udp://host", "tcp://HOST:PORT"),
     ),
 }
 

@@ -165,7 +165,7 @@ def test_values_of_another_shape_are_refused() -> None:
 def test_before_anything_is_told_there_is_no_best() -> None:
     search = planfly.optimise([0.0], [1.0])
     assert repr(search) == "<Optimiser Umda: 1 variables, 0 evaluations>"
-    with pytest.raises(ValueError, match="nothing was told"):
+    with pytest.raises(ValueError, match="nothing has been evaluated"):
         _ = search.best
     search.minimise(lambda points: points[:, 0] * 0.0 + 2.0, 1)
     assert repr(search) == "<Optimiser Umda: 1 variables, 100 evaluations, best 2>"

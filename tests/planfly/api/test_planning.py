@@ -2,6 +2,7 @@
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import planfly
 from aircraft.catalog import aircraft_names, load_aircraft
 from planfly.airframe import load_airframe
 from planfly.api.planning import changed_scenario, opened_scenario
+from planfly.cli import main
 from planner.plan import plan_json, read_plan
 from planner.search.plan_path import plan_path
 from tests.planfly.conftest import FIELD
@@ -44,6 +46,21 @@ def test_each_keyword_changes_its_own(tmp_path: Path) -> None:
     assert changed_scenario(scenario, nav="rtk").flight.steering.nav == "rtk"
     for params in (tmp_path / "my.parm", str(tmp_path / "my.parm")):
         assert changed_scenario(scenario, params=params).flight.params == str(tmp_path / "my.parm")
+
+
+def test_parameters_mean_arduplane_and_a_law_of_guidance_takes_its_place() -> None:
+    scenario = small_scenario(wind={"speed_mps": 3.0, "from_deg": 200.0, "turbulence": "light"})
+    by_arduplane = changed_scenario(scenario, params="mine.parm")
+    assert by_arduplane.flight.steering == ("ardupilot", "path", "gnss")
+    assert by_arduplane.flight.params == str(Path("mine.parm").resolve())
+    again = changed_scenario(by_arduplane, guidance="l1").flight
+    assert (again.params, again.steering) == (None, ("ideal", "l1", "perfect"))
+    assert changed_scenario(scenario, params="mine.parm", nav="rtk").flight.steering.nav == "rtk"
+    # A program is an ArduPlane, whatever the scenario says.
+    assert (
+        changed_scenario(changed_scenario(scenario, guidance="l1"), autopilot="arduplane").flight.steering.autopilot
+        == "ardupilot"
+    )
 
 
 def test_an_aircraft_is_a_name_or_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,3 +162,43 @@ def test_a_name_that_is_none_is_bad_input(name: str | Path, file: str) -> None:
     with pytest.raises(planfly.FlightError) as caught:
         planfly.aircraft(name)
     assert caught.value.file == file
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"seed": -1}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"budget": 3}, "budget"),
+        ({"seconds": 0.0}, "seconds"),
+        ({"wind": (5.0, 361.0)}, "wind"),
+    ],
+)
+def test_a_number_out_of_its_range_names_its_keyword(given: dict[str, Any], field: str, tmp_path: Path) -> None:
+    with pytest.raises(planfly.ArgumentError, match="expected") as caught:
+        planfly.plan("tight", out=tmp_path / "plan.json", **given)
+    assert caught.value.field == field
+    assert isinstance(caught.value, ValueError)
+    assert not (tmp_path / "plan.json").exists()
+
+
+def test_planning_again_keeps_what_is_flown_and_goes_round_a_new_threat(tmp_path: Path) -> None:
+    """As the command plans again, byte for byte."""
+    old = planfly.plan("hard-07", seed=1, out=tmp_path / "plan.json")
+    east, north, _ = old.waypoints[6].tolist()
+    threat = (east, north, 300.0, 0.0)
+    new = planfly.replan("hard-07", tmp_path / "plan.json", 3, threats=[threat], seed=1, out=tmp_path / "new.json")
+    assert (new.safe, new.flown_legs) == (True, 3)
+    assert np.array_equal(new.waypoints[:4], old.waypoints[:4])
+    line = ["plan", "hard-07", "--from", str(tmp_path / "plan.json"), "--at-leg", "3", "--seed", "1"]
+    assert main([*line, f"--add-threat={east},{north},300,0", "--out", str(tmp_path / "theirs.json")]) == 0
+    assert (tmp_path / "new.json").read_bytes() == (tmp_path / "theirs.json").read_bytes()
+    with pytest.raises(planfly.MissionError, match="at_leg 99: the plan has legs"):
+        planfly.replan("hard-07", old, 99)
+    with pytest.raises(planfly.ScenarioError, match=r"threats: east 900000 m, .*: outside the terrain"):
+        planfly.replan("hard-07", old, 1, threats=[(9e5, 0.0, 10.0, 0.0)])
+
+
+def test_a_search_stops_where_it_is_told(tmp_path: Path) -> None:
+    made = planfly.plan("tight", algorithm="umda-smooth", stop=lambda: True)
+    assert made.ended == "interrupted"

@@ -8,26 +8,9 @@ from logs.importers.raw_log import example_raw_log
 from logs.recording.example_log import write_example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.commands.imported_logs import import_options
-from planfly.terminal.parser import build_parser
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
 from tests.planfly.commands.imported_log_files import FLIGHTS, example_plan
 from tests.soak import SOAK
-from world.errors import ScenarioError
-
-
-def test_options_become_what_a_person_says() -> None:
-    line = ["check", "a.BIN", "--plan", "p.plan", "--flight", "2", "--datum", "amsl", "--aircraft", "c172x"]
-    options = import_options(build_parser().parse_args([*line, "--wind", "5,270"]))
-    assert (options.plan, options.number, options.datum) == (Path("p.plan"), 2, "amsl")
-    assert (options.aircraft, options.wind_given, options.scenario) == ("c172x", True, None)
-
-
-@pytest.mark.parametrize("given", [["--params", "a.parm"], ["--guidance", "l1"], ["--airspeed", "20"]])
-def test_what_a_flown_log_cannot_take_is_refused(given: list[str]) -> None:
-    with pytest.raises(ScenarioError, match=f"a.BIN: {given[0]}: an imported flight"):
-        import_options(build_parser().parse_args(["check", "a.BIN", *given]))
-
 
 # ----------------------------------------------------------------------
 # `planfly import` and `planfly check LOG`: every format, refusals, and what the other commands make of the result.
@@ -91,7 +74,7 @@ def test_the_same_log_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_a_track_alone_needs_a_plan(tmp_path: Path, capsys: Output) -> None:
     log = kml(tmp_path / "a.kml")
     assert main(["check", str(log)]) == 2
-    said = "holds no mission: --plan MISSION names the one that was to be flown"
+    said = "holds no mission: --plan names the one that was to be flown"
     assert capsys.readouterr().err == f"planfly: {log}: {said}\n"
 
 

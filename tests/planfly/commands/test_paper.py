@@ -9,7 +9,7 @@ import pytest
 
 from planfly.cli import main
 from planfly.paper import file_names
-from planfly.terminal.results import prepare_folder
+from planfly.targets import prepare_folder
 
 ROWS = ["umda", "umda-strip", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing"]
 STABLE = ("table.csv", "runs.csv", "runs.json", "paths-07.png", "encodings-07.png", "convergence.png")

@@ -1,46 +1,41 @@
-"""Every command is found by its name, and none but the one that is given is loaded."""
+"""The list of commands is that of the parser, and each has its functions and its answer."""
 
-import json
-import subprocess
-import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 import planfly.commands
-from planfly.commands.registry import COMMAND_NAMES, find_command
-
-HELPERS = {"__init__", "registry"}
-# Commands that share a module, or whose function has another name than the command.
-ELSEWHERE = {
-    "import": ("imported_logs", "import_log"),
-    "refly": ("imported_logs", "refly"),
-    "help": ("shell", "show_help"),
-    "completion": ("shell", "completion"),
-    "scenarios": ("shell", "scenarios"),
-}
+from planfly.commands.registry import COMMANDS, answer_schema, build_parser, find_command
 
 
-def test_the_commands_are_the_modules_of_their_folder() -> None:
-    modules = {path.stem for path in Path(planfly.commands.__path__[0]).glob("*.py")} - HELPERS
-    shared = {module for module, _ in ELSEWHERE.values()}
-    assert sorted(COMMAND_NAMES) == sorted((modules - shared) | set(ELSEWHERE))
-    for name in COMMAND_NAMES:
-        command = find_command(name)
-        module, function = ELSEWHERE.get(name, (name, name))
-        assert (command.__module__, command.__name__) == (f"planfly.commands.{module}", function)
+def test_each_command_is_a_parser_and_a_function_of_one_module() -> None:
+    assert list(build_parser().commands) == [command.name for command in COMMANDS]
+    modules = {path.stem for path in Path(planfly.commands.__path__[0]).glob("*.py")} - {"__init__", "registry"}
+    assert modules == {command.module or command.name for command in COMMANDS}
+    for command in COMMANDS:
+        function, options = find_command(command.name), command.load("_options")
+        assert function.__module__ == options.__module__
+        assert (function.__doc__ or "").strip()
 
 
-def test_what_is_no_command_is_not_imported() -> None:
+def test_what_is_no_command_is_none() -> None:
     for name in ("registry", "os", ""):
         with pytest.raises(KeyError):
             find_command(name)
+    for name in ("serve", "land"):
+        with pytest.raises(KeyError):
+            answer_schema(name)
 
 
-def test_a_command_loads_no_other() -> None:
-    code = (
-        "import json, sys; from planfly.commands.registry import find_command; find_command('scenarios'); "
-        "print(json.dumps([name for name in sys.modules if name.startswith('planfly.commands.')]))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert sorted(json.loads(done.stdout)) == ["planfly.commands.registry", "planfly.commands.shell"]
+def test_a_command_answers_in_json_where_the_list_names_its_answer() -> None:
+    line = build_parser()
+    for command in COMMANDS:
+        assert ("--json" in line.commands[command.name].options()) == bool(command.answer)
+
+
+def test_help_lists_each_command_below_its_section() -> None:
+    text = build_parser().format_help()
+    for before, after in pairwise(COMMANDS):
+        assert text.index(f"\n  {before.name} ") < text.index(f"\n  {after.name} ")
+        assert text.index(f"\n{after.section}:\n") < text.index(f"\n  {after.name} ")

@@ -13,7 +13,7 @@ import pytest
 from logs.recording.reader import read_log
 from logs.verdict.rules.registry import RULES
 from planfly.cli import main
-from planfly.terminal.results import RUN_FILES
+from planfly.targets import RUN_FILES
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK, scaled
 
@@ -24,9 +24,9 @@ SEEDS = range(1, 1 + scaled(100, 1)) if SOAK else (4,)
 # ``planfly run`` but for its pictures, which take most of its time.
 WITHOUT_PICTURES = """
 import sys
-import planfly.commands.run as command
+import logs.views.report.page
 from planfly.cli import main
-command.write_pictures = lambda *_, **__: []
+logs.views.report.page.write_report = lambda *_, **__: []
 sys.exit(main(["run", *sys.argv[1:]]))
 """
 

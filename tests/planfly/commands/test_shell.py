@@ -10,7 +10,7 @@ import pytest
 
 import world
 from planfly.cli import main
-from planfly.terminal.parser import build_parser
+from planfly.commands.registry import build_parser
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from planfly.api import campaigns
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsGoal
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, WindsStore
 from planfly.cli import main
-from planfly.commands import winds as command
 from tests.planfly.campaigns.made_campaigns import made_flight, table, write_short
 from tests.planfly.terminal.answers.checked_answers import answered
 from world.interruption import Interrupted
@@ -59,7 +59,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
             store.add(AskedFlight(index, 0, 5.0, index), made_flight(base, index))
         raise Interrupted(number)
 
-    monkeypatch.setattr(command, "find_winds", interrupted)
+    monkeypatch.setattr(campaigns, "find_winds", interrupted)
     assert main([*line, "--out", str(tmp_path / "out")]) == 128 + number
     told = capsys.readouterr().err.splitlines()
     assert told[-1] == f"planfly: interrupted; 3 flights are kept in {tmp_path / 'out'}, --resume goes on"
@@ -89,7 +89,7 @@ def test_one_line_and_nothing_lost(
         raise Interrupted(signal.SIGINT)
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(command, "find_winds", left)
+    monkeypatch.setattr(campaigns, "find_winds", left)
     assert main([*line, "--out", "out"]) == 130
     Path("campaign").mkdir()
     Path("campaign", "campaign.sqlite").write_bytes(b"another one's")

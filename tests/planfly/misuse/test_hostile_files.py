@@ -27,8 +27,8 @@ MAGIC = b"\x89MCAP0\r\n"
 # the file that is limited, not Python.
 CHILD = """
 import json, os, resource, signal, sys, time, traceback
-import logs.verdict.judge_flight, logs.recording.reader, planfly.commands.check
-import planfly.commands.recover, planfly.commands.replay, planfly.commands.report, world.raster
+import logs.verdict.judge_flight, logs.recording.reader, planfly.api.flying, planfly.api.imported
+import planfly.api.replaying, planfly.api.reporting, world.raster
 from planfly.cli import main
 def kib(name):
     with open("/proc/self/status") as file:

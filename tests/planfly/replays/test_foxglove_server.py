@@ -142,7 +142,7 @@ def test_the_subprotocol_is_the_one_that_is_stated(log_path: Path) -> None:
     from websockets.exceptions import WebSocketException
     from websockets.sync.client import connect
 
-    from planfly.terminal.parser import build_parser
+    from planfly.commands.registry import build_parser
 
     with served(str(log_path)) as (_, viewer):
         assert viewer.socket.subprotocol == SUBPROTOCOL == "foxglove.sdk.v1"

@@ -11,48 +11,55 @@ from typing import Any
 
 import pytest
 
-from planfly.commands.registry import COMMAND_NAMES
+from planfly.commands.registry import COMMANDS
 from planfly.terminal import arguments
-from planfly.terminal.arguments import SHELLS, aircraft_words, mission_or_scenario_words, scenario_words, shell_script
+from planfly.terminal.arguments import (
+    SHELLS,
+    aircraft_words,
+    mission_or_scenario_words,
+    number,
+    scenario_words,
+    shell_script,
+)
 
 TAKEN: list[tuple[Callable[[str], Any], str, Any]] = [
-    (arguments.seed, "0", 0),
-    (arguments.seed, "9223372036854775807", 2**63 - 1),
-    (arguments.count, "20", 20),
-    (arguments.positive, "1e6", 1e6),
-    (arguments.positive, "0.25", 0.25),
-    (arguments.speedup, "0.1", 0.1),
-    (arguments.speedup, "100", 100.0),
+    (number("seed"), "0", 0),
+    (number("seed"), "9223372036854775807", 2**63 - 1),
+    (number("refine"), "20", 20),
+    (number("max_hours"), "1e6", 1e6),
+    (number("max_hours"), "0.25", 0.25),
+    (number("served_speed"), "0.1", 0.1),
+    (number("served_speed"), "100", 100.0),
     (arguments.wind, "40,-360", (40.0, -360.0)),
     (arguments.wind, "0,360", (0.0, 360.0)),
-    (arguments.flight_time, "0", 0.0),
-    (arguments.flight_time, "1e7", 1e7),
+    (number("start"), "0", 0.0),
+    (number("start"), "1e7", 1e7),
     (arguments.time_or_stations, "12.5", 12.5),
     (arguments.time_or_stations, "127.0.0.1:14550", "127.0.0.1:14550"),
     (arguments.budget, "4", (4, None)),
     (arguments.budget, "2.5s", (None, 2.5)),
-    (arguments.leg, "10000", 10_000),
+    (number("at_leg"), "10000", 10_000),
     (arguments.threat, "-5,6.5,0,300", (-5.0, 6.5, 0.0, 300.0)),
     (arguments.problems, "60, 7,7", (7, 60)),
-    (arguments.positive_count, "1000", 1000),
-    (arguments.port, "65535", 65535),
-    (arguments.port, "0", 0),
+    (number("runs"), "1000", 1000),
+    (number("port"), "65535", 65535),
+    (number("port"), "0", 0),
 ]
 
 REFUSED: list[tuple[Callable[[str], Any], tuple[str, ...]]] = [
-    (arguments.seed, ("-1", "9223372036854775808", "1.0", "")),
-    (arguments.count, ("21", "-1", "\u0663", "2.0")),
-    (arguments.positive, ("0", "-1", "1000001", "nan", "inf", "ten")),
-    (arguments.speedup, ("0.09", "100.1", "nan")),
+    (number("seed"), ("-1", "9223372036854775808", "1.0", "")),
+    (number("refine"), ("21", "-1", "\u0663", "2.0")),
+    (number("max_hours"), ("0", "-1", "1000001", "nan", "inf", "ten")),
+    (number("served_speed"), ("0.09", "100.1", "nan")),
     (arguments.wind, ("5", "5,6,7", "-1,0", "40.1,0", "5,361", "nan,0", "5,nan")),
-    (arguments.flight_time, ("-0.1", "10000001", "nan")),
+    (number("start"), ("-0.1", "10000001", "nan")),
     (arguments.time_or_stations, ("-1", "soon")),
     (arguments.budget, ("3", "10000000001", "0s", "nans", "-2s", "s", "1000001s")),
-    (arguments.leg, ("-1", "10001", "1.5")),
+    (number("at_leg"), ("-1", "10001", "1.5")),
     (arguments.threat, ("1,2,3", "1,2,-3,4", "1,2,3,-4", "nan,2,3,4", "1,inf,3,4", "1,2,nan,4")),
     (arguments.problems, ("8", "7,", "7,-15", "")),
-    (arguments.positive_count, ("0", "1001", "-1", "2.5")),
-    (arguments.port, ("65536", "-1", "80.0")),
+    (number("runs"), ("0", "1001", "-1", "2.5")),
+    (number("port"), ("65536", "-1", "80.0")),
 ]
 
 
@@ -87,7 +94,7 @@ def proposed(line: str, folder: Path) -> list[str]:
 def test_commands_options_and_names(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("", encoding="utf-8")
     (tmp_path / "notes.txt").write_text("", encoding="utf-8")
-    assert set(proposed("planfly ", tmp_path)) >= set(COMMAND_NAMES)
+    assert set(proposed("planfly ", tmp_path)) >= {command.name for command in COMMANDS}
     assert proposed("planfly sce", tmp_path) == ["scenarios"]
     assert {"--wind", "--turbulence", "--json"} <= set(proposed("planfly fly --", tmp_path))
     assert proposed("planfly run --tur", tmp_path) == ["--turbulence"]

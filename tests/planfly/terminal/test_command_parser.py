@@ -8,8 +8,8 @@ import sys
 
 import pytest
 
+from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import CommandParser, LineParser, coloured, wants_colour
-from planfly.terminal.parser import build_parser
 
 
 class Terminal(io.StringIO):
@@ -114,7 +114,8 @@ def test_a_parser_knows_its_long_options() -> None:
 
 def test_commands_are_found_by_name_and_help_shows_groups() -> None:
     line = LineParser("1.0", "What it is.", "first steps: planfly go")
-    go = line.command("go", "go there", "planfly go now", "planfly go later", more="ways:\n  on foot")
+    go = line.command("go", "go there", "planfly go now", "planfly go later")
+    go.more = lambda: "ways:\n  on foot"
     go.group("how fast").add_argument("--speed", help="in m/s")
     assert line.commands == {"go": go}
     text = go.format_help()

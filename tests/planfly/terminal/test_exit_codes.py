@@ -12,9 +12,9 @@ PAGES = (ROOT / "README.md", ROOT / "docs" / "commands.md")
 # By the sentence that the pages have for each; 130 and 143 are what a shell gives a command that a signal ended.
 MEANT = {
     "flyable": exit_codes.FLYABLE,
-    "our fault or the machine's": exit_codes.FAULT,
-    "bad usage or bad input": exit_codes.BAD_INPUT,
-    "done with a stated loss": exit_codes.LOSS,
+    "internal or system error": exit_codes.FAULT,
+    "incorrect usage or invalid input": exit_codes.BAD_INPUT,
+    "finished with a reported loss": exit_codes.LOSS,
     "not flyable, or no feasible plan": exit_codes.NOT_FLYABLE,
     "and 143 ended by SIGINT (Ctrl-C) and SIGTERM": exit_codes.INTERRUPTED,
 }

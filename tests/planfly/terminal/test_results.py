@@ -1,114 +1,16 @@
-"""Targets on disk: what may be written over, and what is cleared."""
+"""What commands print of results, and errors in the words of the command line."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from flight.mission_files.formats import read_mission
 from logs.recording.reader import read_log
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Change, Place
 from planfly.cli import main
-from planfly.terminal.results import (
-    RUN_FILES,
-    default_folder,
-    named_or_default,
-    prepare_folder,
-    print_verdict,
-    print_warnings,
-    refuse_existing,
-    refuse_folder,
-    write_missions,
-    write_verdict,
-)
-from tests.logs.made_flight import make_setup
-from world.errors import PlanflyError
-
-
-def test_a_named_file_is_refused_where_it_would_destroy(tmp_path: Path) -> None:
-    there, link = tmp_path / "there.plan", tmp_path / "link.plan"
-    there.write_text("mine", encoding="utf-8")
-    link.symlink_to(there)
-    refuse_existing(tmp_path / "new.plan", overwrite=False, source=there)
-    refuse_existing(there, overwrite=True)
-    for path, overwrite, source, message in (
-        (there, False, None, "--overwrite replaces it"),
-        (link, True, there, "is the input itself"),
-        (tmp_path, True, None, "is a folder"),
-        (tmp_path / "none" / "a.plan", True, None, "does not exist"),
-    ):
-        with pytest.raises(PlanflyError, match=message):
-            refuse_existing(path, overwrite, source)
-    assert there.read_text(encoding="utf-8") == "mine"
-
-
-def test_a_named_folder_is_refused_unless_it_is_empty(tmp_path: Path) -> None:
-    refuse_folder(tmp_path, overwrite=False)
-    refuse_folder(tmp_path / "new", overwrite=False)
-    file = tmp_path / "mine.txt"
-    file.write_text("mine", encoding="utf-8")
-    with pytest.raises(PlanflyError, match="not empty; --overwrite"):
-        refuse_folder(tmp_path, overwrite=False)
-    with pytest.raises(PlanflyError, match="a folder is expected"):
-        refuse_folder(file, overwrite=True)
-    refuse_folder(tmp_path, overwrite=True)
-
-
-def test_a_run_clears_its_old_results_and_nothing_of_others(tmp_path: Path) -> None:
-    old = tmp_path / "round-1"
-    mixed = tmp_path / "round-2"
-    for folder in (tmp_path, old, mixed):
-        folder.mkdir(exist_ok=True)
-        for name in RUN_FILES:
-            (folder / name).write_text("old", encoding="utf-8")
-    for kept in (tmp_path / "mine.txt", mixed / "mine.txt", tmp_path / "map.svg"):
-        kept.write_text("mine", encoding="utf-8")
-    (tmp_path / "rounds.json").write_text("old", encoding="utf-8")
-    prepare_folder(tmp_path)
-    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*"))
-    assert left == ["map.svg", "mine.txt", "round-2", "round-2/mine.txt"]
-
-
-def test_a_folder_of_old_results_alone_stays_to_take_the_new_ones(tmp_path: Path) -> None:
-    folder = tmp_path / "runs" / "a"
-    prepare_folder(folder)
-    (folder / "plan.json").write_text("old", encoding="utf-8")
-    prepare_folder(folder)
-    assert folder.is_dir()
-    assert list(folder.iterdir()) == []
-
-
-def test_another_command_leaves_a_runs_rounds_alone(tmp_path: Path) -> None:
-    (tmp_path / "round-1").mkdir()
-    for name in ("round-1/map.png", "map.png", "plan.json", "rounds.json"):
-        (tmp_path / name).write_text("old", encoding="utf-8")
-    prepare_folder(tmp_path, ("map.png", "report.html"))
-    left = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file())
-    assert left == ["plan.json", "round-1/map.png", "rounds.json"]
-
-
-@pytest.mark.parametrize(
-    ("name", "folder"),
-    [
-        ("jacksboro", "runs/jacksboro-seed3"),
-        ("../../etc/passwd", "runs/-..-etc-passwd-seed3"),
-        ("a b/c", "runs/a-b-c-seed3"),
-        ("...", "runs/run-seed3"),
-    ],
-)
-def test_a_default_folder_stays_below_runs(name: str, folder: str) -> None:
-    assert default_folder(name, 3) == Path(folder)
-
-
-def test_a_default_is_replaced_and_a_named_target_is_not(tmp_path: Path) -> None:
-    there, source = tmp_path / "there.json", tmp_path / "in.json"
-    there.write_text("mine", encoding="utf-8")
-    assert named_or_default(None, there, overwrite=False, source=source) == there
-    assert named_or_default(str(there), source, overwrite=True, source=source) == there
-    with pytest.raises(PlanflyError, match="exists"):
-        named_or_default(str(there), source, overwrite=False, source=source)
-
+from planfly.commands.registry import build_parser
+from planfly.terminal.results import error_text, print_verdict, print_warnings
+from world.errors import LogError, PlanflyError
 
 # ----------------------------------------------------------------------
 # A log that is cut short: every command that reads it says so, and ends with 3.
@@ -175,15 +77,24 @@ def test_warnings_do_not_mix_with_results(capsys: pytest.CaptureFixture[str]) ->
     assert (out.out, out.err) == ("", "warning: line 3: CRLF\n")
 
 
-def test_files_hold_the_mission_and_the_verdict(tmp_path: Path) -> None:
-    mission = make_setup().mission
-    targets = [tmp_path / "m.waypoints", tmp_path / "m.plan"]
-    write_missions(mission, targets)
-    for target in targets:
-        read = read_mission(target)
-        assert [item.command for item in read.items] == [16] * 4
-        assert [item.lat_deg for item in read.items] == pytest.approx([46.0 + k / 300 for k in range(4)], abs=1e-7)
-    write_verdict(tmp_path / "v.json", Verdict((slope(1, 9.0, 8.0),), False, True, ("not flyable",), "flown"))
-    data = json.loads((tmp_path / "v.json").read_text(encoding="utf-8"))
-    assert data["flyable"] is False
-    assert [(item["rule"], item["flown"], item["limit"]) for item in data["findings"]] == [("slope", 9.0, 8.0)]
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (LogError.of_argument("start", 9.0, "the log ends at 4 s", file="a.mcap"), "a.mcap: --from 9.0: the log"),
+        (
+            LogError.of_argument("end", 9.0, "at or after `start`", file="a.mcap"),
+            "a.mcap: --to 9.0: at or after --f",
+        ),
+        (
+            PlanflyError("a.gif: exists; overwrite=True replaces it", file="a.gif"),
+            "a.gif: exists; --overwrite replaces",
+        ),
+        # A source that is an argument.
+        (PlanflyError.at("speed", "a", 1, "2 is expected"), "--speed: a: 1"),
+        # A field of a file, and words, that only have the name of a keyword.
+        (PlanflyError.at("a.toml", "speed", 1, "2 is expected"), "a.toml: speed: 1: 2"),
+        (PlanflyError("a `word` of no option: speed=True, none=True"), "a `word` of no option: --speed, none=True"),
+    ],
+)
+def test_keywords_are_options(error: PlanflyError, line: str) -> None:
+    assert error_text(error, build_parser().commands["replay"]).startswith(line)

@@ -7,7 +7,7 @@ import jsonschema
 import pytest
 
 from planfly.cli import main
-from planfly.terminal.answers.giving import answer_schema
+from planfly.commands.registry import answer_schema
 
 
 def validate(command: str, answer: object) -> None:

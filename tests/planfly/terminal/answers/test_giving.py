@@ -5,16 +5,15 @@ import json
 import jsonschema
 import pytest
 
-from planfly.terminal.answers.giving import ANSWERS, answer_schema, schema_text
-from planfly.terminal.parser import build_parser
+from planfly.commands.registry import answer_schema, answering_commands, build_parser, schema_text
 
 
 def test_every_command_with_json_has_a_schema_and_no_other() -> None:
     asked = {name for name, parser in build_parser().commands.items() if "--json" in parser.options()}
-    assert asked == set(ANSWERS)
+    assert asked == set(answering_commands())
 
 
-@pytest.mark.parametrize("command", ANSWERS)
+@pytest.mark.parametrize("command", answering_commands())
 def test_each_is_a_schema_that_asks_for_its_name(command: str) -> None:
     schema = answer_schema(command)
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -25,7 +24,7 @@ def test_each_is_a_schema_that_asks_for_its_name(command: str) -> None:
 
 
 def test_no_two_answers_have_one_name() -> None:
-    names = [answer_schema(command)["properties"]["schema"]["const"] for command in ANSWERS]
+    names = [answer_schema(command)["properties"]["schema"]["const"] for command in answering_commands()]
     assert len(set(names)) == len(names)
 
 

@@ -1,19 +1,23 @@
-"""`planfly.winds`: the search of the command, its numbers checked, its files where they are asked for."""
+"""`planfly.winds` and `planfly.campaign`: what is asked for is what is flown."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import planfly
-from planfly.api import wind_limits
+from planfly.api import campaigns
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.dispersions import draw_flight
+from planfly.campaigns.dispersions import default_dispersions, draw_flight
 from planfly.campaigns.find_winds import WindsFound, WindsGoal
-from planfly.campaigns.flight_row import FlightRow
+from planfly.campaigns.flight_row import FlightRow, fly_one
+from planfly.campaigns.fly_campaign import open_store
+from planfly.campaigns.report import OutputDirectory
+from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.statistics.wind_boundary import Direction
-from planfly.campaigns.tables import AskedFlight, WindsStore
-from tests.planfly.campaigns.made_campaigns import table
+from planfly.campaigns.tables import DATABASE, AskedFlight, WindsStore
+from tests.planfly.campaigns.made_campaigns import short_base, table, write_short
 from tests.planfly.campaigns.statistics.made_directions import no_numbers
 
 FLIGHTS = tuple((number, speed, speed < 8.0) for number in range(4) for speed in (2.0, 6.0, 7.5, 8.5, 10.0, 14.0))
@@ -24,7 +28,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
     """What a search was asked; it finds that 8 m/s decide."""
     seen = []
 
-    def found(base: CampaignBase, goal: WindsGoal, _: object, store: WindsStore) -> WindsFound:
+    def found(base: CampaignBase, goal: WindsGoal, _: object, store: WindsStore, __: object) -> WindsFound:
         seen.append((base, goal))
         if not store.known():
             store.add(AskedFlight(0, 0, 5.0, 0), made_row(base))
@@ -33,7 +37,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
             directions[number].add(speed, draw, frozenset() if flyable else frozenset({"slope"}))
         return WindsFound(goal, tuple(one.boundary() for one in directions), FLIGHTS)
 
-    monkeypatch.setattr(wind_limits, "find_winds", found)
+    monkeypatch.setattr(campaigns, "find_winds", found)
     return seen
 
 
@@ -62,9 +66,9 @@ def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoa
 
 
 def test_nothing_to_go_on_with(asked: list[object], tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="resume: out is missing"):
+    with pytest.raises(ValueError, match="resume: `out` is missing"):
         planfly.winds("paper-07", resume=True)
-    with pytest.raises(ValueError, match="resume: out is missing"):
+    with pytest.raises(ValueError, match="resume: `out` is missing"):
         planfly.campaign("paper-07", resume=True)
     assert asked == []
 
@@ -78,3 +82,46 @@ def test_numbers_that_are_none_are_refused(bad: dict[str, Any], asked: list[obje
     with pytest.raises(ValueError, match=next(iter(bad))):
         planfly.winds("paper-07", **bad)
     assert asked == []
+
+
+# ----------------------------------------------------------------------
+# Campaigns: the goal of one that goes on, and fences.
+
+
+def test_a_goal_is_one_of_two(tmp_path: Path) -> None:
+    with pytest.raises(planfly.ArgumentError, match="give one of them"):
+        planfly.campaign("paper-07", prove=0.9, at_least=0.9)
+
+
+@pytest.mark.parametrize("goal", [(None, None, None), (9, None, 0.9)])
+def test_a_campaign_that_goes_on_keeps_its_confidence_unless_one_is_named(
+    goal: tuple[int | None, float | None, float | None], tmp_path: Path
+) -> None:
+    base = short_base(tmp_path)
+    with open_store(base, Goal(0.9, False, 9, 0.8), tmp_path, resume=False):
+        pass
+    flights, prove, at_least = goal
+    named = (0.95, 0.9, 0.8)
+    goals = [campaigns.continued_goal(tmp_path, flights, prove, at_least, one) for one in named]
+    assert [one.confidence for one in goals] == list(named)
+    assert campaigns.continued_goal(tmp_path, flights, prove, at_least, None) == Goal(0.9, False, 9, 0.8)
+
+
+def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:
+    """Zones join the scenario, fences the mission; and it is another campaign than that without them."""
+    mission, scenario = write_short(tmp_path)
+    circle, zone = tmp_path / "keep-out.fence", tmp_path / "zone.geojson"
+    circle.write_text("QGC WPL 110\n0\t0\t0\t5004\t50\t0\t0\t0\t46.0\t8.00904\t0\t1\n")
+    ring = [[8.0, 46.01], [8.01, 46.01], [8.01, 46.02], [8.0, 46.01]]
+    zone.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    with_both, without = (
+        campaigns._asked(mission, scenario, None, fences, None, wind=None).open(
+            default_dispersions(), OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False)
+        )
+        for name, fences in (("a", [circle, zone]), ("b", []))
+    )
+    assert [item.command for item in with_both.mission.fences] == [5004]
+    assert len(with_both.scenario.spec.zones) == 1
+    assert with_both.world_hash() != without.world_hash()
+    assert "fence" not in {rule for rule, _ in fly_one(without, 0).failed}
+    assert "fence" in {rule for rule, _ in fly_one(with_both, 0).failed}

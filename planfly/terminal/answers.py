@@ -2,16 +2,14 @@
 
 import json
 import math
-from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from pydantic import ConfigDict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
-from aircraft.envelope import Envelope
-from flight.dynamics.characteristics import Mode, TrimRow
 from logs.verdict.findings import Verdict, verdict_json
+from planfly.api.aircraft import AircraftNumbers
 
 # ----------------------------------------------------------------------
 # What ``verdict.json`` holds, as data that a JSON schema is made of.
@@ -145,7 +143,7 @@ class ParametersDocument:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ProgramDocument:
-    """The real autopilot that flew."""
+    """The SITL program that flew."""
 
     version: str
     sha256: str
@@ -247,19 +245,6 @@ class AircraftAnswer:
     aircraft: list[AircraftEntry]
 
 
-class AircraftNumbers(NamedTuple):
-    """What the command works out of an aircraft.
-
-    modes: by airspeed, m/s.  cruise: modes in cruise.  steps: of `flight.dynamics.characteristics.step_responses`.
-    """
-
-    envelope: Envelope
-    trims: tuple[TrimRow, ...]
-    modes: dict[float, tuple[Mode, ...]]
-    cruise: tuple[Mode, ...]
-    steps: Any
-
-
 def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntry:
     """An aircraft's metadata, and what was worked out."""
     return AircraftEntry(
@@ -278,9 +263,7 @@ def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntr
     )
 
 
-def aircraft_detail(
-    numbers: AircraftNumbers, identity: str, lacking: Sequence[str], files: Sequence[str]
-) -> AircraftDetail:
+def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
     """What was worked out, in the answer's units."""
     slow, fast = numbers.envelope.level_speeds(0.0)
     trims = [
@@ -299,13 +282,13 @@ def aircraft_detail(
         for mode in numbers.cruise
     ]
     return AircraftDetail(
-        model_sha256=identity,
+        model_sha256=numbers.model_sha256,
         level_speed_min_mps=float(slow),
         level_speed_max_mps=float(fast),
         trims=trims,
         modes=modes,
-        lacking=list(lacking),
-        files=list(files),
+        lacking=list(numbers.lacking),
+        files=[str(file) for file in numbers.files],
     )
 
 
@@ -475,7 +458,7 @@ class FlyAnswer:
     log: str | None
     """The flight log, null where nothing was flown."""
     autopilot_log: str | None
-    """A real autopilot's own."""
+    """ArduPilot SITL's own."""
     warnings: list[str]
     verdict: VerdictDocument
 

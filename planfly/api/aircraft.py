@@ -1,0 +1,148 @@
+"""The aircraft that planfly knows, and one's own: data, trims and modes, and a folder to begin with."""
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import overload
+
+from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft, make_own_folder, model_hash
+from aircraft.envelope import Envelope
+from flight.autopilots.catalog import AUTOPILOTS
+from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, modes_at, step_responses, trim_table
+from flight.dynamics.envelope_tables import load_envelope
+from planfly.first_start import with_warm_up
+from planfly.stages import stage
+from planfly.targets import filled_pattern, prepare_folder, refuse_folder
+from world.errors import PlanflyError
+from world.files import whole_path, write_whole
+from world.scenario_tables import names_folder
+
+
+@dataclass(frozen=True, slots=True)
+class AircraftNumbers:
+    """What `planfly.describe_aircraft` returns.
+
+    aircraft: its metadata.  model_sha256: of its JSBSim model.
+    envelope: climb and descent by airspeed and height.
+    trims: level flight by airspeed.  modes: by airspeed, m/s.  cruise: modes in cruise.
+    steps: responses to steps of the controls.
+    lacking: what is missing in its folder for a flight, a line each.
+    files: the pictures that were written.
+    """
+
+    aircraft: Aircraft
+    model_sha256: str
+    envelope: Envelope
+    trims: tuple[TrimRow, ...]
+    modes: Mapping[float, tuple[Mode, ...]]
+    cruise: tuple[Mode, ...]
+    steps: tuple[StepResponse, ...]
+    lacking: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+
+
+@overload
+def aircraft() -> dict[str, Aircraft]: ...
+@overload
+def aircraft(name: str | Path) -> Aircraft: ...
+def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
+    """An aircraft by its name, or by the folder of one's own: masses, speeds and limits, in SI units and radians.
+
+    name: None for all embedded ones by name.
+    Raises a `planfly.PlanflyError` for a name that is none and a folder that holds no aircraft.
+
+    >>> import planfly
+    >>> planfly.aircraft("aerosonde").airspeed
+    25.0
+    >>> list(planfly.aircraft())
+    ['aerosonde', 'c172x']
+    """
+    if name is None:
+        return {known: load_aircraft(known) for known in aircraft_names()}
+    return find_aircraft(str(name.resolve()) if isinstance(name, Path) else name)
+
+
+def new_aircraft(folder: str | Path, source: str | Path = "aerosonde") -> Aircraft:
+    """Make the folder of an aircraft of one's own, which must not be there yet, with copies of another's files.
+
+    source: the aircraft to begin with, a name or a folder.
+    Raises a `planfly.PlanflyError` for bad input; nothing is made then.
+
+    >>> import planfly, tempfile
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     made = planfly.new_aircraft(Path(place) / "mine")
+    >>> made.name, made.mass
+    ('mine', 11.0)
+    """
+    make_own_folder(Path(folder), _opened(source))
+    return find_aircraft(str(Path(folder).absolute()))
+
+
+@with_warm_up()
+def describe_aircraft(
+    name: str | Path, *, motor_braking: bool = False, out: str | Path | None = None, overwrite: bool = False
+) -> AircraftNumbers:
+    """Work out trims, modes, envelope and step responses of an aircraft, and draw them.
+
+    name: embedded, or a folder.  motor_braking: whether the motor may brake in descents.
+    out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``; {name} in it is the aircraft's; None for none.
+    overwrite: whether pictures that lie there are replaced.
+    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+
+    >>> import planfly
+    >>> numbers = planfly.describe_aircraft("aerosonde")
+    >>> numbers.envelope.level_speeds(0.0)
+    (15.9..., 32.4...)
+    """
+    chosen = _opened(name)
+    identity = model_hash(chosen)
+    # Settings that are there and broken are refused here.
+    lacking = tuple(missing for kind in AUTOPILOTS for missing in kind.missing_files(chosen))
+    folder = None if out is None else filled_pattern(out, chosen.name, 0)
+    if folder is not None:
+        refuse_folder(folder, overwrite)
+    # Everything is worked out before anything is written.
+    with stage(f"trimming {chosen.name}"):
+        envelope = load_envelope(chosen, motor_braking=motor_braking)
+        trims = trim_table(chosen)
+        modes = {row.trim.airspeed: modes_at(chosen, row.trim.airspeed) for row in trims}
+        cruise, steps = modes_at(chosen, chosen.airspeed), step_responses(chosen)
+    files: tuple[Path, ...] = ()
+    if folder is not None:
+        pictures = _draw(chosen, envelope, trims, modes, steps)
+        prepare_folder(folder, tuple(pictures))
+        for file, data in pictures.items():
+            write_whole(folder / file, data)
+        files = tuple(folder / file for file in pictures)
+    return AircraftNumbers(chosen, identity, envelope, trims, modes, cruise, steps, lacking, files)
+
+
+def _opened(name: str | Path) -> Aircraft:
+    """The aircraft of a name or in a folder.  Raises PlanflyError."""
+    text = str(name.absolute()) if isinstance(name, Path) else name
+    if not names_folder(text):
+        return find_aircraft(text)
+    if not Path(text).exists():
+        message = f"{text}: no such folder; planfly aircraft --new {shlex.quote(text)} makes it"
+        raise PlanflyError(message, file=text)
+    return find_aircraft(whole_path(Path(text)))
+
+
+def _draw(
+    chosen: Aircraft,
+    envelope: Envelope,
+    trims: tuple[TrimRow, ...],
+    modes: Mapping[float, tuple[Mode, ...]],
+    steps: tuple[StepResponse, ...],
+) -> dict[str, bytes]:
+    # matplotlib loads for pictures alone.
+    from logs.views.aircraft import draw_envelope, draw_steps, draw_trims
+    from logs.views.drawing import png_bytes
+
+    with stage("drawing"):
+        return {
+            "envelope.png": png_bytes(draw_envelope(chosen, envelope)),
+            "trims.png": png_bytes(draw_trims(chosen, trims, modes)),
+            "steps.png": png_bytes(draw_steps(chosen, steps)),
+        }

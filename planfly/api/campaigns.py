@@ -1,0 +1,306 @@
+"""How likely a mission is to fly, and the largest wind from each direction: many flights, each somewhat different."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from planfly.api.flying import FencePaths, named_fences
+from planfly.api.planning import Wind, changed_scenario
+from planfly.arguments import check_arguments
+from planfly.campaigns.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.campaign_result import CampaignResult, campaign_line, make_goal, winds_line
+from planfly.campaigns.dispersions import Dispersions, default_dispersions, read_dispersions
+from planfly.campaigns.find_winds import (
+    ASKED,
+    WindsFound,
+    WindsGoal,
+    asked_flights,
+    find_winds,
+    open_winds_store,
+)
+from planfly.campaigns.flight_row import FlightRow
+from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goal
+from planfly.campaigns.report import OutputDirectory, campaign_folder, finish_campaign, fly_row_again, write_winds
+from planfly.campaigns.statistics.decision import Goal
+from planfly.campaigns.summary import summarise
+from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, read_table
+from planfly.campaigns.worker_pool import Workers, in_own_process
+from planfly.first_start import with_warm_up
+from planfly.kernel_units.unit_kernels import BOTH
+from planfly.stages import stage
+from world.errors import PlanflyError
+from world.scenario_tables import Guidance, Navigation
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignFlight:
+    """What `planfly.campaign_flight` returns: a flight of a campaign, flown again as the table has it.
+
+    row: outcome, how it ended, and the rules that it failed.  log: the file that it is recorded in.
+    """
+
+    row: FlightRow
+    log: Path
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What a campaign flies, as the keywords of a call state it; None for what they leave as it is."""
+
+    target: str
+    scenario: str | None
+    terrain: str | None
+    fence: FencePaths
+    seed: int | None
+    flown: Mapping[str, Any]
+
+    def open(self, dispersions: Dispersions, folder: OutputDirectory) -> CampaignBase:
+        """The mission, and its folder ready for it.  Raises PlanflyError; the folder is as it was then."""
+        return folder.open(lambda planned: self._opened(dispersions, planned))
+
+    def _opened(self, dispersions: Dispersions, planned: Path | None) -> CampaignBase:
+        """The mission, planned if it is a scenario and there is no plan of it."""
+        opened = partial(
+            in_own_process, open_campaign, self.target, dispersions, planned=planned, scenario_name=self.scenario,
+            terrain=self.terrain, seed=self.seed, change=partial(changed_scenario, **self.flown),
+            fences=named_fences(self.fence),
+        )  # fmt: skip
+        is_file = Path(self.target).suffix.lower() in (".json", ".waypoints", ".plan")
+        if is_file or (planned is not None and planned.is_file()):
+            return opened()
+        with stage("planning") as advance:
+            return opened(advance=advance)
+
+    def options(self, base: CampaignBase, spread: str | Path | None) -> dict[str, object]:
+        """What decides what is flown, by name, for the line that repeats it."""
+        fences = [self.fence] if isinstance(self.fence, str | Path) else list(self.fence)
+        named = {"scenario": self.scenario, "terrain": self.terrain, "fence": [str(one) for one in fences]}
+        return {"seed": base.seed, "spread": spread, **named, **self.flown}
+
+
+def _asked(
+    target: str | Path,
+    scenario: str | Path | None,
+    terrain: str | Path | None,
+    fence: FencePaths,
+    seed: int | None,
+    **flown: Any,
+) -> _Asked:
+    world, ground = (None if name is None else str(name) for name in (scenario, terrain))
+    return _Asked(str(target), world, ground, fence, seed, flown)
+
+
+def _dispersions(file: str | Path | None) -> Dispersions:
+    return default_dispersions() if file is None else read_dispersions(Path(file))
+
+
+# ----------------------------------------------------------------------
+# How likely a mission is to fly.
+
+
+def continued_goal(
+    folder: Path, flights: int | None, prove: float | None, at_least: float | None, confidence: float | None
+) -> Goal:
+    """The goal of a campaign that goes on: what is asked for now, or, where nothing is, its own.
+
+    Raises PlanflyError for numbers out of their ranges, and for a folder without a campaign.
+    """
+    asked = make_goal(flights, prove, at_least, confidence)
+    return resumed_goal(None if (flights, prove, at_least) == (None, None, None) else asked, folder, confidence)
+
+
+@with_warm_up(*BOTH)
+def campaign(
+    target: str | Path,
+    *,
+    spread: Path | str | None = None,
+    flights: int | None = None,
+    prove: float | None = None,
+    at_least: float | None = None,
+    confidence: float | None = None,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    nav: Navigation | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    out: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+) -> CampaignResult:
+    """Fly a mission many times, each time as `planfly.fly` would in its own wind, aircraft, terrain and start.
+
+    target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
+    spread: a TOML file of what varies; None takes planfly's default.
+    flights: how many; None takes 300, or, with ``prove``, 5,000 at most.  Without flights, ``prove`` and ``at_least`` a
+    campaign that is resumed goes on with its own.
+    prove: a probability: fly until it is reached or missed, whichever comes first.  at_least: one to answer after all
+    flights.  Not both.
+    confidence: of each bound; None takes 0.95, or what it was of a campaign that is resumed.
+    scenario, terrain, fence, wind, turbulence, aircraft, airspeed, params, guidance, nav: as of `planfly.fly`.
+    seed: of plan and draws; None takes the scenario's, or 1.
+    workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
+    out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
+    overwrite: replace it.
+
+    A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
+    Raises a `planfly.PlanflyError` for bad input; for a number out of its range it is a ValueError, too.
+
+    >>> campaign("paper-07", prove=1.5)
+    Traceback (most recent call last):
+    ...
+    world.errors.ArgumentError: prove 1.5: at least 0.5 and below 1 is expected
+    """
+    check_arguments(workers=workers, seed=seed)
+    goal = make_goal(flights, prove, at_least, confidence)
+    asked = _asked(
+        target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
+        turbulence=turbulence, params=params, guidance=guidance, nav=nav,
+    )  # fmt: skip
+    with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as place:
+        if resume:
+            goal = continued_goal(place.folder, flights, prove, at_least, confidence)
+        base = asked.open(_dispersions(spread), place)
+        line = campaign_line(str(target), goal, asked.options(base, spread))
+        return _flown(base, goal, Workers(workers, scheduler), place, line, keep=out is not None)
+
+
+def _flown(
+    base: CampaignBase, goal: Goal, workers: Workers, place: OutputDirectory, line: str, *, keep: bool
+) -> CampaignResult:
+    """Fly a campaign, or the rest of it, and sum it up.  keep: whether its folder stays, and gets its files."""
+    table = place.folder / DATABASE
+    with open_store(base, goal, place.folder, resume=place.resume) as store:
+        with stage("flying") as advance:
+            estimate = fly_campaign(base, goal, workers, store, advance)
+        if not keep:
+            return CampaignResult(summarise(base, goal, estimate, store), read_table(table))
+    with stage("reporting") as advance:
+        summary = finish_campaign(base, goal, estimate, place.folder, line, advance)
+    return CampaignResult(summary, read_table(table), table)
+
+
+@with_warm_up(*BOTH)
+def campaign_flight(
+    target: str | Path,
+    index: int,
+    out: str | Path,
+    *,
+    spread: Path | str | None = None,
+    flights: int | None = None,
+    prove: float | None = None,
+    at_least: float | None = None,
+    confidence: float | None = None,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    nav: Navigation | None = None,
+    seed: int | None = None,
+) -> CampaignFlight:
+    """Fly one flight of a campaign again, into a log in the campaign's folder.
+
+    target: as of the campaign, and so are all other keywords.  index: of the flight, from 0.  out: the folder.
+    Raises a `planfly.PlanflyError` for bad input, and where the flight does not come out as the table has it.
+    """
+    check_arguments(index=index, seed=seed)
+    folder = Path(out)
+    goal = continued_goal(folder, flights, prove, at_least, confidence)
+    asked = _asked(
+        target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
+        turbulence=turbulence, params=params, guidance=guidance, nav=nav,
+    )  # fmt: skip
+    base = asked.open(_dispersions(spread), OutputDirectory(folder, DATABASE, resume=True, overwrite=False))
+    row = _row_of(base, goal, folder, index)
+    log = folder / "flights" / f"flight-{index:06d}.mcap"
+    log.parent.mkdir(exist_ok=True)
+    return CampaignFlight(fly_row_again(base, row, log), log)
+
+
+def _row_of(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
+    with open_store(base, goal, folder, resume=True) as store:
+        row = store.flight(index)
+        if row is None:
+            allowed = f"no such flight; it has {store.tally().flown}, from 0"
+            raise PlanflyError.of_argument("index", index, allowed, file=store.path)
+    return row
+
+
+# ----------------------------------------------------------------------
+# The largest wind from each direction in which a mission flies.
+
+
+@with_warm_up(*BOTH)
+def winds(
+    target: str | Path,
+    *,
+    prove: float = 0.99,
+    directions: int = 16,
+    most: float = 20.0,
+    flights: int | None = None,
+    confidence: float = 0.95,
+    spread: str | Path | None = None,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    nav: Navigation | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    out: str | Path | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+) -> WindsFound:
+    """Find the largest wind from each direction in which a mission flies with a probability.
+
+    target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
+    prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all
+    directions; None takes 5,000, or those that a search which is resumed was to have.
+    confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
+    scenario, terrain, fence, wind, turbulence, aircraft, airspeed, params, guidance, nav: as of `planfly.fly`.
+    out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
+    resume: go on with the search that is there.  overwrite: replace it.
+
+    A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
+    Raises a `planfly.PlanflyError` for bad input; for a number out of its range it is a ValueError, too.
+
+    >>> winds("paper-07", directions=3)
+    Traceback (most recent call last):
+    ...
+    world.errors.ArgumentError: directions 3: 4 to 72 is expected
+    """
+    check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)
+    check_arguments(workers=workers, seed=seed)
+    asked = _asked(
+        target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
+        turbulence=turbulence, params=params, guidance=guidance, nav=nav,
+    )  # fmt: skip
+    with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as place:
+        folder = place.folder
+        goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
+        base = asked.open(_dispersions(spread).without(ASKED), place)
+        with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying") as advance:
+            found = find_winds(base, goal, Workers(workers, scheduler), store, advance)
+        if out is not None:
+            write_winds(folder, base, found, winds_line(str(target), goal, asked.options(base, spread)))
+    return found

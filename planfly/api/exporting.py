@@ -1,0 +1,202 @@
+"""A plan, a mission or a flight log, written in the forms that files' suffixes name."""
+
+import contextlib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from flight.mission.fences import numbered, zone_fences
+from flight.mission.items import Mission
+from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
+from logs.recording.reader import FlightLog, read_log
+from logs.views.exports.map_files import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
+from planfly.api.flying import FencePaths, FlownMission, named_fences
+from planfly.first_start import with_warm_up
+from planfly.open_mission import NamedFences, fence_of_plan, is_log, loss_text, open_mission
+from planfly.targets import refuse_existing
+from planner.plan import Plan, plan_json
+from world.errors import MissionError, PlanflyError
+from world.files import temporary_folder, write_whole
+from world.scenario import Scenario
+
+MAPS = {".kml": kml_text, ".gpx": gpx_text}
+# What a flight log alone can be written as.
+LOGS = (".csv", ".parquet", ".tlog", ".ulg")
+_CONTENTS = {"fence": "fence items", "rally": "rally points"}
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedFiles:
+    """What `planfly.export` wrote.
+
+    files: in the order asked for.  contents: what each holds, in words.
+    notes: what of the source they do not hold, a line each.
+    loss: what of a flight log could not be read, in a line, which is among the notes; "" where nothing is missing.
+    """
+
+    files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
+    contents: tuple[str, ...] = ()
+    loss: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """What an input holds.
+
+    mission: its items, and a plan's threats as fences.
+    name: a map's title.
+    lines, zones: on a map, lines by what they are; none where no target asks for one.
+    notes: what the mission does not hold of the plan.
+    log: the input, where it is a flight log.
+    """
+
+    mission: Mission
+    name: str
+    lines: dict[str, MapLine] = field(default_factory=dict)
+    zones: list[MapZone] = field(default_factory=list)
+    notes: tuple[str, ...] = ()
+    log: FlightLog | None = None
+
+
+@with_warm_up()
+def export(
+    source: FlightLog | FlownMission | Plan | str | Path,
+    *files: str | Path,
+    fence: FencePaths = (),
+    overwrite: bool = False,
+) -> ExportedFiles:
+    """Write a plan, a mission or a flight in the forms that the files' suffixes name.
+
+    source: a plan, a flight with a log, or the path of a plan.json, mission file or log.
+    files: .waypoints, .plan, .fence, .rally, .kml, .gpx; of a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
+    fence: files of fences or zones beside its own.
+    overwrite: whether files that are there may be replaced.
+    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+
+    >>> import planfly, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     written = planfly.export(planfly.plan("tight", seed=1), f"{folder}/m.waypoints", Path(folder) / "m.kml")
+    ...     [file.suffix for file in written.files], written.contents
+    (['.waypoints', '.kml'], ('23 items', 'plan and 7 zones'))
+    """
+    if not files:
+        raise PlanflyError("export: no file: one at least is expected", field="files")
+    targets = tuple(Path(file) for file in files)
+    with contextlib.ExitStack() as place:
+        path = _as_file(source, place)
+        for target in targets:
+            if target.suffix.lower() not in (*MAPS, *LOGS):
+                _refuse_unknown(target)
+            refuse_existing(target, overwrite, path)
+        found = _read(path, targets, named_fences(fence), fenced=bool(fence))
+        texts = [_text(found, target) for target in targets]
+    for target, (text, _) in zip(targets, texts, strict=True):
+        write_whole(target, text)
+    loss = "" if found.log is None else loss_text(found.log)
+    notes = (*found.mission.warnings, *found.notes, *([loss] if loss else []))
+    return ExportedFiles(targets, notes, tuple(content for _, content in texts), loss)
+
+
+def _as_file(source: FlightLog | FlownMission | Plan | str | Path, place: contextlib.ExitStack) -> Path:
+    """The file that a source is, or one made for it while the place is open."""
+    if isinstance(source, Plan):
+        file = place.enter_context(temporary_folder("planfly-export-")) / "plan.json"
+        write_whole(file, plan_json(source))
+        return file
+    if isinstance(source, FlightLog):
+        return Path(source.source)
+    if isinstance(source, FlownMission):
+        if source.log is None:
+            raise PlanflyError("export: a flight without a log: fly(..., log=FILE) writes one", field="source")
+        return source.log
+    return Path(source)
+
+
+def _refuse_unknown(target: Path) -> None:
+    try:
+        mission_kind(target)
+    except MissionError:
+        allowed = f"allowed {', '.join([*KINDS, *MAPS, *LOGS])}"
+        message = f"{target}: suffix {target.suffix!r}: {allowed}"
+        raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
+
+
+def _read(path: Path, targets: tuple[Path, ...], fences: NamedFences, *, fenced: bool) -> _Source:
+    """A source, as far as the targets ask for it."""
+    if path.is_file() and is_log(path):
+        if fenced:
+            allowed = "a log is exported with the fence that it was flown with"
+            raise MissionError.of_argument("fence", fences, allowed, shown="", file=path)
+        return _read_log(path)
+    for target in targets:
+        suffix = target.suffix
+        if suffix.lower() in LOGS:
+            message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
+            raise MissionError(message, file=target, field="suffix", value=suffix)
+    return _read_mission(path, any(target.suffix.lower() in MAPS for target in targets), fences)
+
+
+def _read_log(path: Path) -> _Source:
+    log = read_log(path)
+    lines = {"plan": plan_line(log.setup)}
+    if len(log.track):
+        lines["flown"] = track_line(log.setup, log.track)
+    return _Source(log.setup.mission, log.setup.scenario.name, lines, map_zones(log.setup), log=log)
+
+
+def _read_mission(path: Path, maps: bool, fences: NamedFences) -> _Source:
+    """A plan or a mission file; a map, zones and a plan's fence need its place, too, which not every mission has."""
+    if not path.is_file():
+        raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
+    is_plan = path.suffix.lower() == ".json"
+    if not (maps or is_plan or fences.zones):
+        return _Source(fences.on_mission(read_mission(path)), path.stem)
+    setup = open_mission(path, None, None, fences=fences).setup
+    source = _Source(setup.mission, setup.scenario.name, {"plan": plan_line(setup)}, map_zones(setup))
+    if not is_plan:
+        return _with_zones(source, setup.scenario)
+    mission, notes = fence_of_plan(setup)
+    return replace(source, mission=mission, notes=notes)
+
+
+def _with_zones(source: _Source, scenario: Scenario) -> _Source:
+    """The zones named as fence items, beside the mission's own."""
+    items, notes = zone_fences(scenario.zones, scenario.origin)
+    fenced = replace(source.mission, fences=numbered([*source.mission.fences, *items]))
+    return replace(source, mission=fenced, notes=tuple(notes))
+
+
+def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
+    """Text of a target, and what it holds."""
+    suffix, mission = target.suffix.lower(), source.mission
+    if suffix in LOGS and source.log is not None:
+        return _flown_text(source.log, suffix)
+    if suffix in MAPS:
+        parts = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
+        return MAPS[suffix](source.name, list(source.lines.values()), source.zones), " and ".join(parts)
+    kind = mission_kind(target)
+    if kind in _CONTENTS:
+        count = len(mission.fences if kind == "fence" else mission.rally)
+        if not count:
+            raise MissionError(f"{mission.source}: no {_CONTENTS[kind]} to write to {target}", file=mission.source)
+        return mission_text(mission, kind), f"{count} {_CONTENTS[kind]}"
+    extra = ""
+    if kind == "plan" and (mission.fences or mission.rally):
+        extra = f", {len(mission.fences)} fence items, {len(mission.rally)} rally points"
+    return mission_text(mission, kind), f"{len(mission.items)} items{extra}"
+
+
+def _flown_text(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
+    """A flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
+    content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
+    if suffix == ".tlog":
+        from logs.views.exports.log_files import telemetry_bytes
+
+        return telemetry_bytes(log), content
+    if suffix == ".ulg":
+        from logs.views.exports.log_files import px4_log_bytes
+
+        return px4_log_bytes(log), content
+    from logs.views.exports.log_files import csv_text, parquet_bytes
+
+    return (csv_text(log) if suffix == ".csv" else parquet_bytes(log)), content

@@ -1,0 +1,238 @@
+"""Flights that another program logged: imported and judged, and their missions flown again; and damaged logs."""
+
+import tempfile
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from flight.simulation.setup import VerticalDatum
+from logs.recording.reader import FlightLog, read_log
+from logs.recording.recorder import Recorder
+from logs.recording.recover import recover_log
+from logs.verdict.imported.model_comparison import Reflight
+from logs.verdict.judge_flight import judge_flight
+from logs.views.report.text import left_lines, refly_lines
+from planfly.api.flying import FencePaths, named_fences
+from planfly.api.planning import Wind, changed_scenario
+from planfly.arguments import check_arguments
+from planfly.first_start import with_warm_up
+from planfly.imported_flights import ImportedFlight, ImportOptions, fly_again, import_flight
+from planfly.kernel_units.unit_kernels import FLYING
+from planfly.stages import stage
+from planfly.targets import REFLOWN, REFLY_FILES, clean_folder, refuse_existing, refuse_folder
+from world.errors import LogError, ScenarioError
+from world.files import write_whole
+from world.scenario_tables import Guidance
+
+# Rows that are recorded at once: a recorder takes many times the bytes of a row for it.
+_ROWS_AT_ONCE = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Reflown:
+    """What `planfly.refly` returns.
+
+    flights: the longest stretch of the mission first, each beside its simulation.
+    lines: where model and flight differ, in words.
+    files: pictures and logs of the simulated flights.
+    """
+
+    flights: tuple[Reflight, ...]
+    lines: tuple[str, ...]
+    files: tuple[Path, ...]
+
+
+def read_imported(
+    log: str | Path,
+    *,
+    plan: str | Path | None = None,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    flight: int | None = None,
+    datum: VerticalDatum | None = None,
+) -> ImportedFlight:
+    """Read and judge a flight of another program's log; arguments as of `import_log`.
+
+    Raises ScenarioError for an argument that a flown log cannot take.
+    """
+    for name, value in {"params": params, "guidance": guidance, "airspeed": airspeed}.items():
+        if value is not None:
+            allowed = "an imported flight is judged by the autopilot and the speeds of its log"
+            raise ScenarioError.of_argument(name, value, allowed, shown="", file=log)
+    check_arguments(flight=flight, datum=datum)
+    options = ImportOptions(
+        plan=None if plan is None else Path(plan),
+        scenario=None if scenario is None else str(scenario),
+        terrain=None if terrain is None else str(terrain),
+        aircraft=str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
+        datum=datum,
+        number=flight,
+        wind_given=wind is not None,
+        fences=named_fences(fence),
+    )
+    change = partial(changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft)
+    return import_flight(Path(log), options, change)
+
+
+@with_warm_up()
+def import_log(
+    log: str | Path,
+    target: str | Path | None = None,
+    *,
+    plan: str | Path | None = None,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    flight: int | None = None,
+    datum: VerticalDatum | None = None,
+    overwrite: bool = False,
+) -> ImportedFlight:
+    """Read a flight of another program's log, judge it against its plan, and write it as a flight log.
+
+    log: of ArduPilot (.BIN, .log), a ground station (.tlog), PX4 (.ulg), or a track (.gpx, .igc, .kml, .kmz).
+    target: the flight log to write, as MCAP; None writes none.  overwrite: whether an existing one is replaced.
+    plan: the mission or plan.json that was to be flown, in place of the log's own mission.
+    flight: which of the log's flights, from 1; None for the longest in AUTO.
+    datum: what the log's heights are above where it does not say, "amsl" or "ellipsoid".
+    scenario, terrain, fence, wind, turbulence, aircraft: as of `planfly.fly`; without an aircraft no limits of an
+    aircraft are judged.
+    airspeed: refused: the flight is judged by the speeds of its log.
+    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+    """
+    if target is not None:
+        refuse_existing(Path(target), overwrite, Path(log))
+    found = read_imported(
+        log, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence,
+        aircraft=aircraft, airspeed=airspeed, flight=flight, datum=datum,
+    )  # fmt: skip
+    if target is not None:
+        _write(Path(target), found)
+    return found
+
+
+def _write(target: Path, flight: ImportedFlight) -> None:
+    """The log, whole or not at all."""
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
+        path = Path(folder) / target.name
+        with Recorder(path, flight.setup) as recorder:
+            # Events first, so that each stands in the log where it happened.
+            for event in flight.events:
+                recorder.event(event.time, event.text, event.level)
+            for start in range(0, len(flight.track), _ROWS_AT_ONCE):
+                recorder.write(flight.track.rows(start, start + _ROWS_AT_ONCE))
+            recorder.finish(flight.ended, flight.verdict)
+        path.replace(target)
+
+
+# ----------------------------------------------------------------------
+# The mission of an imported flight, flown again in JSBSim: where model and flight differ.
+
+
+@with_warm_up(*FLYING)
+def refly(
+    log: FlightLog | str | Path,
+    out: str | Path | None = None,
+    *,
+    aircraft: str | Path | None = None,
+    turbulence: str | None = None,
+    overwrite: bool = False,
+) -> Reflown:
+    """Fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare.
+
+    log: a flight log that `planfly.import_log` wrote.
+    out: a folder for pictures and for logs of the simulated flights; None writes none.
+    aircraft: that flies it, a name or a folder; None for the log's.  turbulence: in place of the log's.
+    overwrite: whether results that lie there are replaced.
+    Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+    """
+    check_arguments(turbulence=turbulence)
+    found = log if isinstance(log, FlightLog) else read_log(log)
+    if found.setup.source is None:
+        message = f"{found.source}: flown by planfly itself: refly takes a log that `planfly import` wrote"
+        raise LogError(message, file=found.source)
+    if out is not None:
+        refuse_folder(Path(out), overwrite)
+    with stage("flying again") as advance:
+        model = str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft
+        agains = fly_again(found.setup, found.track, model, turbulence, advance, REFLOWN)
+    lines: list[str] = []
+    for number, again in enumerate(agains, 1):
+        lines += [*([] if number == 1 else [""]), *refly_lines(again)]
+    lines += left_lines(agains, found.setup.source.stretches, REFLOWN)
+    files: list[Path] = []
+    if out is not None:
+        folder = clean_folder(out, REFLY_FILES, overwrite=True)
+        with stage("drawing"):
+            for number, again in enumerate(agains, 1):
+                ending = "" if number == 1 else f"-{number}"
+                files += [*_draw(folder, again, ending), _record(folder, again, found, ending)]
+    return Reflown(agains, tuple(lines), tuple(files))
+
+
+def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
+    # matplotlib loads for pictures alone.
+    from logs.views.compare import refly_charts
+    from logs.views.drawing import draw_chart, png_bytes
+
+    files = []
+    for name, chart in refly_charts(again).items():
+        path = (folder / name).with_stem(f"{Path(name).stem}{ending}")
+        write_whole(path, png_bytes(draw_chart(chart)))
+        files.append(path)
+    return files
+
+
+def _record(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
+    """The simulated flight as a log of its own, for `compare` and `replay`."""
+    path = folder / f"simulated{ending}.mcap"
+    verdict = judge_flight(again.setup, again.simulated, again.ended)
+    with Recorder(path, replace(again.setup, seed=log.setup.seed)) as recorder:
+        recorder.write(again.simulated)
+        recorder.finish(again.ended, verdict)
+    return path
+
+
+# ----------------------------------------------------------------------
+# Damaged logs.
+
+
+def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool = False) -> FlightLog | None:
+    """Write what can be read of an unfinished or damaged flight log as a new one.
+
+    out: the new log; None for ``<log>-recovered.mcap`` beside it.  overwrite: whether an existing one is replaced.
+    Returns the flight as far as it can be read; None where the log is complete, and then nothing is written.
+    Raises a `planfly.PlanflyError` for bad input.
+
+    >>> import planfly, tempfile
+    >>> from logs.recording.example_log import write_example_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     planfly.recover(write_example_log(Path(folder) / "example.mcap")) is None
+    True
+    """
+    target = recovered_path(log) if out is None else Path(out)
+    refuse_existing(target, overwrite)
+    recovered = recover_log(Path(log))
+    if recovered is None:
+        return None
+    write_whole(target, recovered.data)
+    return recovered.log
+
+
+def recovered_path(log: str | Path) -> Path:
+    """Where a recovered log goes that nobody named a file for.
+
+    >>> recovered_path("runs/flight.mcap").name
+    'flight-recovered.mcap'
+    """
+    return Path(log).with_name(f"{Path(log).stem}-recovered.mcap")

@@ -1,0 +1,165 @@
+"""A recorded flight again: as a timeline, as instruments, as a film, in Foxglove and in ground stations."""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from logs.recording.reader import FlightLog, read_log
+from logs.views.replay.instruments import Instruments, make_instruments
+from logs.views.replay.timeline import TimelineEntry
+from logs.views.replay.timeline import timeline as list_timeline
+from planfly.api.serving import link_access
+from planfly.arguments import check_arguments
+from planfly.first_start import with_warm_up
+from world.errors import LogError
+
+# Numbers that may be meant as ports that ground stations listen at.
+_PORTS = range(1024, 65536)
+# Seconds to wait for a ground station unless another time is given.
+_STATION_PATIENCE = 10.0
+
+
+def _opened(log: FlightLog | str | Path) -> FlightLog:
+    return log if isinstance(log, FlightLog) else read_log(log)
+
+
+def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tuple[float, float]:
+    """Start and end of what is replayed, s of the flight.  Raises LogError where there is nothing between them."""
+    check_arguments(start=start, end=end)
+    first = start if start is not None else float(log.track.time[0])
+    last = log.end_time if end is None else min(end, log.end_time)
+    ends = f"the log ends at {log.end_time:.1f} s"
+    if end is not None and end > log.end_time and end in _PORTS:
+        allowed = f"{ends}; if a port is meant, name its address, too: 127.0.0.1:{end:g}"
+        raise LogError.of_argument("end", end, allowed, shown=f"{end:g}", file=log.source)
+    if first > log.end_time:
+        raise LogError.of_argument("start", first, ends, shown=f"{first:g}", file=log.source)
+    if last < first:
+        allowed = f"at or after `start`, {first:g} s, is expected"
+        raise LogError.of_argument("end", last, allowed, shown=f"{last:g}", file=log.source)
+    return first, last
+
+
+@with_warm_up()
+def timeline(
+    log: FlightLog | str | Path, *, start: float | None = None, end: float | None = None
+) -> tuple[TimelineEntry, ...]:
+    """What happened in a flight, in order of time: legs, turns, clearances, threats and events.
+
+    log: a flight log, or its path.  start, end: of the part that is listed, s of the flight; None for all of it.
+    Raises a `planfly.PlanflyError` for bad input.
+
+    >>> import planfly
+    >>> from logs.recording.example_log import example_log
+    >>> planfly.timeline(example_log(), start=20.0)[0].text
+    'turn left 14.0° at waypoint 1 (item 2), peak bank 0.0°'
+    """
+    found = _opened(log)
+    first, last = (-math.inf, math.inf) if start is None and end is None else replayed_part(found, start, end)
+    return tuple(entry for entry in list_timeline(found) if first <= entry.time <= last)
+
+
+@with_warm_up()
+def instruments(log: FlightLog | str | Path) -> Instruments:
+    """The instruments of a recorded flight: `Instruments.frame` gives them at a time, as lines of text.
+
+    >>> import planfly
+    >>> from logs.recording.example_log import example_log
+    >>> len(planfly.instruments(example_log()).frame(12.0)) > 10
+    True
+    """
+    return make_instruments(_opened(log))
+
+
+@with_warm_up()
+def movie(
+    log: FlightLog | str | Path,
+    out: str | Path,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    speed: float | None = None,
+    overwrite: bool = False,
+) -> tuple[Path, ...]:
+    """Draw a flight as a film.
+
+    out: a .gif, an .mp4 (which needs ffmpeg), or a folder for PNG frames.
+    start, end: of the part that is drawn, s of the flight; None for all of it.
+    speed: times real time; None for a film of 20 s.  overwrite: whether an existing target is replaced.
+    Returns the files written.  Raises a `planfly.PlanflyError` for bad input.
+    """
+    # matplotlib loads for pictures alone.
+    from planfly.replays.movie import write_movie
+
+    check_arguments(speed=speed)
+    found = _opened(log)
+    first, last = replayed_part(found, start, end)
+    return tuple(write_movie(found, Path(out), first, last, speed=speed, overwrite=overwrite))
+
+
+def _never() -> bool:
+    return False
+
+
+def _ignore(_text: str) -> None:
+    pass
+
+
+@with_warm_up()
+def play_to_foxglove(
+    log: FlightLog | str | Path,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    speed: float | None = None,
+    port: int = 8765,
+    wait: float | None = None,
+    stop: Callable[[], bool] = _never,
+    on_message: Callable[[str], None] = _ignore,
+) -> None:
+    """Play a flight to Foxglove on this machine over WebSocket; needs the extra ``planfly[foxglove]``.
+
+    start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
+    port: 0 for any that is free.  wait: for the first viewer, s; None without end.
+    stop: asked all the time; once it is true the call returns.  on_message: called with the address.
+    Raises a `planfly.PlanflyError` for bad input, and where nobody subscribes in time.
+    """
+    # Nobody else needs foxglove-sdk and MAVLink.
+    from planfly.replays import live
+
+    check_arguments(speed=speed, port=port, wait=wait)
+    found = _opened(log)
+    first, last = replayed_part(found, start, end)
+    live.play_to_foxglove(
+        found, first, last, speed=speed or 1.0, port=port, wait=wait, stopped=stop, on_message=on_message
+    )
+
+
+@with_warm_up()
+def play_to_stations(
+    log: FlightLog | str | Path,
+    to: str | Sequence[str],
+    *,
+    bind: str = "127.0.0.1:0",
+    allow: str | Sequence[str] = (),
+    sign_key: str | Path | None = None,
+    speed: float | None = None,
+    wait: float | None = None,
+    stop: Callable[[], bool] = _never,
+    on_message: Callable[[str], None] = _ignore,
+) -> None:
+    """Play a flight into MAVLink ground stations, as if it were flown now.
+
+    to: where they listen, IP:PORT, one or several.  bind, allow, sign_key: as of `planfly.serve`.
+    speed: times real time, 1 if None.  wait: for the first station, s; 10 if None.
+    stop: asked all the time; once it is true the call returns.  on_message: called with what happens, a line each.
+    Raises a `planfly.PlanflyError` for bad input, and where no station answers in time.
+    """
+    from planfly.replays import live
+
+    check_arguments(speed=speed, wait=wait)
+    access = link_access(to, bind, allow, sign_key)
+    live.play_to_stations(
+        _opened(log), access, speed=speed or 1.0, wait=_STATION_PATIENCE if wait is None else wait, stopped=stop,
+        on_message=on_message,
+    )  # fmt: skip

@@ -1,0 +1,248 @@
+"""The whole chain into one folder: plan, export, fly, record, judge and report, once or in rounds."""
+
+import contextlib
+import json
+import shlex
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+from flight.autopilots.arduplane_sitl.process import check_binary
+from flight.mission.from_plan import plan_mission
+from flight.mission_files.formats import mission_kind, mission_text
+from logs.recording.setup_attachments import package_versions
+from logs.verdict.findings import Verdict, verdict_json
+from logs.verdict.judge_flight import judge_plan_only
+from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
+from planfly.api.planning import Wind, changed_scenario, opened_scenario
+from planfly.arguments import check_arguments
+from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_text
+from planfly.first_start import with_warm_up
+from planfly.kernel_units.unit_kernels import BOTH
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from planfly.refine import refine as refine_rounds
+from planfly.stages import stage
+from planfly.targets import RUN_FILES, RUN_FOLDER, filled_pattern, prepare_folder, refuse_folder
+from planner.plan import Plan, plan_json
+from world.files import hold, write_whole
+from world.scenario import Scenario
+from world.scenario_tables import Guidance, Navigation
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """One round of a run.
+
+    number: from 0.
+    changes: what was tightened for its planning, a line each.
+    verdict: on its flight, or on its plan where nothing was flown.
+    flown: whether it was flown.
+    folder: where its files are.
+    notes: on the mission's route.
+    has_log: whether a flight log was written.
+    """
+
+    number: int
+    changes: tuple[str, ...]
+    verdict: Verdict
+    flown: bool
+    folder: Path
+    notes: tuple[str, ...] = ()
+    has_log: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """What `planfly.run` returns.
+
+    scenario: its name.  seed: of planner and turbulence.
+    folder: where the files are; those of earlier rounds in round-0, round-1, ...
+    rounds: at least one; the last one's verdict is the answer.
+    ended: why no round followed.
+    """
+
+    scenario: str
+    seed: int
+    folder: Path
+    rounds: tuple[Round, ...]
+    ended: str
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of the last round."""
+        return self.rounds[-1].verdict
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files in the folder itself."""
+        found = (self.folder / name for name in (*RUN_FILES, "rounds.json"))
+        return tuple(file for file in found if file.exists())
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """What every round has in common.
+
+    scenario: what each round is judged in.
+    airframe: its aircraft.
+    command: the line that repeats it, for the report.
+    folder: where the results go.
+    program: of ArduPilot SITL, None for planfly's own simulation.
+    limits: how long it may fly, and how large its log may grow.
+    every: of so many rows one goes into the log.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    seed: int
+    command: str
+    folder: Path
+    program: Path | None
+    limits: FlightLimits
+    every: int
+
+
+@with_warm_up(*BOTH)
+def run(
+    scenario: Scenario | str | Path = "jacksboro",
+    *,
+    seed: int | None = None,
+    refine: int = 0,
+    terrain: str | Path | None = None,
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    nav: Navigation | None = None,
+    autopilot: str | Path | None = None,
+    log_hz: Literal[10, 20, 30, 60] = 60,
+    max_hours: float = MAX_HOURS,
+    max_log: float = MAX_MEGABYTES,
+    out: str | Path = RUN_FOLDER,
+    overwrite: bool = False,
+    on_round: Callable[[Round], None] | None = None,
+) -> RunResult:
+    """Plan, export, fly, record, judge and report into one folder.
+
+    scenario: an embedded name, a TOML file's path, or a `Scenario`.  terrain: an elevation file in place of its own.
+    seed: of planner and turbulence; None takes the scenario's, or 1.
+    refine: rounds more, up to 20, each planned within limits tightened by what the flight before could not do.
+    out: the folder; {name} and {seed} in it stand for the scenario's name and the seed.
+    overwrite: whether results that lie there are replaced, as they always are in the default folder.
+    on_round: called with each round once it is over.
+    The other keywords are as of `planfly.fly`.
+
+    Raises a `planfly.PlanflyError` for bad input, before anything is written.
+
+    >>> import planfly, tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     result = planfly.run("tight", seed=1, out=folder)
+    >>> result.verdict.flyable, len(result.rounds), [file.name for file in result.files][:3]
+    (False, 1, ['plan.json', 'mission.waypoints', 'mission.plan'])
+    """
+    check_arguments(seed=seed, refine=refine, log_hz=log_hz, max_hours=max_hours, max_log=max_log)
+    program = None if autopilot is None else Path(autopilot)
+    if program is not None:
+        check_binary(program)
+    change = partial(
+        changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
+        guidance=guidance, nav=nav, autopilot=autopilot,
+    )  # fmt: skip
+    world = change(opened_scenario(scenario, terrain))
+    number, airframe = choose_seed(world, seed), load_airframe(world)
+    folder = filled_pattern(out, world.name, number)
+    refuse_folder(folder, overwrite or out == RUN_FOLDER)
+    limits = FlightLimits(max_hours, max_log)
+    repeated = {
+        "refine": refine, "terrain": terrain, "aircraft": aircraft, "airspeed": airspeed, "wind": wind,
+        "turbulence": turbulence, "params": params, "guidance": guidance, "nav": nav, "autopilot": autopilot,
+    }  # fmt: skip
+    name = world.name if isinstance(scenario, Scenario) else str(scenario)
+    task = _Task(world, airframe, number, command_line(name, number, repeated), folder, program, limits, 60 // log_hz)
+    with contextlib.ExitStack() as held:
+        return _rounds(task, refine, held, on_round)
+
+
+def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
+    """``planfly run`` with options by name, of which those that are None or 0 are left out.
+
+    >>> command_line("tight", 3, {"refine": 0, "wind": (8.0, 270.0), "params": "my file.parm"})
+    "planfly run tight --seed 3 --wind 8,270 --params 'my file.parm'"
+    """
+    given = {name: value for name, value in options.items() if value}
+    if "wind" in given:
+        given["wind"] = "{:g},{:g}".format(*given["wind"])
+    words = [f"--{name} {shlex.quote(str(value))}" for name, value in given.items()]
+    return " ".join([f"planfly run {shlex.quote(scenario)} --seed {seed}", *words])
+
+
+def _rounds(
+    task: _Task, refine: int, held: contextlib.ExitStack, on_round: Callable[[Round], None] | None
+) -> RunResult:
+    """Plan and fly until it flies; held: keeps the folder from the first plan on."""
+    scenario, airframe, folder = task.scenario, task.airframe, task.folder
+    flown: list[Round] = []
+
+    def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
+        planned_with = airframe if planned_in is scenario else tightened_airframe(airframe, planned_in)
+        with stage(f"planning {scenario.name}") as advance:
+            plan = make_plan(planned_in, planned_with, task.seed, advance=advance)
+        if not flown:
+            folder.mkdir(parents=True, exist_ok=True)
+            held.enter_context(hold(folder))
+            prepare_folder(folder)
+        flown.append(_fly_round(task, plan, len(flown)))
+        if on_round is not None:
+            on_round(flown[-1])
+        return flown[-1].verdict, flown[-1].flown
+
+    _, entries = refine_rounds(scenario, refine, one_round, lambda number: _keep(folder, number))
+    if refine:
+        write_whole(folder / "rounds.json", json.dumps(entries, indent=1) + "\n")
+    *earlier, last = (replace(one, changes=tuple(entry["changes"])) for one, entry in zip(flown, entries, strict=True))
+    rounds = (*(replace(one, folder=folder / f"round-{one.number}") for one in earlier), last)
+    return RunResult(scenario.name, task.seed, folder, rounds, entries[-1]["next"])
+
+
+def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
+    """Write a plan and its mission, and fly it if it is feasible."""
+    # matplotlib loads for pictures alone.
+    from logs.views.report.page import write_report
+
+    folder, airframe = task.folder, task.airframe
+    write_whole(folder / "plan.json", plan_json(plan))
+    tracking = airframe.limits.tracking
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints", tracking=tracking)
+    for target in (folder / "mission.waypoints", folder / "mission.plan"):
+        write_whole(target, mission_text(mission, mission_kind(target)))
+    if not plan.feasible:
+        verdict = judge_plan_only(plan)
+        write_whole(folder / "verdict.json", verdict_json(verdict))
+        return Round(number, (), verdict, flown=False, folder=folder)
+    setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
+    with stage(f"flying {flight_text(setup)}") as advance:
+        flown = fly_and_judge(
+            setup, airframe, folder / "flight.mcap", advance, every=task.every, autopilot=task.program,
+            limits=task.limits,
+        )  # fmt: skip
+    write_whole(folder / "verdict.json", verdict_json(flown.verdict))
+    with stage("drawing"):
+        write_report(
+            folder, flown.setup, flown.track, flown.verdict, ended=flown.ended, versions=package_versions(),
+            command=task.command, events=flown.events,
+        )  # fmt: skip
+    notes = tuple(setup.route.notes)
+    return Round(number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=len(flown.track) > 0)
+
+
+def _keep(folder: Path, number: int) -> None:
+    """Move a round's results out of the way of the next."""
+    kept = folder / f"round-{number}"
+    kept.mkdir(exist_ok=True)
+    for name in RUN_FILES:
+        if (folder / name).exists():
+            (folder / name).replace(kept / name)

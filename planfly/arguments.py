@@ -1,0 +1,117 @@
+"""The numbers and words that a call may be given: one table for the API's keywords and the command line's options."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from world.errors import ArgumentError
+
+
+class Range(NamedTuple):
+    """The values of a number.
+
+    low, high: both allowed, unless `above` excludes low or `below` excludes high.
+    expected: what the error says.  whole: whether only whole numbers are allowed.
+    """
+
+    low: float
+    high: float
+    expected: str
+    whole: bool = False
+    above: bool = False
+    below: bool = False
+
+    def allows(self, value: Any) -> bool:
+        """Whether a value is a number in the range; a truth value is none.
+
+        >>> Range(0, 20, "a whole number", whole=True).allows(3), Range(0, 1, "a share").allows(math.nan)
+        (True, False)
+        """
+        try:
+            number = int(value) if self.whole else float(value)
+        except (TypeError, ValueError, OverflowError):
+            return False
+        if isinstance(value, bool) or (self.whole and number != value):
+            return False
+        inside = self.low <= number <= self.high
+        return inside and not (self.above and number == self.low) and not (self.below and number == self.high)
+
+
+_SECONDS = Range(0.0, 1e7, "seconds, from 0 to 10,000,000, are expected")
+_POSITIVE = Range(0.0, 1e6, "a number above 0, up to 1,000,000, is expected", above=True)
+_COUNT = Range(1, 1000, "a whole number from 1 to 1,000 is expected", whole=True)
+_SHARE = Range(0.5, 1.0, "at least 0.5 and below 1 is expected", below=True)
+
+# By keyword.  What a scenario file bounds, too (wind, turbulence, airspeed, laws), is refused as there.
+RANGES: Mapping[str, Range] = {
+    "seed": Range(0, 2**63 - 1, "a whole number from 0 to 2^63 - 1 is expected", whole=True),
+    "refine": Range(0, 20, "a whole number from 0 to 20 is expected", whole=True),
+    "budget": Range(4, 10**10, "a whole number of evaluations, 4..10^10, is expected", whole=True),
+    "seconds": Range(0.0, 1e6, "a number of seconds above 0, up to 1,000,000, is expected", above=True),
+    "at_leg": Range(0, 10_000, "a leg's number is expected, from 0", whole=True),
+    "airspeed": _POSITIVE,
+    "max_hours": _POSITIVE,
+    "max_log": _POSITIVE,
+    "speed": _POSITIVE,
+    "served_speed": Range(0.1, 100.0, "a number from 0.1 to 100 is expected"),
+    "wait": _POSITIVE,
+    "start": _SECONDS,
+    "end": _SECONDS,
+    "port": Range(0, 65535, "a port, 0..65535, is expected", whole=True),
+    "flight": _COUNT,
+    "runs": _COUNT,
+    "jobs": _COUNT,
+    "workers": _COUNT,
+    "prove": _SHARE,
+    "at_least": _SHARE,
+    "confidence": _SHARE,
+    "flights": Range(1, 10_000_000, "a whole number from 1 to 10,000,000 is expected", whole=True),
+    "index": Range(0, 10**9 - 1, "a flight's index is expected, from 0", whole=True),
+    "directions": Range(4, 72, "4 to 72 is expected", whole=True),
+    "most": Range(1.0, 40.0, "m/s from 1 to 40 are expected"),
+}
+CHOICES: Mapping[str, tuple[Any, ...]] = {
+    "turbulence": ("none", "light", "moderate"),
+    "guidance": ("path", "l1", "vector-field"),
+    "nav": ("perfect", "rtk", "gnss"),
+    "log_hz": (60, 30, 20, 10),
+    "datum": ("amsl", "ellipsoid"),
+    "problems": (7, 15, 30, 60),
+}
+
+
+def check_arguments(**given: Any) -> None:
+    """Refuse the first number or word that is not in its range; None is not given.
+
+    given: by the name in `RANGES` or `CHOICES`.  Raises ArgumentError.
+
+    >>> check_arguments(seed=3, log_hz=60, max_hours=None)
+    >>> check_arguments(directions=3)
+    Traceback (most recent call last):
+    world.errors.ArgumentError: directions 3: 4 to 72 is expected
+    """
+    for name, value in given.items():
+        if value is None:
+            continue
+        if name in CHOICES:
+            values = value if isinstance(value, tuple | list) else (value,)
+            if all(one in CHOICES[name] for one in values):
+                continue
+            allowed = f"{', '.join(map(str, CHOICES[name]))} is expected"
+        elif RANGES[name].allows(value):
+            continue
+        else:
+            allowed = RANGES[name].expected
+        raise ArgumentError.of_argument(_KEYWORDS.get(name, name), value, allowed)
+
+
+# Where one keyword has another range in another call.
+_KEYWORDS = {"served_speed": "speed"}
+
+
+def is_wind(speed: float, from_deg: float) -> bool:
+    """Whether a steady wind can be flown in: m/s, and degrees that it blows from.
+
+    >>> is_wind(8.0, 270.0), is_wind(math.nan, 0.0)
+    (True, False)
+    """
+    return 0.0 <= speed <= 40.0 and -360.0 <= from_deg <= 360.0

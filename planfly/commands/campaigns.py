@@ -1,0 +1,169 @@
+"""``planfly campaign`` and ``planfly winds``: how likely a mission is to fly, and the largest wind it flies in."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import planfly
+from planfly.targets import RESULTS
+from planfly.terminal.arguments import completed, files, mission_or_scenario_words, number
+from planfly.terminal.command_parser import CommandParser, LineParser
+from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.options import call, flown_by_options, result_options, steering_options, world_options
+from planfly.terminal.output import give_answer
+from world.errors import PlanflyError
+from world.interruption import Interrupted
+
+_EXITS = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
+
+
+def campaign_options(line: LineParser) -> None:
+    """The parser of ``planfly campaign``."""
+    parser = line.command(
+        "campaign",
+        "fly a mission many times in varied weather and with varied aircraft: how likely is it to fly",
+        "planfly campaign jacksboro --prove 0.99",
+    )
+    parser.alias("index", "--refly")
+    _shared_options(parser)
+    goal = parser.add_mutually_exclusive_group()
+    goal.add_argument("--prove", metavar="P", type=number("prove"), help="fly until P is reached or missed")
+    goal.add_argument(
+        "--at-least", metavar="P", type=number("at_least"), help="decide after all flights whether P is reached"
+    )
+    parser.add_argument(
+        "--flights", metavar="N", type=number("flights"),
+        help="number of flights (default: 300), or with --prove the largest number (default: 5000)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--confidence", metavar="C", type=number("confidence"),
+        help="confidence of each bound (default: 0.95; with --resume what it was)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--refly", metavar="K", type=number("index"), help="fly flight K of the campaign in --out again, with a log"
+    )
+
+
+def winds_options(line: LineParser) -> None:
+    """The parser of ``planfly winds``."""
+    parser = line.command(
+        "winds",
+        "find the largest wind from each direction in which a mission flies",
+        "planfly winds jacksboro --prove 0.99 --directions 16",
+    )
+    _shared_options(parser)
+    parser.add_argument(
+        "--prove", metavar="P", type=number("prove"), default=0.99, help="probability to fly with (default: 0.99)"
+    )
+    parser.add_argument(
+        "--confidence", metavar="C", type=number("confidence"), default=0.95,
+        help="confidence of each interval (default: 0.95)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--directions", metavar="N", type=number("directions"), default=16,
+        help="number of directions, 4 to 72 (default: 16)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--most", metavar="M/S", type=number("most"), default=20.0, help="largest wind to try, m/s (default: 20)"
+    )
+    parser.add_argument(
+        "--flights", metavar="N", type=number("flights"),
+        help="largest number of flights, in all directions together (default: 5000)",
+    )  # fmt: skip
+
+
+def _shared_options(parser: CommandParser) -> None:
+    completed(
+        parser.add_argument(
+            "target", metavar="SCENARIO|PLAN|MISSION", help="embedded name, TOML file, plan.json, .waypoints or .plan"
+        ),
+        mission_or_scenario_words,
+    )
+    world_options(parser)
+    flown_by_options(parser)
+    steering_options(parser)
+    completed(
+        parser.add_argument("--spread", metavar="FILE", help="what varies, as TOML (default: planfly's own)"),
+        files("toml"),
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=number("seed"), help="seed of plan and draws (default: the scenario's, or 1)"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=number("workers"), help="processes on this machine (default: one a core)"
+    )
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT")
+    parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
+    result_options(parser, "where the files go (default: runs/<name>-<command>, kept)")
+
+
+def campaign(args: argparse.Namespace) -> int:
+    """Fly a campaign, go on with one, or fly one of its flights again."""
+    folder = _folder(args, "campaign")
+    if args.refly is not None:
+        return _refly(args, folder)
+    with _kept_flights(folder, "campaign.sqlite") as interrupted:
+        result = call(planfly.campaign, args, out=folder)
+    if interrupted():
+        return interrupted()
+    from planfly.campaigns.summary import campaign_lines
+
+    print("\n".join(campaign_lines(result.summary)))
+    print(f"results   {folder}/ (report.html, summary.json, campaign.sqlite, worst/)")
+    give_answer(args, lambda: (folder / "summary.json").read_text(encoding="utf-8"))
+    return _EXITS[result.answer]
+
+
+def winds(args: argparse.Namespace) -> int:
+    """Find the boundary of each direction, or go on with that, and draw the chart."""
+    folder = _folder(args, "winds")
+    with _kept_flights(folder, "winds.sqlite") as interrupted:
+        found = call(planfly.winds, args, out=folder)
+    if interrupted():
+        return interrupted()
+    from planfly.campaigns.report import wind_lines
+
+    print("\n".join(wind_lines(found)))
+    print(f"results   {folder}/ (winds.html, winds.png, winds.json, winds.sqlite)")
+    give_answer(args, lambda: (folder / "winds.json").read_text(encoding="utf-8"))
+    return FLYABLE
+
+
+def _folder(args: argparse.Namespace, kind: str) -> Path:
+    """Where the files go: as named, or ``runs/<name>-<kind>``."""
+    return Path(args.out) if args.out else RESULTS / f"{Path(args.target).stem}-{kind}"
+
+
+def _refly(args: argparse.Namespace, folder: Path) -> int:
+    from logs.verdict.wording import place_text
+
+    if args.json:
+        raise PlanflyError("--json: goes with a campaign, not with --refly", field="--json", value=args.json)
+    again = call(planfly.campaign_flight, args, index=args.refly, out=folder)
+    print(f"flight {args.refly}: {again.row.outcome}, ended: {again.row.ended}, as in the table")
+    for rule, place in again.row.failed:
+        print(f"  failed  {rule} at {place_text(place)}")
+    print(f"log       {again.log}")
+    return FLYABLE if again.row.outcome == "flyable" else NOT_FLYABLE
+
+
+@contextmanager
+def _kept_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
+    """Say which flights an interruption leaves, and how to go on; gives the exit code afterwards, 0 without one.
+
+    An interruption before there is a table is passed on.
+    """
+    code = 0
+    try:
+        yield lambda: code
+    except KeyboardInterrupt as stop:
+        from planfly.campaigns.tables import count_flights
+
+        if not (folder / table).is_file():
+            raise
+        flights = count_flights(folder / table)
+        print(f"planfly: interrupted; {flights} flights are kept in {folder}, --resume goes on", file=sys.stderr)
+        code = 128 + (stop.number if isinstance(stop, Interrupted) else signal.SIGINT)

@@ -1,0 +1,92 @@
+"""Progress of long work: the API reports stages of work, and its caller decides where they are shown.
+
+Without a receiver nothing is shown.  Only the compilation of kernels, up to a minute after an install, is then logged
+as a warning of the logger ``planfly``, which Python writes to standard error unless logging is configured otherwise.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
+from typing import NamedTuple
+
+# Takes how far a stage is: done, total, a remark.
+Advance = Callable[[float, float, str], None]
+
+
+class Receiver(NamedTuple):
+    """Where progress goes.
+
+    stage: begins a stage by its title, and gives what takes how far it is.
+    say: takes a line that stands for itself.
+    """
+
+    stage: Callable[[str], AbstractContextManager[Advance]]
+    say: Callable[[str], None]
+
+
+_receiver: ContextVar[Receiver | None] = ContextVar("receiver", default=None)
+
+
+@contextmanager
+def received_by(receiver: Receiver) -> Iterator[None]:
+    """Send the progress of what runs inside to a receiver."""
+    token = _receiver.set(receiver)
+    try:
+        yield
+    finally:
+        _receiver.reset(token)
+
+
+def stage(title: str) -> AbstractContextManager[Advance]:
+    """Begin a stage of work; its context gives a function that takes done, total and a remark.
+
+    >>> with stage("flying") as advance:
+    ...     advance(1.0, 2.0, "half")
+    """
+    receiver = _receiver.get()
+    return contextlib.nullcontext(_ignore) if receiver is None else receiver.stage(title)
+
+
+def say(line: str) -> None:
+    """A line about the work; without a receiver it is logged as a warning."""
+    receiver = _receiver.get()
+    if receiver is not None:
+        receiver.say(line)
+        return
+    # Imported here: the command line has a receiver, and answers --help at once.
+    import logging
+
+    logging.getLogger("planfly").warning(line)
+
+
+def is_received() -> bool:
+    """Whether stages are shown to anybody.
+
+    >>> is_received()
+    False
+    """
+    return _receiver.get() is not None
+
+
+def _ignore(_done: float, _total: float, _remark: str) -> None:
+    pass
+
+
+def progress(callback: Callable[[str, float, float, str], None]) -> AbstractContextManager[None]:
+    """Report the progress of the calls inside a ``with`` block.
+
+    callback: called with the title of a stage ("planning jacksboro"), how much of how much is done, and a remark;
+    with 0, 0 and "" for a line that stands for itself.
+
+    >>> with progress(lambda title, done, total, remark: print(title, done, total, remark)):
+    ...     with stage("flying") as advance:
+    ...         advance(1.0, 2.0, "half")
+    flying 1.0 2.0 half
+    """
+
+    @contextmanager
+    def begin(title: str) -> Iterator[Advance]:
+        yield lambda done, total, remark: callback(title, done, total, remark)
+
+    return received_by(Receiver(begin, lambda line: callback(line, 0.0, 0.0, "")))

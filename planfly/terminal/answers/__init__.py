@@ -1,1 +1,0 @@
-"""What commands answer with ``--json``: data with a schema a command."""

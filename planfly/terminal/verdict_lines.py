@@ -1,0 +1,62 @@
+"""A verdict as lines for a terminal."""
+
+from collections.abc import Iterable
+
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.rule import Rule
+from logs.verdict.rules.registry import RULES
+from logs.verdict.wording import place_text, quantity_text, suggestions_text
+from planfly.terminal.command_parser import coloured
+
+# Failed findings that are listed one by one.
+_LISTED = 12
+# Sources of a limit that are named beside it; any other limit is a check of planfly's own.
+_LIMIT_SOURCES = ("scenario", "aircraft", "autopilot", "mission")
+# Width of the column of rules.
+_TITLES = 2 + max(len(rule.title) for rule in RULES.values())
+
+
+def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
+    """The summary, then what fails, then what is closest to each rule's limit, then notes, in colour where wanted."""
+    first, *rest = verdict.lines or ("",)
+    lines = [coloured(first, "good" if verdict.flyable else "bad"), *rest]
+    failed = [finding for finding in verdict.findings if finding.ok is False]
+    for finding in failed[:_LISTED]:
+        lines.append(
+            coloured("  failed  ", "bad") + f"{_noun(finding)} at {place_text(finding.place)}: {finding.reason}"
+        )
+        if finding.suggestions:
+            lines.append(coloured("          would pass: ", "hint") + suggestions_text(finding.suggestions))
+    if len(failed) > _LISTED:
+        lines.append(coloured("  failed  ", "bad") + f"and {len(failed) - _LISTED} more")
+    for rule in RULES.values():
+        mine = [finding for finding in verdict.findings if finding.rule == rule.name]
+        if mine:
+            lines.append(f"  {rule.title:<{_TITLES}}{_state(rule, mine)}")
+    return [*lines, *(f"  note    {note}" for note in notes)]
+
+
+def _noun(finding: Finding) -> str:
+    rule = RULES[finding.rule]
+    return rule.noun or rule.name
+
+
+def _state(rule: Rule, findings: list[Finding]) -> str:
+    """How the findings of a rule stand, and the one closest to its limit."""
+    failed = sum(finding.ok is False for finding in findings)
+    unknown = [finding for finding in findings if finding.ok is None]
+    judged = len(findings) - len(unknown)
+    if not judged:
+        return f"not judged: {unknown[0].reason}"
+    text = f"{judged - failed} of {judged} ok"
+    with_margin = [(one.margin, one) for one in findings if one.margin is not None and one.ok is not None]
+    if not with_margin or rule.margin is None:
+        return text
+    closest = min(with_margin, key=lambda one: one[0])[1]
+    value = closest.planned if closest.flown is None else closest.flown
+    if value is None or closest.limit is None:
+        return text
+    where = "" if closest.place.kind == "flight" else f"closest to its limit at {place_text(closest.place)}: "
+    limit = quantity_text(closest.limit, closest.unit)
+    whose = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
+    return f"{text}; {where}{rule.margin.of} {quantity_text(value, closest.unit)} (limit {limit}{whose})"

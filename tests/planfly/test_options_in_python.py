@@ -1,0 +1,97 @@
+"""Python reaches all that the command line does: each option of each command is a keyword of the API."""
+
+import argparse
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+import planfly
+from planfly.commands.registry import build_parser
+
+# The functions that each command calls.
+FUNCTIONS = {
+    "run": ("run",),
+    "plan": ("plan", "replan"),
+    "export": ("export",),
+    "fly": ("fly",),
+    "serve": ("serve",),
+    "check": ("judge",),
+    "report": ("report", "foxglove_layout"),
+    "compare": ("compare",),
+    "replay": ("timeline", "instruments", "movie", "play_to_foxglove", "play_to_stations"),
+    "recover": ("recover",),
+    "import": ("import_log",),
+    "refly": ("refly",),
+    "campaign": ("campaign", "campaign_flight"),
+    "winds": ("winds",),
+    "paper": ("paper_tables",),
+    "aircraft": ("aircraft", "describe_aircraft", "new_aircraft"),
+    "scenarios": ("scenarios",),
+    "help": (),
+    "completion": (),
+}
+# Options whose keyword has another name in the function named.
+RENAMED = {
+    ("report", "log"): ("report", "source"),
+    ("report", "layout"): ("foxglove_layout", "file"),
+    ("replay", "movie"): ("movie", "out"),
+    ("campaign", "refly"): ("campaign_flight", "index"),
+}
+# What only a terminal has; of a replay, how the timeline is printed, and that another function is meant; of a check,
+# whether the file of --json is replaced.
+TERMINAL_ONLY = {
+    *("help", "json", "quiet", "schema", "topic", "shell"),
+    *(("replay", "at_once"), ("replay", "foxglove"), ("check", "overwrite")),
+}
+
+
+def options() -> Iterator[tuple[str, argparse.Action]]:
+    for name, parser in build_parser().commands.items():
+        for action in parser._actions:
+            if not {action.dest, (name, action.dest)} & TERMINAL_ONLY:
+                yield name, action
+
+
+def keywords(command: str) -> dict[str, inspect.Parameter]:
+    found: dict[str, inspect.Parameter] = {}
+    for name in FUNCTIONS[command]:
+        found |= inspect.signature(getattr(planfly, name)).parameters
+    return found
+
+
+def test_every_command_calls_public_functions() -> None:
+    assert set(FUNCTIONS) == set(build_parser().commands)
+    assert {name for names in FUNCTIONS.values() for name in names} <= set(planfly.__all__)
+
+
+@pytest.mark.parametrize(("command", "action"), [pytest.param(*one, id=f"{one[0]}-{one[1].dest}") for one in options()])
+def test_an_option_is_a_keyword(command: str, action: argparse.Action) -> None:
+    if (command, action.dest) in RENAMED:
+        function, keyword = RENAMED[command, action.dest]
+        assert keyword in inspect.signature(getattr(planfly, function)).parameters
+        return
+    assert action.dest in keywords(command), f"planfly {command} {action.option_strings or action.dest}"
+
+
+@pytest.mark.parametrize(("command", "action"), [pytest.param(*one, id=f"{one[0]}-{one[1].dest}") for one in options()])
+def test_a_default_is_the_same_in_python(command: str, action: argparse.Action) -> None:
+    if action.default is None or action.required or (command, action.dest) in RENAMED:
+        return
+    mine: Any = [
+        signature.parameters[action.dest].default
+        for name in FUNCTIONS[command]
+        if action.dest in (signature := inspect.signature(getattr(planfly, name))).parameters
+    ]
+    if action.dest == "overwrite":
+        # Where a call always named its target, it is replaced.
+        assert set(mine) <= {True, False}
+    else:
+        for one in mine:
+            assert (list(one) if isinstance(action.default, list) else one) == action.default
+
+
+def test_check_takes_what_judge_takes() -> None:
+    check, judge = (list(inspect.signature(function).parameters) for function in (planfly.check, planfly.judge))
+    assert check == judge
