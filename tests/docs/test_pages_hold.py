@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from planfly.commands.registry import build_parser
 
 import planfly
 from logs.verdict import tolerances
 from logs.verdict.rules.registry import RULES
+from planfly.commands.registry import build_parser
 from planfly.terminal.exit_codes import EXIT_CODES
 from tests.docs.page_blocks import PAGES, ROOT
 
