@@ -130,20 +130,9 @@ def score_path(
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
         within = max(flown[i].missile_distance, flown[i + 1].missile_distance)
+        lag = lags[i]
         dose, at_beginning, at_end = kill_density(
-            missiles,
-            margin,
-            within,
-            x,
-            y,
-            z,
-            x2,
-            y2,
-            z2,
-            extents[i],
-            extents[i + 1],
-            lags[i].max_below,
-            -lags[i].min_below,
+            missiles, margin, within, x, y, z, x2, y2, z2, extents[i], extents[i + 1], lag.max_below, -lag.min_below
         )
         gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
         violations.terrain += terrain_legs[i].depth
