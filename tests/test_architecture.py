@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from planfly.cli import main
+from tests.kernels.__main__ import TESTS
 from tests.stopwatch import Stopwatch
 
 ROOT = Path(__file__).parents[1]
@@ -197,6 +198,13 @@ def test_benchmarks_and_examples_import_what_there_is() -> None:
         if not resolves(f"{node.module}.{alias.name}")
     ]
     assert lost == []
+
+
+def test_the_tests_that_compile_kernels_beforehand_are_there() -> None:
+    for test in TESTS:
+        file, _, name = test.partition("::")
+        assert not name or name in names_of(ROOT / "tests" / file), test
+        assert (ROOT / "tests" / file).is_file(), test
 
 
 def test_names_in_backquotes_lead_to_what_they_name() -> None:

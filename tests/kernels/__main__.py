@@ -89,7 +89,7 @@ TESTS = (
     "planner/optimisers/test_niche_sampling.py::test_at_most_half_of_the_rows_are_kept",
     "planner/evaluation/test_terrain_clearance.py::test_steps_over_the_ground_leave_nothing_out",
     "logs/verdict/rules/test_height_rule.py::test_the_height_over_a_valley_across_the_map",
-    "flight/guidance/test_lateral.py::test_on_the_path_nothing_is_asked",
+    "flight/autopilots/planfly/test_law.py::test_on_the_path_nothing_is_asked",
     "logs/verdict/measures/test_path_moves.py::test_a_block_holds_its_moves",
     "planner/airspace/test_zone_distances.py::test_beside_an_exclusion_and_into_it",
     "planner/evaluation/test_airspace_scores.py::test_pieces_that_touch_a_zone_are_counted",
