@@ -113,8 +113,7 @@ def score_path(
     bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
     legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
     terrain_legs, gaps, lags = scratch.terrain_legs, scratch.gaps, scratch.lags
-    has_error = data.tracking.has_error
-    count = path.shape[0]
+    count, has_error = path.shape[0], data.tracking.has_error
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
     graded = count > 0  # no literal: numba would compile what takes it for each
