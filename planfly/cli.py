@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 from planfly.commands.registry import build_parser, find_command
 from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
-from planfly.terminal.command_parser import coloured
+from planfly.terminal.command_parser import coloured, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
 from planfly.terminal.output import asked_output, open_standard_streams, printable, tolerate_closed_output
-from planfly.terminal.results import error_text
 from planfly.terminal.signal_watch import end_process, ended_by_signals
 from world.errors import PlanflyError
 from world.interruption import Interrupted

@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -271,3 +272,22 @@ def test_every_error_carries_its_file_or_field_apart() -> None:
     assert all(list(placeless_errors(ast.parse(errors.format(one)), kinds)) for one in bare)
     found = [f"{name_of(file)}:{one}" for file in OURS for one in placeless_errors(parsed(file), kinds)]
     assert found == []
+
+
+def module_names(file: Path) -> Iterator[str]:
+    """What a module binds at its top level, as often as it does."""
+    for node in parsed(file).body:
+        if isinstance(node, Function | ast.ClassDef):
+            overload = any(isinstance(mark, ast.Name) and mark.id == "overload" for mark in node.decorator_list)
+            yield from () if overload else (node.name,)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            for name in (part for target in targets for part in ast.walk(target)):
+                if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store):
+                    yield name.id
+
+
+def test_no_module_defines_a_name_twice() -> None:
+    """The later of two constants of a merged file would count for both."""
+    doubled = {name_of(file): [name for name, n in Counter(module_names(file)).items() if n > 1] for file in CODE}
+    assert {file: names for file, names in doubled.items() if names} == {}

@@ -480,8 +480,9 @@ def _singles(connection: sqlite3.Connection, name: str) -> NDArray[np.float32]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[sqlite3.Connection]:
+    # Nothing is written; but a connection that may write removes its -wal and -shm files when it closes.
     with (
         translated_errors(path),
-        closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=1.0)) as connection,
+        closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True, timeout=1.0)) as connection,
     ):
         yield connection

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal, NoReturn, Protocol, TextIO
 
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
+from world.errors import PlanflyError
 from world.files import did_you_mean
 
 # ----------------------------------------------------------------------
@@ -164,3 +165,29 @@ class LineParser(CommandParser):
             what = "option" if unknown.startswith("-") else "argument"
             parser.error(f"{unknown}: no such {what}{did_you_mean(unknown, parser.options())}")
         return parsed
+
+
+# ----------------------------------------------------------------------
+# Errors of the API name its keywords; on the command line they name the options that state them.
+
+# In an error's text: `keyword`, and keyword=True.
+_KEYWORD = re.compile(r"`(\w+)`|\b(\w+)=True\b")
+
+
+def error_text(error: PlanflyError, parser: CommandParser) -> str:
+    """An error's line with the options of a command's parser in place of the keywords that they state.
+
+    >>> parser = CommandParser(prog="planfly replay")
+    >>> _ = parser.add_argument("--from", dest="start")
+    >>> _ = parser.add_argument("--overwrite", action="store_true")
+    >>> error_text(PlanflyError.of_argument("start", 9.0, "the log ends at 4 s", file="a.mcap"), parser)
+    'a.mcap: --from 9.0: the log ends at 4 s'
+    >>> error_text(PlanflyError("a.gif: exists; overwrite=True replaces it", file="a.gif"), parser)
+    'a.gif: exists; --overwrite replaces it'
+    """
+    options, text = parser.keywords(), str(error)
+    begin = "" if error.file in options else f"{error.file}: " if error.file else ""
+    head = error.file if error.file in options else error.argument
+    if head in options and text.startswith(begin + head):
+        text = begin + options[head] + text[len(begin + head) :]
+    return _KEYWORD.sub(lambda found: options.get(found[1] or found[2], found[0]), text)

@@ -281,7 +281,7 @@ _COMPARED, _SOUGHT = 1000, 2000
 # Every so many flights takes the next draw.
 _PLAIN = 3
 # Nearer to the largest wind that is looked at than this, by bisection, it is that wind, m/s.
-_NEAR = 0.3
+_END = 0.3
 
 
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
@@ -300,7 +300,7 @@ def _by_bisection(direction: Direction) -> float:
     if direction.all_failed:
         return _rounded(0.5 * min(direction.speeds), most)
     top = max(direction.speeds)
-    return _rounded(0.5 * (top + most), most) if top < most - _NEAR else most
+    return _rounded(0.5 * (top + most), most) if top < most - _END else most
 
 
 def _next_draws(direction: Direction, count: int, others: list[int]) -> list[int]:

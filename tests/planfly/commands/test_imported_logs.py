@@ -154,7 +154,7 @@ def test_flights_anywhere_are_judged_alike(tmp_path: Path, capsys: Output, lat: 
         lines += [f"{seq}\t0\t0\t16\t0\t0\t0\t0\t{y:.8f}\t{x:.8f}\t{z:.6f}\t1" for seq, y, x, z in rows]
         plan.write_text("\n".join(lines) + "\n")
         assert main(["check", str(log), "--plan", str(plan)]) == 0, name
-        assert "corridor     2 of 2 ok" in capsys.readouterr().out
+        assert "corridor         2 of 2 ok" in capsys.readouterr().out
 
 
 def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Output) -> None:

@@ -9,7 +9,8 @@ from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Change, Place
 from planfly.cli import main
 from planfly.commands.registry import build_parser
-from planfly.terminal.results import error_text, print_verdict, print_warnings
+from planfly.terminal.command_parser import error_text
+from planfly.terminal.results import print_verdict, print_warnings
 from world.errors import LogError, PlanflyError
 
 # ----------------------------------------------------------------------
