@@ -30,7 +30,7 @@ def replayed_part(log: FlightLog, start: float | None, end: float | None) -> tup
     last = log.end_time if end is None else min(end, log.end_time)
     ends = f"the log ends at {log.end_time:.1f} s"
     if end is not None and end > log.end_time and end in _PORTS:
-        allowed = f"{ends}; if a port is meant, name its address, too: 127.0.0.1:{end:g}"
+        allowed = f"{ends}; if a port is meant, name its address, too: `end` 127.0.0.1:{end:g}"
         raise LogError.of_argument("end", end, allowed, shown=f"{end:g}", file=log.source)
     if first > log.end_time:
         raise LogError.of_argument("start", first, ends, shown=f"{first:g}", file=log.source)
