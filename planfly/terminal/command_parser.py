@@ -186,8 +186,10 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
     'a.gif: exists; --overwrite replaces it'
     """
     options, text = parser.keywords(), str(error)
-    begin = "" if error.file in options else f"{error.file}: " if error.file else ""
-    head = error.file if error.file in options else error.argument
+    # A change that a keyword asked for is reported in the keyword's name; a file alone may be named like one.
+    of_keyword = error.file in options and bool(error.field)
+    begin = f"{error.file}: " if error.file and not of_keyword else ""
+    head = error.file if of_keyword else error.argument
     if head in options and text.startswith(begin + head):
         text = begin + options[head] + text[len(begin + head) :]
     return _KEYWORD.sub(lambda found: options.get(found[1] or found[2], found[0]), text)
