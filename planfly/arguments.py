@@ -23,7 +23,7 @@ class Range(NamedTuple):
     def allows(self, value: Any) -> bool:
         """Whether a value is a number in the range; a truth value is none.
 
-        >>> Range(0, 20, "a whole number", whole=True).allows(3), Range(0, 1, "a share").allows(math.nan)
+        >>> Range(0, 20, "a whole number", whole=True).allows(3), Range(0, 1, "a share").allows(float("nan"))
         (True, False)
         """
         try:
@@ -111,7 +111,7 @@ _KEYWORDS = {"served_speed": "speed"}
 def is_wind(speed: float, from_deg: float) -> bool:
     """Whether a steady wind can be flown in: m/s, and degrees that it blows from.
 
-    >>> is_wind(8.0, 270.0), is_wind(math.nan, 0.0)
+    >>> is_wind(8.0, 270.0), is_wind(float("nan"), 0.0)
     (True, False)
     """
     return 0.0 <= speed <= 40.0 and -360.0 <= from_deg <= 360.0

@@ -55,8 +55,9 @@ def by_reference(cls: _Class) -> _Class:
 
     Its fields are numbers, arrays, records and named tuples of such.  Records are copied when it is first handed over.
 
+    >>> import numba
     >>> from world.airspace.zone_kernels import zone_records
-    >>> typeof(zone_records([])).held.fields
+    >>> numba.typeof(zone_records([])).held.fields
     ('zones', 'edges')
     """
     members = {name: getattr(cls, name) for name in ("__doc__", "__module__", "__qualname__")}

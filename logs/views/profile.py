@@ -72,6 +72,11 @@ def profile_chart(
     labels = [*fail_labels(failed, corners, entered), *labels, *cut_names, *zone_names]
     limits, note = _bounds(scenario, low, high)
     panel = Panel("height", "m AMSL", tuple(layers), limits, span=(low, high), note=note, labels=tuple(labels))
+    return _chart(scenario, at, panel, straight=straight)
+
+
+def _chart(scenario: Scenario, at: Floats, panel: Panel, *, straight: bool) -> Chart:
+    """The panel as a chart; at: distance of each waypoint along the route, m."""
     path = "the straight line from start to destination" if straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
     return Chart(

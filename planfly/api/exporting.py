@@ -76,8 +76,8 @@ def export(
     >>> import planfly, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     written = planfly.export(planfly.plan("tight", seed=1), f"{folder}/m.waypoints", Path(folder) / "m.kml")
-    ...     [file.suffix for file in written.files], written.contents
-    (['.waypoints', '.kml'], ('23 items', 'plan and 7 zones'))
+    ...     [file.suffix for file in written.files], written.contents[0]
+    (['.waypoints', '.kml'], '23 items')
     """
     if not files:
         raise PlanflyError("export: no file: one at least is expected", field="files")

@@ -240,11 +240,13 @@ def judge(
     source = _source_of(what)
     _refuse(source, {"plan": plan, "flight": flight, "datum": datum}, "goes with an imported log, not with this file")
     fences = named_fences(fence)
-    if isinstance(what, str | Path) and is_log(Path(what)):
-        what = read_log(what)
-    if isinstance(what, FlightLog | FlownMission):
+    log = Path(what) if isinstance(what, str | Path) and is_log(Path(what)) else None
+    if log is not None or isinstance(what, FlightLog | FlownMission):
         _refuse(source, flown_with | {"guidance": guidance}, _AS_FLOWN)
         _refuse(source, {"scenario": scenario}, _WHERE_FLOWN)
+    if log is not None:
+        what = read_log(log)
+    if isinstance(what, FlightLog | FlownMission):
         return _judge_flight(what, terrain, fences)
     change = partial(changed_scenario, guidance=guidance, **flown_with)
     setup = _opened(what, scenario, terrain, None, fences, change).setup

@@ -141,7 +141,7 @@ def run(
     >>> import planfly, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     result = planfly.run("tight", seed=1, out=folder)
-    >>> result.verdict.flyable, len(result.rounds), [file.name for file in result.files][:3]
+    ...     result.verdict.flyable, len(result.rounds), [file.name for file in result.files][:3]
     (False, 1, ['plan.json', 'mission.waypoints', 'mission.plan'])
     """
     check_arguments(seed=seed, refine=refine, log_hz=log_hz, max_hours=max_hours, max_log=max_log)

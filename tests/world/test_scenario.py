@@ -278,10 +278,10 @@ def test_relative_paths_count_from_the_scenario_file(tmp_path: Path, monkeypatch
     monkeypatch.chdir(tmp_path)
     assert load_scenario("scenarios/s.toml").terrain is not None
     # An option's path counts from where the user is.
-    with pytest.raises(TerrainError, match=r"--terrain: .*tile\.npz"):
+    with pytest.raises(TerrainError, match=r"terrain: .*tile\.npz"):
         load_scenario("scenarios/s.toml", terrain="tile.npz")
     assert load_scenario("scenarios/s.toml", terrain="scenarios/tile.npz").terrain is not None
-    with pytest.raises(ScenarioError, match=r"--terrain: path"):
+    with pytest.raises(ScenarioError, match=r"terrain: path"):
         load_scenario("scenarios/s.toml", terrain="")
 
 
