@@ -146,10 +146,13 @@ def _frame_at(data: bytes, at: int) -> MavlinkFrame | None:
 # (mavlink.io, "Message Signing".)  pymavlink keeps a packet's timestamp before it checks the signature: one forged
 # packet from the future then locks the real station out.
 
-# Timestamps count 10 us from 2015-01-01; a stream that is new may lag by a minute.
+# Timestamps count 10 us from 2015-01-01 in six bytes; a stream that is new may lag by a minute, and any stream may lead
+# by a day.
 EPOCH = 1_420_070_400.0
 _UNITS = 100_000
+_LATEST = 2**48 - 1
 _MAX_LAG = 60 * _UNITS
+_MAX_LEAD = 86_400 * _UNITS
 _MAX_STREAMS = 64
 _LARGEST_KEY = 1024
 
@@ -199,6 +202,7 @@ class Refused(Enum):
     FORGED = auto()
     REPLAYED = auto()
     OLD = auto()
+    FUTURE = auto()
     STREAMS = auto()
 
 
@@ -206,12 +210,14 @@ class Refused(Enum):
 class Signing:
     """Signs what goes out and checks what comes in.
 
-    key: 32 bytes.  link: our link id.  newest: the largest timestamp sent or believed.
+    key: 32 bytes.  link: our link id.  newest: the largest timestamp sent or believed.  clock: the largest timestamp
+    that our own clock has had, which a clock that is set back does not lower.
     """
 
     key: bytes
     link: int = 0
     newest: int = 0
+    clock: int = 0
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
 
     def refuses(self, frame: MavlinkFrame, wall: float) -> Refused | None:
@@ -229,6 +235,10 @@ class Signing:
         stamp = int.from_bytes(frame.raw[-12:-6], "little")
         stream = (frame.system, frame.component, link)
         last = self._streams.get(stream)
+        # By our own clock, not by what was believed before: no row of frames can lead step by step into the future.
+        self.clock = max(self.clock, _stamp(wall))
+        if stamp > self.clock + _MAX_LEAD:
+            return Refused.FUTURE
         if last is None:
             # By our clock, not by others' timestamps: a station whose clock runs ahead locks nobody out.
             if stamp + _MAX_LAG < _stamp(wall):
@@ -243,8 +253,12 @@ class Signing:
         return None
 
     def sign(self, packed: bytes, wall: float) -> bytes:
-        """Sign a packed MAVLink 2 frame that is not signed yet."""
-        self.newest = max(self.newest + 1, _stamp(wall))
+        """Sign a packed MAVLink 2 frame that is not signed yet.
+
+        Beyond the year 2104 timestamps stay at the largest that six bytes hold, and stations drop them as replayed.
+        """
+        self.clock = max(self.clock, _stamp(wall))
+        self.newest = min(max(self.newest + 1, _stamp(wall)), _LATEST)
         number = packed[7] | packed[8] << 8 | packed[9] << 16
         body = bytearray(packed[:-2])
         body[2] |= SIGNED
@@ -255,7 +269,7 @@ class Signing:
 
 
 def _stamp(wall: float) -> int:
-    return max(0, int((wall - EPOCH) * _UNITS))
+    return min(max(0, int((wall - EPOCH) * _UNITS)), _LATEST)
 
 
 Address = tuple[str, int]
@@ -299,8 +313,9 @@ class Dropped:
 
     address: from an address that is not allowed, datagrams.  unsigned, forged: without a signature, and with one that
     the key did not make.  replayed: signed by the key, and no newer than one before it in its stream.  old: the first
-    of a stream, and from more than a minute ago.  streams: of more streams than are kept.  stranger: from another
-    machine, and nobody that has sent a HEARTBEAT.  others: to another system, or from ours.
+    of a stream, and from more than a minute ago.  future: signed by the key, and more than a day ahead of our clock.
+    streams: of more streams than are kept.  stranger: from another machine, and nobody that has sent a HEARTBEAT.
+    others: to another system, or from ours.
     """
 
     address: int = 0
@@ -308,6 +323,7 @@ class Dropped:
     forged: int = 0
     replayed: int = 0
     old: int = 0
+    future: int = 0
     streams: int = 0
     stranger: int = 0
     others: int = 0
@@ -372,7 +388,9 @@ class Link:
         self.clock, self._wall = clock or RunningClock(), wall
         self._signing = Signing(access.key) if access.key is not None else None
         self._decoder = Decoder()
+        # Addresses that a notice names already: strangers, and those whose clock is ahead.
         self._strangers: set[str] = set()
+        self._ahead: set[str] = set()
         self._notices: list[str] = []
         self._hello = {address: mavlink.MAVLink(None, SYSTEM, COMPONENT) for address in access.to}
         family = socket.AF_INET6 if ":" in access.bind[0] else socket.AF_INET
@@ -425,6 +443,8 @@ class Link:
                 continue
             if self._signing is not None and (reason := self._signing.refuses(frame, self._wall())):
                 self._count(reason)
+                if reason is Refused.FUTURE:
+                    self._name_ahead(source[0])
                 continue
             message = self._decoder.message(frame)
             if message is None:
@@ -454,6 +474,15 @@ class Link:
         full = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
         self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full}: it is not answered")
 
+    def _name_ahead(self, host: str) -> None:
+        """Have it said once that an address with the key is not answered, as its clock or ours is wrong."""
+        if host in self._ahead or len(self._ahead) >= _MAX_NAMED:
+            return
+        self._ahead.add(host)
+        self._notices.append(
+            f"{host} signs with timestamps more than a day ahead of this machine's clock: such frames are dropped"
+        )
+
     def notices(self) -> list[str]:
         """What is to be said, since the last call, of who is not answered."""
         found, self._notices = self._notices, []
@@ -465,6 +494,7 @@ class Link:
         dropped.forged += reason is Refused.FORGED
         dropped.replayed += reason is Refused.REPLAYED
         dropped.old += reason is Refused.OLD
+        dropped.future += reason is Refused.FUTURE
         dropped.streams += reason is Refused.STREAMS
 
     def _heard(self, source: Address, system: int, component: int) -> Peer | None:

@@ -255,6 +255,8 @@ class _Player:
         now = self._link.clock()
         self._status.boot, self._status.wall = now - self._born, time.time()
         self._link.receive()
+        for notice in self._link.notices():
+            self._on_message(notice)
         if now >= self._hello:
             self._hello = now + 1.0
             self._link.send_heartbeat(heartbeat(self._status))

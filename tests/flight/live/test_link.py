@@ -153,6 +153,53 @@ def test_each_frame_that_is_not_believed_says_why() -> None:
     assert refused(Signing(KEY, 100).sign(packed(HEARTBEAT), WALL)) is Refused.STREAMS
 
 
+# Timestamps as the standard counts them: 10 us since 2015-01-01.  3e8 s after it, and a day.
+NOW, DAY = 30_000_000_000_000, 8_640_000_000
+
+
+def signed_at(stamp: int, link_id: int = 1, system: int = 255) -> bytes:
+    """A HEARTBEAT that pymavlink signs with the key and a timestamp."""
+    mav = mavlink.MAVLink(None, system, 190)
+    mav.signing.secret_key, mav.signing.sign_outgoing = KEY, True
+    mav.signing.link_id, mav.signing.timestamp = link_id, stamp
+    return HEARTBEAT.pack(mav)
+
+
+def test_a_timestamp_more_than_a_day_ahead_is_refused_and_leaves_no_trace() -> None:
+    vehicle = Signing(KEY)
+
+    def refused(stamp: int, link_id: int = 1) -> Refused | None:
+        return vehicle.refuses(split_frames(signed_at(stamp, link_id))[0], WALL)
+
+    assert refused(NOW) is None
+    for ahead in (2**48 - 1, 2**48 - 2, NOW + DAY + 1):
+        for link_id in (1, 2):
+            assert refused(ahead, link_id) is Refused.FUTURE
+    assert vehicle.newest == NOW
+    assert refused(NOW + 1) is None, "its own stream goes on"
+    assert refused(NOW + DAY) is None
+    # Half a day at a time leads no further than one frame does.
+    assert refused(NOW + DAY + DAY // 2) is Refused.FUTURE
+    sent = split_frames(vehicle.sign(packed(HEARTBEAT, 1), WALL))[0].raw
+    assert int.from_bytes(sent[-12:-6], "little") == NOW + DAY + 1
+
+
+def test_a_clock_set_back_by_years_keeps_the_streams_that_it_had() -> None:
+    vehicle = Signing(KEY)
+    assert vehicle.refuses(split_frames(signed_at(NOW))[0], WALL) is None
+    assert vehicle.refuses(split_frames(signed_at(NOW + 1))[0], 0.0) is None
+
+
+def test_our_timestamps_never_overflow_their_six_bytes() -> None:
+    """In the year 2104 and long after it frames are still signed, so that pymavlink can check them."""
+    ours, receiver = Signing(KEY), mavlink.MAVLink(None)
+    receiver.signing.secret_key = KEY
+    last = EPOCH + 2**48 / 1e5
+    assert receiver.decode(bytearray(ours.sign(packed(HEARTBEAT, 1), last - 1.0))).get_signed()
+    for wall in (last, last + 1.0, 1e11, 1e18):
+        assert ours.sign(packed(HEARTBEAT, 1), wall)[-12:-6] == bytes([0xFF] * 6)
+
+
 def test_keys_that_others_could_read_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "key"
     path.write_text(KEY.hex() + "\n", encoding="ascii")
@@ -305,6 +352,26 @@ def test_a_key_lets_only_its_owner_in() -> None:
         assert made.take(packed(HEARTBEAT), ("127.0.0.1", 5)) == []
         assert made.peers == {}
         assert len(made.take(Signing(KEY).sign(packed(HEARTBEAT), WALL), ("127.0.0.1", 5))) == 1
+    finally:
+        made.close()
+
+
+def test_an_address_whose_clock_is_far_ahead_is_named_once() -> None:
+    made = Link(Access(("127.0.0.1", 0), (("127.0.0.1", 9),), key=KEY), Clock(), lambda: WALL)
+    try:
+        for stamp in (2**48 - 1, 2**48 - 1, NOW + 2 * DAY):
+            assert made.take(signed_at(stamp), ("127.0.0.1", 5)) == []
+        assert (made.dropped.future, made.peers) == (3, {})
+        (notice,) = made.notices()
+        assert notice.startswith("127.0.0.1 signs with timestamps more than a day ahead")
+        made.take(signed_at(NOW + 2 * DAY), ("127.0.0.1", 6))
+        assert made.notices() == []
+        # Addresses that are named are bounded, and the vehicle still signs.
+        for host in range(1000):
+            made.take(signed_at(2**48 - 1), (f"127.0.{host // 250}.{2 + host % 250}", 5))
+        assert len(made.notices()) < 20
+        made.send_heartbeat(HEARTBEAT)
+        assert len(made.take(signed_at(NOW), ("127.0.0.1", 5))) == 1
     finally:
         made.close()
 

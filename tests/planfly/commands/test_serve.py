@@ -236,6 +236,71 @@ def test_a_key_shuts_strangers_out(serve: Callable[..., Served], tmp_path: Path)
     assert vehicle.stop() == 0
 
 
+EPOCH_2015 = 1_420_070_400
+
+
+def signed_frames(key: bytes, stamps: list[int], link_id: int, system: int = 253) -> list[bytes]:
+    """A frame that asks for all parameters for each timestamp, signed by pymavlink."""
+    mav = mavlink.MAVLink(None, system, 190)
+    mav.signing.secret_key, mav.signing.sign_outgoing, mav.signing.link_id = key, True, link_id
+    frames = []
+    for stamp in stamps:
+        mav.signing.timestamp = stamp
+        frames.append(mavlink.MAVLink_param_request_list_message(1, 1).pack(mav))
+    return frames
+
+
+def attacks(key: bytes, heard: bytes) -> dict[str, list[bytes]]:
+    """Datagrams by the reason for which a vehicle drops each; heard: a frame of the station, signed."""
+    now = int((time.time() - EPOCH_2015) * 1e5)
+    minute, day = 6_000_000, 8_640_000_000
+    # A frame of the station under other link ids, which its signature covers.
+    moved = [heard[:-13] + bytes([n]) + heard[-12:] for n in range(256) if n != heard[-13]]
+    return {
+        "future": signed_frames(key, [2**48 - 1, 2**48 - 2, now + 2 * day], 7),
+        "forged": [*moved, *signed_frames(bytes(32), [2**48 - 1] * 200, 8)],
+        # The same frame again, and a system's clock that goes back.
+        "replayed": [heard] * 50,
+        "old": signed_frames(key, [now - 2 * minute, now - 365 * day, 1], 9),
+        "unsigned": [mavlink.MAVLink_param_request_list_message(1, 1).pack(mavlink.MAVLink(None, 253, 190))] * 2000,
+    }
+
+
+def test_no_attack_on_a_signed_link_ends_a_flight(serve: Callable[..., Served], tmp_path: Path) -> None:
+    """Timestamps of the far future, wrong link ids, replay, rollback and a flood, all in flight."""
+    key = bytes(range(32))
+    (tmp_path / "key").write_text(key.hex(), encoding="ascii")
+    (tmp_path / "key").chmod(0o600)
+    vehicle = serve("--scenario", "field.toml", "--sign-key", "key")
+    with UdpStation(vehicle.port, system=254) as station, UdpStation(vehicle.port, mute=True) as thief:
+        for mav in (station.mav, station.parser):
+            mav.signing.secret_key = key
+            mav.signing.timestamp = int((time.time() - EPOCH_2015) * 1e5)
+        station.mav.signing.sign_outgoing = True
+        assert station.upload(LONG) == 0
+        station.fly()
+        station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0)
+        heard = mavlink.MAVLink_param_request_read_message(1, 1, b"", 0).pack(station.mav)
+        station.socket.sendto(heard, station.to)
+        station.until(lambda m: m.get_type() == "PARAM_VALUE")
+        tried = attacks(key, heard)
+        for reason, datagrams in tried.items():
+            for number, data in enumerate(datagrams):
+                thief.socket.sendto(data, thief.to)
+                if number % 50 == 49:
+                    # What the vehicle answers between two bursts: the kernel's queue for its socket is short.
+                    station.command(511, 30, 33_333)
+            assert station.command(511, 30, 33_333) == 0, reason
+        assert station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT").get_signed()
+        assert thief.listen(0.5) == []
+    assert vehicle.stop() == 0
+    (told,) = (line for line in vehicle.lines if line.startswith("frames dropped"))
+    counts = {word: int(count.replace(",", "")) for count, word in (part.split() for part in told[16:].split(", "))}
+    assert counts == {reason: len(datagrams) for reason, datagrams in tried.items()}
+    assert sum("more than a day ahead" in line for line in vehicle.lines) == 1
+    assert read_log(vehicle.folder / "logs" / "flight-001.mcap").complete
+
+
 def test_the_default_scenario_stands_by(serve: Callable[..., Served]) -> None:
     vehicle = serve()
     with UdpStation(vehicle.port) as station:
