@@ -27,6 +27,7 @@ from logs.importers.open_log import open_log
 from logs.recording.reader import LogEvent
 from logs.verdict.findings import Verdict
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, plan_mismatch
+from logs.verdict.imported.judge_imported_flight import missing_text
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import find_airframe
@@ -39,6 +40,8 @@ from world.scenario_tables import FlightTable
 Floats = NDArray[np.float64]
 
 _BLOCK = 2**20
+# Items that a mission has at least.
+_FEWEST = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +117,7 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
         *_differing(flight, mission, options),
     )
     source = ImportedLog(
+        missing=None if options.plan is not None or flight.mission is None else flight.mission.missing,
         file=path.name,
         sha256=_sha256(path),
         format=flight.raw.format,
@@ -156,6 +160,10 @@ def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[
     if flight.mission is None:
         raise LogError(f"{path}: holds no mission: `plan` names the one that was to be flown", file=path)
     found = flight.mission
+    if found.missing is not None and len(found.mission.items) < _FEWEST:
+        lacking = [missing_text(found.missing), *found.mission.warnings[:1]]
+        lacking.append("`plan` names the mission that was to be flown")
+        raise LogError(f"{path}: {'; '.join(lacking)}", file=path)
     when = f", at {found.time:.1f} s" if found.time > 0.0 else ""
     return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
 

@@ -1,6 +1,7 @@
 """A MAVLink mission as data: items, home, fences and rally points."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, NamedTuple
@@ -263,14 +264,23 @@ def renumbered(mission: Mission) -> Mission:
     """
     if not mission.items or mission.items[0].seq > 0:
         return mission
-    shift = 1 - mission.items[0].seq
-    items = []
-    for item in mission.items:
+    return replace(mission, items=shifted(mission.items, 1 - mission.items[0].seq))
+
+
+def shifted(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
+    """Items with a number added to each seq, and to the targets of jumps.
+
+    >>> jump = MissionItem(3, int(Command.DO_JUMP), 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    >>> [(item.seq, item.params[0]) for item in shifted([jump], 1)]
+    [(4, 2.0)]
+    """
+    moved = []
+    for item in items:
         params = item.params
         if item.command == Command.DO_JUMP:
             params = (params[0] + shift, *params[1:])
-        items.append(replace(item, seq=item.seq + shift, params=params))
-    return replace(mission, items=tuple(items))
+        moved.append(replace(item, seq=item.seq + shift, params=params))
+    return tuple(moved)
 
 
 class ItemProblem(NamedTuple):

@@ -112,6 +112,28 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True)
+class MissingItems:
+    """Items of a mission that its log does not hold, or holds in a form that no autopilot could make sense of.
+
+    numbers: of those items, rising, as the mission that is judged counts.
+    total: how many items the mission has, home among them where the autopilot counts it; 0 where the log does not say.
+    first, last: numbers of the items that are judged, with all between them.
+    end: the highest number that is known of.
+    """
+
+    numbers: tuple[int, ...]
+    total: int
+    first: int
+    last: int
+    end: int
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the mission goes on beyond what is judged."""
+        return self.last < self.end
+
+
+@dataclass(frozen=True, slots=True)
 class ImportedLog:
     """An imported log as the source of a flight.
 
@@ -123,6 +145,7 @@ class ImportedLog:
     heights: which was taken.
     wind: where the wind is from: "XKF2", "" for none.
     mission: where the mission is from: "CMD of the log, at 22.4 s", or a file.
+    missing: items of that mission that the log does not hold; None where it is judged whole.
     plan_heights: whether the mission states heights.
     aircraft_known: whether the aircraft was named; if not, none of its limits count.
     gaps: pauses between rows, over the whole of what was imported.
@@ -149,6 +172,7 @@ class ImportedLog:
     faults: RowFaults = field(default_factory=RowFaults)
     damage: Damage = field(default_factory=Damage)
     notes: tuple[str, ...] = ()
+    missing: MissingItems | None = None
 
 
 # Steps of JSBSim a second, but for campaigns.

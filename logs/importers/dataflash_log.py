@@ -53,12 +53,13 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
         place = (on_grid(lat), on_grid(lon), round(up, 6))
         item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *place)
         rows.append(Item(stamp, int(total), item))
-    for start, items in gather_items(rows):
-        made = logged_mission(items, f"{source}: CMD")
+    notes = () if framed else ("the log states no frames: heights are taken as above home",)
+    for logged in gather_items(rows):
+        made = logged_mission(logged, source, "CMD")
         if made is not None:
-            made = made if made.home is not None else replace(made, home=_home(origins))
-            notes = () if framed else ("the log states no frames: heights are taken as above home",)
-            yield LoggedMission(start, replace(made, warnings=(*made.warnings, *notes)), "CMD")
+            mission = made.mission
+            home = mission.home if mission.home is not None else _home(origins)
+            yield replace(made, mission=replace(mission, home=home, warnings=(*mission.warnings, *notes)))
 
 
 def _home(origins: Messages) -> Home | None:

@@ -1,55 +1,85 @@
 """What several formats hold alike: missions, ArduPlane's parameters and flight modes, by the names of any release."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from pymavlink import mavutil
 
-from flight.mission.items import Home, Mission, MissionItem, item_problem, renumbered
+from flight.mission.items import Command, Home, Mission, MissionItem, item_problem, shifted
+from flight.simulation.setup import MissingItems
+from logs.importers.raw_log import LoggedMission
 
 # ----------------------------------------------------------------------
 # Missions out of items as logs hold them: one by one, whole missions again and again, and items as they are flown.
 
 
 class Item(NamedTuple):
-    """An item as logged: when (s), of how many items its mission is (0 where that is not logged), and the item."""
+    """An item as logged.
+
+    time: s.  total: of how many items its mission is; 0 where that is not logged.
+    begins: whether the log shows that a mission anew begins with it.
+    """
 
     time: float
     total: int
     item: MissionItem
+    begins: bool = False
 
 
-def gather_items(rows: Iterable[Item]) -> list[tuple[float, tuple[MissionItem, ...]]]:
-    """Missions that items, in the order of the log, come to, and when each began to hold.
+class LoggedItems(NamedTuple):
+    """The items of a mission, by rising number: since when they hold (s), and how many there are said to be.
+
+    total: 0 where the log does not say.
+    """
+
+    time: float
+    total: int
+    items: tuple[MissionItem, ...]
+
+
+def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
+    """Missions that items, in the order of the log, come to.
 
     Items from number 0 on are a mission anew.  An item alone is one that is flown if it is as it was, and else one that
-    was changed.
+    was changed.  A mission that is logged twice, each time in part, is one.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> logged = [Item(1.0, 3, way[0]), Item(1.0, 3, way[1]), Item(1.0, 3, way[2]), Item(9.0, 3, way[1])]
-    >>> [(start, len(items)) for start, items in gather_items(logged)]
-    [(1.0, 3)]
+    >>> [(start, total, len(items)) for start, total, items in gather_items(logged)]
+    [(1.0, 3, 3)]
     """
     found: list[tuple[float, dict[int, MissionItem]]] = []
+    # The number of items that was last announced for each of them.
+    totals: list[int] = []
     ordered = list(rows)
-    for k, (time, _, item) in enumerate(ordered):
+    for k, (time, total, item, begins) in enumerate(ordered):
         follows = k + 1 < len(ordered) and ordered[k + 1].item.seq == 1
-        if not found or (item.seq == 0 and follows and len(found[-1][1]) > 1):
+        if not found or begins or (item.seq == 0 and follows and len(found[-1][1]) > 1):
             found.append((time, {}))
         elif item.seq in found[-1][1] and not _same(found[-1][1][item.seq], item):
             found.append((time, dict(found[-1][1])))
         found[-1][1][item.seq] = item
-    out: list[tuple[float, tuple[MissionItem, ...]]] = []
-    for start, items in found:
-        whole = tuple(items[seq] for seq in sorted(items))
-        if not out or not _alike(out[-1][1], whole):
-            out.append((start, whole))
+        totals = [*totals, *[0] * (len(found) - len(totals))]
+        totals[-1] = total or totals[-1]
+    out: list[LoggedItems] = []
+    for (start, items), total in zip(found, totals, strict=True):
+        logged = LoggedItems(start, total, tuple(items[seq] for seq in sorted(items)))
+        if out and _are_one(out[-1], logged):
+            both = {item.seq: item for item in (*out[-1].items, *logged.items)}
+            out[-1] = LoggedItems(out[-1].time, total or out[-1].total, tuple(both[seq] for seq in sorted(both)))
+        else:
+            out.append(logged)
     return out
 
 
-def _alike(one: tuple[MissionItem, ...], other: tuple[MissionItem, ...]) -> bool:
-    return len(one) == len(other) and all(map(_same, one, other))
+def _are_one(one: LoggedItems, other: LoggedItems) -> bool:
+    """Whether two are the same mission: item by item; or where the same number is announced, in the items of both."""
+    known = {item.seq: item for item in one.items}
+    common = [item for item in other.items if item.seq in known]
+    whole = len(common) == len(one.items) == len(other.items)
+    announced = one.total == other.total > 0 and bool(common)
+    return (whole or announced) and all(_same(known[item.seq], item) for item in common)
 
 
 def _same(one: MissionItem, other: MissionItem) -> bool:
@@ -61,19 +91,23 @@ def _content(item: MissionItem) -> tuple[object, ...]:
     return item.seq, item.command, repr((item.params, item.lat_deg, item.lon_deg, item.alt))
 
 
-def logged_mission(items: tuple[MissionItem, ...], source: str) -> Mission | None:
-    """The mission of logged items, the first of number 0 being home; None where no two are left.
+def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
+    """The mission of logged items, the first of number 0 being home; None where it has fewer than two.
 
-    An item that no autopilot could make sense of is left out and told.
+    An item that no autopilot could make sense of is left out and told.  Where items are missing, the mission is the
+    longest run of items without a gap.
+    source: the log's name.  origin: what of the log holds the items, for people.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
-    >>> made = logged_mission(tuple(way), "a.BIN")
+    >>> made = logged_mission(LoggedItems(1.0, 5, tuple(way)), "a.BIN", "CMD").mission
     >>> made.home.lat_deg, [item.seq for item in made.items]
     (46.0, [1, 2])
+    >>> logged_mission(LoggedItems(1.0, 5, tuple(way)), "a.BIN", "CMD").missing.numbers
+    (3, 4)
     """
     home: Home | None = None
     kept, warnings = [], []
-    for item in items:
+    for item in logged.items:
         problem = item_problem(item)
         if problem is not None:
             warnings.append(f"item {item.seq}: left out: {problem}")
@@ -82,15 +116,49 @@ def logged_mission(items: tuple[MissionItem, ...], source: str) -> Mission | Non
             home = Home(item.lat_deg, item.lon_deg, item.alt) if placed else None
         else:
             kept.append(item)
-    if len(kept) < 2:
-        return None
-    mission = Mission(home, tuple(kept), warnings=tuple(warnings), source=source)
-    numbers = {item.seq for item in kept}
-    missing = sorted(set(range(min(numbers), max(numbers))) - numbers)
-    if missing:
-        listed = ", ".join(map(str, missing[:8]))
-        mission = replace(mission, warnings=(*mission.warnings, f"the log holds no item {listed} of the mission"))
-    return renumbered(mission)
+    if logged.total and not any(item.seq == 0 for item in logged.items):
+        warnings.append(f"item 0, which is home, of {logged.total} is not in the log")
+    # Both mission files keep number 0 for home.
+    shift = 1 if kept and kept[0].seq == 0 else 0
+    end = max(logged.total - 1, logged.items[-1].seq) + shift
+    mission = Mission(home, shifted(kept, shift), warnings=tuple(warnings), source=f"{source}: {origin}")
+    return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)
+
+
+def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:
+    """A mission whose items are numbered from 1, if it is whole, or its longest run of items without a gap.
+
+    total: how many items it is said to have, 0 where that is not known.  end: the number of its last item, as far as
+    that is known.
+    None for a mission of fewer than two items.
+    """
+    held = {item.seq for item in logged.mission.items}
+    missing = tuple(sorted(set(range(1, end + 1)) - held))
+    if not missing:
+        return logged if len(held) > 1 else None
+    run = _longest_run(logged.mission.items)
+    first, last = (run[0].seq, run[-1].seq) if run else (0, 0)
+    found = MissingItems(missing, total, first, last, end)
+    return replace(logged, mission=replace(logged.mission, items=tuple(run)), missing=found)
+
+
+def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
+    """The most items that follow each other, up to a jump to another; the first of several such runs."""
+    runs: list[list[MissionItem]] = [[]]
+    for item in items:
+        if runs[-1] and item.seq != runs[-1][-1].seq + 1:
+            runs.append([])
+        runs[-1].append(item)
+    return max((_before_jump_out(run) for run in runs), key=len)
+
+
+def _before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
+    """The items of a run before the first jump to an item that is not in it."""
+    held = {float(item.seq) for item in run}
+    for k, item in enumerate(run):
+        if item.command == Command.DO_JUMP and item.params[0] not in held:
+            return run[:k]
+    return run
 
 
 # ----------------------------------------------------------------------

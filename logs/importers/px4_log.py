@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
-from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid, renumbered
+from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid, shifted
 from flight.simulation.setup import Damage
 from logs.importers.dataflash_frames import MappedFile, pieces
-from logs.importers.logged_missions import px4_state
+from logs.importers.logged_missions import px4_state, without_gaps
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.errors import LogError
 from world.kernels import compiled
@@ -34,7 +34,7 @@ _HEADER, _LETTERS = 16, b"BFIMPQARDLCSO"
 _TOPICS = [
     "vehicle_global_position", "vehicle_local_position", "vehicle_attitude", "airspeed_validated", "airspeed", "wind",
     "wind_estimate", "battery_status", "vehicle_status", "navigator_mission_item", "vehicle_gps_position", "sensor_gps",
-    "vehicle_air_data", "actuator_controls_0", "vehicle_thrust_setpoint", "home_position",
+    "vehicle_air_data", "actuator_controls_0", "vehicle_thrust_setpoint", "home_position", "mission_result",
 ]  # fmt: skip
 # vehicle_status.vehicle_type.
 _TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp"}
@@ -264,15 +264,29 @@ class _Topics:
         return "unknown"
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """Items as they became the current one; those that were never flown to are not in the log."""
+        """The one mission, of items as they became the current one; which others it has mission_result says."""
+        items = self._items()
+        stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])
+        total = self._mission_length(float(stamps[-1]) if items else math.inf)
+        if not items and not total:
+            return
+        held = shifted([items[seq] for seq in sorted(items)], 1)
+        mission = Mission(self._home(), held, source=f"{self._source}: mission items")
+        found = LoggedMission(float(stamps[0]) * 1e-6, mission, "navigator_mission_item")
+        made = without_gaps(found, total, max([total, *(item.seq for item in held[-1:])]))
+        if made is not None:
+            yield made
+
+    def _items(self) -> dict[int, MissionItem]:
+        """Items by their numbers, from 0; those that were never flown to are not in the log."""
         data = self._data.get("navigator_mission_item", {})
         wanted = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
+        items: dict[int, MissionItem] = {}
         if not all(name in data for name in wanted):
-            return
+            return items
         count = len(data["timestamp"])
         relative = data.get("altitude_is_relative", np.zeros(count))
         radius = data.get("acceptance_radius", np.zeros(count))
-        items: dict[int, MissionItem] = {}
         for k in range(count):
             number, command, lat, lon, up = (float(data[name][k]) for name in wanted)
             # Before anything is made of them: garbage may be too large for any degrees.
@@ -284,11 +298,15 @@ class _Topics:
             item = MissionItem(int(number), int(command), frame, params, *place)
             if math.isfinite(number) and item_problem(item) is None:
                 items.setdefault(item.seq, item)
-        if len(items) > 1:
-            made = Mission(
-                self._home(), tuple(items[seq] for seq in sorted(items)), source=f"{self._source}: mission items"
-            )
-            yield LoggedMission(float(data["timestamp"][0]) * 1e-6, renumbered(made), "navigator_mission_item")
+        return items
+
+    def _mission_length(self, stamp: float) -> int:
+        """How many items the mission had at a time (us of the log's clock); 0 where the log does not say."""
+        data = self._data.get("mission_result", {})
+        if "seq_total" not in data:
+            return 0
+        before = np.flatnonzero(np.asarray(data["timestamp"], dtype=np.float64) <= stamp)
+        return int(data["seq_total"][before[-1] if before.size else 0])
 
     def _home(self) -> Home | None:
         found = self._table("home_position", ("lat", "lon", "alt"))

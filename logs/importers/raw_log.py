@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
-from flight.simulation.setup import Damage, VerticalDatum
+from flight.simulation.setup import Damage, MissingItems, VerticalDatum
 from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]
@@ -72,12 +72,15 @@ class LoggedMission:
 
     origin: what of the log holds it, for people: "CMD", "MISSION_ITEM_INT", "declared task".
     with_heights: whether its items state heights.
+    missing: items that the log does not hold; None where it holds them all.  The mission is then the longest run of
+    items without a gap, and may have fewer than two.
     """
 
     time: float
     mission: Mission
     origin: str
     with_heights: bool = True
+    missing: MissingItems | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import math
 import struct
 from array import array
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,11 +17,19 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flight.autopilots.arduplane.law import true_by_equivalent
-from flight.mission.items import Home, Mission, MissionItem, on_grid, renumbered
+from flight.mission.items import Home, Mission, MissionItem, on_grid, shifted
 from flight.simulation.setup import Damage
 from logs.importers.clean_places import steady_clock
 from logs.importers.dataflash_frames import PIECE, MappedFile
-from logs.importers.logged_missions import Item, gather_items, logged_mission, plane_mode, px4_mode
+from logs.importers.logged_missions import (
+    Item,
+    LoggedItems,
+    gather_items,
+    logged_mission,
+    plane_mode,
+    px4_mode,
+    without_gaps,
+)
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.errors import LogError
 
@@ -369,20 +377,21 @@ class _Messages:
     def _missions(self) -> Iterable[LoggedMission]:
         """Items as they went up, or came down when a station asked for them."""
         rows: list[Item] = []
-        total = 0
+        total, begins = 0, False
         for time, message in self._items:
             kind = message.get_type()
             if getattr(message, "mission_type", _MISSION_TYPE) != _MISSION_TYPE:
                 continue
             if kind == "MISSION_COUNT":
-                total = message.count
+                total, begins = message.count, True
             elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
-                rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT")))
+                rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins))
+                begins = False
         px4 = any(one.autopilot == _PX4 for _, one in self._own["HEARTBEAT"])
-        for start, items in gather_items(rows):
-            made = _px4_mission(items, self._source) if px4 else logged_mission(items, f"{self._source}: mission items")
+        for logged in gather_items(rows):
+            made = (_px4_mission if px4 else logged_mission)(logged, self._source, "mission items")
             if made is not None:
-                yield LoggedMission(start, self._with_home(made), "mission items")
+                yield replace(made, mission=self._with_home(made.mission))
 
     def _with_home(self, mission: Mission) -> Mission:
         """With home as the vehicle has it: that of an uploaded mission is only where a station supposed it."""
@@ -421,8 +430,8 @@ def _item(message: Any, *, scaled: bool) -> MissionItem:
     return MissionItem(int(message.seq), command, frame, params, on_grid(lat), on_grid(lon), round(message.z, 6))
 
 
-def _px4_mission(items: tuple[MissionItem, ...], source: str) -> Mission | None:
-    """PX4 keeps no home among the items."""
-    if len(items) < 2:
-        return None
-    return renumbered(Mission(None, items, source=f"{source}: mission items"))
+def _px4_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
+    """PX4 keeps no home among the items, and counts them from 0."""
+    mission = Mission(None, shifted(logged.items, 1), source=f"{source}: {origin}")
+    end = max(logged.total, mission.items[-1].seq)
+    return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

@@ -83,6 +83,8 @@ class Verdict:
     it did not get to; empty where too little was recorded to tell.
     program: of a flown verdict, the real autopilot that flew, None where none did.
     parameters: of a flown verdict, those of the ArduPlane that flew, by its law or itself; None where none did.
+    unjudged: what of the mission of an imported flight was not judged, as its log lacks items; "" for nothing.  Such a
+    flight is never flyable.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -102,6 +104,12 @@ class Verdict:
     leg_ends: tuple[float, ...] = ()
     program: AutopilotProgram | None = None
     parameters: Parameters | None = None
+    unjudged: str = ""
+
+    @property
+    def undecided(self) -> bool:
+        """Whether nothing failed, and a part of the mission was not judged."""
+        return bool(self.unjudged) and not self.failed
 
     @property
     def headline(self) -> str:
@@ -120,6 +128,7 @@ class Verdict:
 
     def __repr__(self) -> str:
         answer = "flyable" if self.flyable else "not flyable" if self.complete else "incomplete"
+        answer = "not judged whole" if self.undecided else answer
         return f"<Verdict {self.level}: {answer}; {len(self.findings)} findings, {len(self.failed)} failed>"
 
     def _repr_html_(self) -> str:

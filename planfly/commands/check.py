@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import planfly
 from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, completed, files
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.exit_codes import LOSS, verdict_code
 from planfly.terminal.options import (
     call,
     flown_by_options,
@@ -55,7 +55,7 @@ def check(args: argparse.Namespace) -> int:
     print_verdict(judged.verdict, judged.setup.route.notes)
     if judged.lossy:
         return LOSS
-    return FLYABLE if judged.verdict.flyable else NOT_FLYABLE
+    return verdict_code(judged.verdict)
 
 
 def _document(judged: "Judged") -> str:

@@ -8,7 +8,7 @@ import planfly
 from planfly.commands.check import LOGS
 from planfly.terminal.arguments import IMPORTED_LOGS, aircraft_words, completed, files
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.exit_codes import FLYABLE, LOSS, verdict_code
 from planfly.terminal.options import (
     call,
     flown_by_options,
@@ -47,7 +47,7 @@ def import_log(args: argparse.Namespace) -> int:
     flight = call(planfly.import_log, args)
     print_verdict(flight.verdict, flight.setup.route.notes)
     print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
-    code = LOSS if flight.lossy else FLYABLE if flight.verdict.flyable else NOT_FLYABLE
+    code = LOSS if flight.lossy else verdict_code(flight.verdict)
     give_answer(args, lambda: _import_answer(Path(args.target), flight, code))
     return code
 

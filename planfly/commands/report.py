@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import planfly
 from planfly.terminal.arguments import completed, files
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE, verdict_code
 from planfly.terminal.options import result_options
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import warn_of_loss
@@ -47,7 +47,7 @@ def report(args: argparse.Namespace) -> int:
     )  # fmt: skip
     for file in written.files:
         print(f"report    {file}")
-    code = FLYABLE if written.verdict is not None and written.verdict.flyable else NOT_FLYABLE
+    code = NOT_FLYABLE if written.verdict is None else verdict_code(written.verdict)
     if not log.complete:
         warn_of_loss(log)
         code = LOSS

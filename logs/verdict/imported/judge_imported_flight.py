@@ -15,6 +15,7 @@ from flight.simulation.setup import (
     Damage,
     FlightSetup,
     ImportedLog,
+    MissingItems,
     Quantity,
     RowFaults,
     VerticalDatum,
@@ -131,6 +132,39 @@ def rows_text(faults: RowFaults, gaps: int) -> str:
     return ", ".join(words) or "in order, without gaps"
 
 
+# Runs of items that a line lists.
+_RUNS = 6
+
+
+def missing_text(missing: MissingItems) -> str:
+    """Which part of a mission is not judged, and which of its items are not in the log, in words.
+
+    >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
+    'not judged beyond item 6: items 7 to 13 of 14 are not in the log'
+    >>> missing_text(MissingItems((1, 5), total=0, first=2, last=4, end=9))
+    'not judged before item 2 and beyond item 4: items 1 and 5 are not in the log'
+    >>> missing_text(MissingItems((1, 2, 3), total=4, first=0, last=0, end=3))
+    'not judged: items 1 to 3 of 4 are not in the log'
+    """
+    runs: list[list[int]] = []
+    for number in missing.numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1] = [runs[-1][0], number]
+        else:
+            runs.append([number])
+    words = [" to ".join(map(str, run)) for run in runs[:_RUNS]]
+    if len(runs) > _RUNS:
+        words.append(f"{len(missing.numbers) - sum(run[-1] - run[0] + 1 for run in runs[:_RUNS])} more")
+    listed = " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+    before = f"before item {missing.first}" if missing.first > 1 else ""
+    beyond = f"beyond item {missing.last}" if missing.last and missing.beyond else ""
+    where = " and ".join(filter(None, [before, beyond]))
+    several = len(missing.numbers) > 1
+    of = f" of {missing.total}" if missing.total else ""
+    items = f"{'items' if several else 'item'} {listed}{of} {'are' if several else 'is'} not in the log"
+    return f"not judged{' ' if where else ''}{where}: {items}"
+
+
 def damage_text(damage: Damage) -> str:
     """What of a file could not be read, in words.
 
@@ -187,9 +221,11 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, whole: bool) -> V
     ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
     findings = (*findings, *(judge(setup, flown, whole) for judge in ends))
     failed = any(item.ok is False for item in findings)
-    flyable = bool(flown) and not failed
-    complete = all(item.ok is True for item in findings if item.rule == "completion")
-    own = LevelAnswer(setup.autopilot.level, flyable, headline(findings, flyable))
+    unjudged = "" if source.missing is None else missing_text(source.missing)
+    flyable = bool(flown) and not failed and not unjudged
+    complete = not unjudged and all(item.ok is True for item in findings if item.rule == "completion")
+    answer = [headline(findings, flyable)] if failed or not unjudged else []
+    own = LevelAnswer(setup.autopilot.level, flyable, "; ".join([*answer, *filter(None, [unjudged])]))
     lines = imported_lines(findings, setup, own, flown)
     return Verdict(
         findings,
@@ -201,6 +237,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, whole: bool) -> V
         notes=setup.route.notes,
         leg_ends=_leg_ends(setup, flown),
         parameters=setup.autopilot.parameters,
+        unjudged=unjudged,
     )
 
 

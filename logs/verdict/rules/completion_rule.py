@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flight.mission.items import Command
-from flight.simulation.setup import FlightSetup
+from flight.simulation.setup import FlightSetup, MissingItems
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
 from logs.verdict.imported.flown_legs import FlownLegs, gaps_between, stretch_end_text
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -83,12 +83,21 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], whole: b
     """How much of the mission the log shows; a log that ends on the way says nothing of what came after."""
     legs, faults, unknown, known = setup.route.legs, [], [], []
     done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
+    missing = None if setup.source is None else setup.source.missing
     if not whole:
         faults.append(message("the log is damaged or unfinished"))
     if not flown:
         stretches = () if setup.source is None else setup.source.stretches
         why = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
-        faults.append(message(why))
+        # It may have flown legs that the log does not hold.
+        if missing is not None and stretches:
+            unknown.append(f"none of the legs that the log holds was flown: {_lacking(missing)}")
+        else:
+            faults.append(message(why))
+    elif legs - 1 in done and missing is not None and missing.beyond:
+        unknown.append(
+            f"{len(done)} of {legs} legs flown that the log holds, the last of them to its end: {_lacking(missing)}"
+        )
     elif legs - 1 in done:
         known.append(f"{len(done)} of {legs} legs flown, the last of them to its end")
     else:
@@ -124,6 +133,10 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], whole: b
         unit="legs",
         method="waypoints passed in order, in the stretches that followed the mission",
     )
+
+
+def _lacking(missing: MissingItems) -> str:
+    return f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission not in the log"
 
 
 def _returns(setup: FlightSetup, legs: FlownLegs) -> bool:

@@ -209,6 +209,8 @@ def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 
 def _label(verdict: Verdict) -> str:
+    if verdict.undecided:
+        return "not judged whole"
     return "flyable" if verdict.flyable else "not flyable" if verdict.complete else "incomplete"
 
 

@@ -198,6 +198,8 @@ def badge_of(verdict: Verdict) -> Badge:
         return Badge("pass", _SIGNS["pass"], "Flyable" if verdict.level == "flown" else "Flyable on paper, not flown")
     if verdict.level == "plan":
         return Badge("fail", _SIGNS["fail"], "Not flyable: no feasible plan")
+    if verdict.undecided:
+        return Badge("fail", _SIGNS["unjudged"], "Not judged whole")
     broken = {finding.rule for finding in verdict.findings if finding.ok is False} - {"completion"}
     if not broken and not verdict.complete:
         return Badge("fail", "!", "Incomplete, so not flyable")

@@ -127,7 +127,9 @@ def test_numbers_that_no_place_or_time_has_are_passed_over(tmp_path: Path) -> No
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         raw = open_log(path)
-    assert len(raw.missions[0].mission.items) == 2
+    missing = raw.missions[0].missing
+    assert missing is not None
+    assert (missing.numbers, missing.total) == ((2,), 3)
     places = clean_places(raw.series["position"])
     assert (len(places.time), places.faults.unusable) == (458, 2)
 

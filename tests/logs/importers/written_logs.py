@@ -2,7 +2,7 @@
 
 import math
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -54,8 +54,12 @@ def dataflash(
     old: bool = False,
     modes: Sequence[tuple[float, int]] = ((20.0, 10),),
     with_frames: bool = True,
+    without_items: Collection[int] = (),
 ) -> Path:
-    """Write a log as a `.BIN`; old: with the names of messages and parameters of before 2016."""
+    """Write a log as a `.BIN`; old: with the names of messages and parameters of before 2016.
+
+    without_items: numbers of items that are announced and not written.
+    """
     raw = example_raw_log() if log is None else log
     out, left = DataflashWriter(), frozenset(leave_out)
 
@@ -71,18 +75,11 @@ def dataflash(
         named = {"AIRSPEED_CRUISE": "TRIM_ARSPD_CM", "ROLL_LIMIT_DEG": "LIM_ROLL_CD"}.get(name, name) if old else name
         factor = 100.0 if named != name else 1.0
         put("PARM", "QNf", "TimeUS,Name,Value", us(19.0), named, value * factor)
-    mission = raw.missions[0].mission
-    total = len(mission.items) + 1
-    home = mission.home
+    home = raw.missions[0].mission.home
     assert home is not None
-    rows = [(0, 16, (0.0,) * 4, home.lat_deg, home.lon_deg, home.alt, 0)]
-    rows += [(it.seq, it.command, it.params, it.lat_deg, it.lon_deg, it.alt, it.frame) for it in mission.items]
-    for number, command, params, lat, lon, up, frame in rows:
+    for row in _command_rows(raw, without_items):
         letters, columns = "QHHHffffLLf", "TimeUS,CTot,CNum,CId,Prm1,Prm2,Prm3,Prm4,Lat,Lng,Alt"
-        values: list[Any] = [us(19.5), total, number, command, *params, lat, lon, up]
-        if with_frames:
-            letters, columns, values = letters + "B", columns + ",Frame", [*values, frame]
-        put("CMD", letters, columns, *values)
+        put("CMD", *((letters + "B", columns + ",Frame", *row) if with_frames else (letters, columns, *row[:-1])))
     ahead = [*modes]
     one, two = ("EKF1", "EKF2") if old else ("XKF1", "XKF2")
     series = {name: found.values for name, found in raw.series.items()}
@@ -107,6 +104,17 @@ def dataflash(
     return path
 
 
+def _command_rows(raw: RawLog, without: Collection[int]) -> list[tuple[Any, ...]]:
+    """The values of CMD, the frame last: home, and the items of a mission."""
+    mission = raw.missions[0].mission
+    home = mission.home
+    assert home is not None
+    total = len(mission.items) + 1
+    rows: list[tuple[Any, ...]] = [(0, 16, *(0.0,) * 4, home.lat_deg, home.lon_deg, home.alt, 0)]
+    rows += [(it.seq, it.command, *it.params, it.lat_deg, it.lon_deg, it.alt, it.frame) for it in mission.items]
+    return [(19_500_000, total, *row) for row in rows if row[0] not in without]
+
+
 class _Sink:
     """What pymavlink writes to: packets as they come, with the time before each."""
 
@@ -118,8 +126,16 @@ class _Sink:
         self.data += struct.pack(">Q", round((BEGAN.timestamp() + self.stamp) * 1e6)) + packet
 
 
-def telemetry(path: Path, log: RawLog | None = None, *, kind: int = 1, autopilot: int = 3, mode: int = 10) -> Path:
-    """Write a log as a `.tlog`, by pymavlink."""
+def telemetry(
+    path: Path,
+    log: RawLog | None = None,
+    *,
+    kind: int = 1,
+    autopilot: int = 3,
+    mode: int = 10,
+    without_items: Collection[int] = (),
+) -> Path:
+    """Write a log as a `.tlog`, by pymavlink; without_items: numbers of items that are announced and not sent."""
     raw = example_raw_log() if log is None else log
     sink = _Sink()
     vehicle, station = dialect.MAVLink(sink, 1, 1), dialect.MAVLink(sink, 255, 190)
@@ -129,8 +145,9 @@ def telemetry(path: Path, log: RawLog | None = None, *, kind: int = 1, autopilot
     home = mission.home
     assert home is not None
     place = round(home.lat_deg * 1e7), round(home.lon_deg * 1e7)
-    station.mission_item_int_send(1, 1, 0, 0, 16, 0, 1, 0.0, 0.0, 0.0, 0.0, *place, home.alt)
-    for it in mission.items:
+    if 0 not in without_items:
+        station.mission_item_int_send(1, 1, 0, 0, 16, 0, 1, 0.0, 0.0, 0.0, 0.0, *place, home.alt)
+    for it in (one for one in mission.items if one.seq not in without_items):
         station.mission_item_int_send(1, 1, it.seq, it.frame, it.command, 0, 1, *it.params, it.x, it.y, it.alt)
     for name, value in raw.parameters.items():
         vehicle.param_value_send(name.encode(), value, 9, len(raw.parameters), 0)
@@ -154,32 +171,46 @@ def telemetry(path: Path, log: RawLog | None = None, *, kind: int = 1, autopilot
     return path
 
 
-def px4(path: Path, log: RawLog | None = None, *, vehicle_type: int = 2, nav_state: int = 3) -> Path:
-    """Write a log as a `.ulg` (PX4, "ULog File Format"), byte by byte."""
+# The topics of a `.ulg`, and their fields.
+_TOPICS = {
+    "vehicle_global_position": "uint64_t timestamp;double lat;double lon;float alt;",
+    "vehicle_local_position": "uint64_t timestamp;float vx;float vy;float vz;",
+    "vehicle_attitude": "uint64_t timestamp;float[4] q;",
+    "airspeed_validated": "uint64_t timestamp;float true_airspeed_m_s;",
+    "wind": "uint64_t timestamp;float windspeed_north;float windspeed_east;",
+    "vehicle_status": "uint64_t timestamp;uint8_t nav_state;uint8_t vehicle_type;",
+    "navigator_mission_item": "uint64_t timestamp;uint16_t sequence_current;uint16_t nav_cmd;"
+    "float acceptance_radius;double latitude;double longitude;float altitude;uint8_t altitude_is_relative;",
+    "mission_result": "uint64_t timestamp;uint16_t seq_current;uint16_t seq_total;",
+}
+
+
+def px4(
+    path: Path,
+    log: RawLog | None = None,
+    *,
+    vehicle_type: int = 2,
+    nav_state: int = 3,
+    without_items: Collection[int] = (),
+) -> Path:
+    """Write a log as a `.ulg` (PX4, "ULog File Format"), byte by byte.
+
+    without_items: numbers of items, from 1, that the mission has and the log does not hold.
+    """
     raw = example_raw_log() if log is None else log
-    topics = {
-        "vehicle_global_position": "uint64_t timestamp;double lat;double lon;float alt;",
-        "vehicle_local_position": "uint64_t timestamp;float vx;float vy;float vz;",
-        "vehicle_attitude": "uint64_t timestamp;float[4] q;",
-        "airspeed_validated": "uint64_t timestamp;float true_airspeed_m_s;",
-        "wind": "uint64_t timestamp;float windspeed_north;float windspeed_east;",
-        "vehicle_status": "uint64_t timestamp;uint8_t nav_state;uint8_t vehicle_type;",
-        "navigator_mission_item": "uint64_t timestamp;uint16_t sequence_current;uint16_t nav_cmd;"
-        "float acceptance_radius;double latitude;double longitude;float altitude;uint8_t altitude_is_relative;",
-    }
     codes = {"uint64_t": "Q", "double": "d", "float": "f", "uint8_t": "B", "uint16_t": "H", "float[4]": "4f"}
     packers = {
         name: "<" + "".join(codes[field.split()[0]] for field in fields.rstrip(";").split(";"))
-        for name, fields in topics.items()
+        for name, fields in _TOPICS.items()
     }
-    numbers = {name: number for number, name in enumerate(topics)}
+    numbers = {name: number for number, name in enumerate(_TOPICS)}
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 20_000_000))
 
     def record(letter: bytes, body: bytes) -> None:
         out.extend(struct.pack("<Hc", len(body), letter) + body)
 
     record(b"B", bytes(40))
-    for name, fields in topics.items():
+    for name, fields in _TOPICS.items():
         record(b"F", f"{name}:{fields}".encode())
     key = b"char[3] sys_name"
     record(b"I", bytes([len(key)]) + key + b"PX4")
@@ -202,7 +233,9 @@ def px4(path: Path, log: RawLog | None = None, *, vehicle_type: int = 2, nav_sta
         row("wind", stamp, -3.0, 0.0)
         if k == 0:
             row("vehicle_status", stamp, nav_state, vehicle_type)
-            for it in raw.missions[0].mission.items:
+            mission = raw.missions[0].mission
+            row("mission_result", stamp, 0, len(mission.items))
+            for it in (one for one in mission.items if one.seq not in without_items):
                 row("navigator_mission_item", stamp, it.seq - 1, 16, 0.0, it.lat_deg, it.lon_deg, it.alt, 0)
     path.write_bytes(bytes(out))
     return path

@@ -1,10 +1,12 @@
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from logs.importers.raw_log import example_raw_log
+from flight.mission_files.formats import mission_text
+from logs.importers.raw_log import RawLog, example_raw_log
 from logs.recording.example_log import write_example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
@@ -155,6 +157,90 @@ def test_flights_anywhere_are_judged_alike(tmp_path: Path, capsys: Output, lat: 
         plan.write_text("\n".join(lines) + "\n")
         assert main(["check", str(log), "--plan", str(plan)]) == 0, name
         assert "corridor         2 of 2 ok" in capsys.readouterr().out
+
+
+def with_13_items() -> RawLog:
+    """The example's flight along 13 waypoints, home beside them: six of 166.7 m on each leg, and the corner."""
+    raw = example_raw_log()
+    mission = raw.missions[0].mission
+    first, corner, last = mission.items
+    lats = [first.lat_deg + (corner.lat_deg - first.lat_deg) * min(k, 6) / 6.0 for k in range(13)]
+    lons = [corner.lon_deg + (last.lon_deg - corner.lon_deg) * max(k - 6, 0) / 6.0 for k in range(13)]
+    lats[7:] = [corner.lat_deg + (last.lat_deg - corner.lat_deg) * k / 6.0 for k in range(1, 7)]
+    places = zip(lats, lons, strict=True)
+    items = tuple(
+        replace(first, seq=k, lat_deg=round(lat, 7), lon_deg=round(lon, 7)) for k, (lat, lon) in enumerate(places, 1)
+    )
+    return replace(raw, missions=(replace(raw.missions[0], mission=replace(mission, items=items)),))
+
+
+# Of each format with a count of items: its writer, the number that it announces for 13 waypoints.
+COUNTED = {"a.BIN": (dataflash, 14), "a.tlog": (telemetry, 14), "a.ulg": (px4, 13)}
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_a_mission_that_is_in_the_log_in_part_is_judged_in_part(tmp_path: Path, capsys: Output, name: str) -> None:
+    """From the last item alone to all 13 waypoints: each that the log does not hold is named."""
+    write, total = COUNTED[name]
+    assert main(["check", str(write(tmp_path / name, with_13_items()))]) == 0
+    capsys.readouterr()
+    for lost in range(1, 14):
+        log = write(tmp_path / name, with_13_items(), without_items=range(14 - lost, 14))
+        missing = "item 13" if lost == 1 else f"items {14 - lost} to 13"
+        named = f"{missing} of {total} {'is' if lost == 1 else 'are'} not in the log"
+        code = main(["check", str(log)])
+        out, error = capsys.readouterr()
+        if lost < 12:
+            assert (code, out.splitlines()[0]) == (3, f"not judged beyond item {13 - lost}: {named}")
+            continue
+        # Of one waypoint, or none, there is nothing to judge.
+        where = " beyond item 1" if lost == 12 else ""
+        says = f"{log}: not judged{where}: {named}; --plan names the mission that was to be flown"
+        assert (code, error) == (2, f"planfly: {says}\n")
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_items_that_are_missing_anywhere_are_all_named(tmp_path: Path, capsys: Output, name: str) -> None:
+    write, total = COUNTED[name]
+    for lost, text in (
+        ((1, 2, 3), "not judged before item 4: items 1 to 3 of {} are not in the log"),
+        ((5,), "not judged before item 6: item 5 of {} is not in the log"),
+        ((9, 13), "not judged beyond item 8: items 9 and 13 of {} are not in the log"),
+        ((2, 8, 9, 13), "not judged before item 3 and beyond item 7: items 2, 8 to 9 and 13 of {} are not in the log"),
+    ):
+        log = write(tmp_path / name, with_13_items(), without_items=lost)
+        assert main(["check", str(log)]) == 3
+        assert capsys.readouterr().out.splitlines()[0] == text.format(total)
+
+
+def test_a_flight_that_is_judged_in_part_is_so_in_every_command(tmp_path: Path, capsys: Output) -> None:
+    log = telemetry(tmp_path / "a.tlog", with_13_items(), without_items=range(7, 14))
+    flight = tmp_path / "a.mcap"
+    assert main(["import", str(log), str(flight), "--json", str(tmp_path / "a.json")]) == 3
+    answer = json.loads((tmp_path / "a.json").read_text())
+    assert (answer["exit_code"], answer["verdict"]["flyable"], answer["verdict"]["complete"]) == (3, False, False)
+    assert main(["check", str(flight)]) == 3
+    said = capsys.readouterr().out
+    assert said.count("not judged beyond item 6: items 7 to 13 of 14 are not in the log") >= 2
+    assert "6 of 6 legs" not in said
+    # The whole mission beside it, and the flight is judged to its end.
+    plan = tmp_path / "plan.waypoints"
+    plan.write_text(mission_text(with_13_items().missions[0].mission, "waypoints"))
+    assert main(["check", str(log), "--plan", str(plan)]) == 0
+
+
+def test_what_fails_on_the_items_that_the_log_holds_is_not_flyable(tmp_path: Path, capsys: Output) -> None:
+    """The third waypoint 300 m beside the flight."""
+    raw = with_13_items()
+    mission = raw.missions[0].mission
+    items = list(mission.items)
+    items[2] = replace(items[2], lon_deg=round(items[2].lon_deg + 0.0039, 7))
+    moved = replace(raw, missions=(replace(raw.missions[0], mission=replace(mission, items=tuple(items))),))
+    log = dataflash(tmp_path / "a.BIN", moved, without_items=range(7, 14))
+    assert main(["check", str(log)]) == 4
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("not flyable: ")
+    assert first.endswith("; not judged beyond item 6: items 7 to 13 of 14 are not in the log")
 
 
 def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Output) -> None:
