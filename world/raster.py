@@ -1,7 +1,8 @@
-"""Elevation files: opened and checked by `FORMATS`, and read as a window at source resolution.
+"""Elevation files: opened and checked, and read as a window at source resolution.
 
-A format is chosen by the file's first bytes or by its suffix, and its driver is explicit, so that nothing that merely
-names another file (VRT, a URL, a `/vsi` path) is ever opened.  Heights are above mean sea level as the file has them.
+`world.elevation_formats.FORMATS` lists the formats.  One is chosen by the file's first bytes or by its suffix, and its
+driver is explicit, so that nothing that merely names another file (VRT, a URL, a `/vsi` path) is ever opened.  Heights
+are above mean sea level as the file has them.
 """
 
 import hashlib
@@ -10,7 +11,7 @@ import os
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
 from world.errors import TerrainError
 from world.files import did_you_mean
 from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, to_geo, to_map, transform_points
@@ -26,10 +28,8 @@ from world.terrain import Terrain
 Floats = NDArray[np.float64]
 ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
-# A window, or an .npz file, with more pixels than this is refused before it is allocated.
+# A window with more pixels than this, or a file of more that is read as one array, is refused.
 MAX_PIXELS = 120_000_000
-# Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
-EMBEDDED = {"jacksboro": "jacksboro.npz"}
 _OWN_FILES = Path(__file__).parent / "elevation"
 EARTH_DATUM = "mean sea level, as the file's heights are taken"
 
@@ -87,6 +87,48 @@ def one_line(error: BaseException) -> str:
 
 
 # ----------------------------------------------------------------------
+# What every format has to be.
+
+
+def _refuse_few(name: str | Path, shape: tuple[int, int]) -> None:
+    """Raise TerrainError for fewer rows or columns than heights can be interpolated between."""
+    if min(shape) < 2:
+        raise TerrainError.at(name, "rows, columns", shape, "at least 2 x 2 pixels are expected")
+
+
+def grid_in_degrees(
+    file: Path, name: str, heights: NDArray[np.generic], edges: tuple[float, float, float, float]
+) -> RasterFile:
+    """A file whose heights were read as one array, rows from north to south, on a grid of longitudes and latitudes.
+
+    edges: west, east, south and north edge of the outermost pixels, deg.
+
+    Raises TerrainError for too few or too many pixels, and for edges that are not on the globe.
+    """
+    rows, cols = heights.shape
+    _refuse_few(name, (rows, cols))
+    if heights.size > MAX_PIXELS:
+        allowed = f"at most {MAX_PIXELS:,} are read"
+        raise TerrainError.at(name, "pixels", heights.size, allowed, shown=f"{heights.size:,}")
+    west, east, south, north = edges
+    if not (-180.0 <= west < east <= 360.0 and -90.0 <= south < north <= 90.0):
+        allowed = "degrees of longitude -180..360 and latitude -90..90 are expected"
+        raise TerrainError.at(name, "west, east, south, north edge", list(edges), allowed)
+    pitch_x, pitch_y = (east - west) / cols, (north - south) / rows
+
+    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+        near = longitude_near(lon, (west + east) / 2)
+        return (near - west) / pitch_x - 0.5, (north - lat) / pitch_y - 0.5
+
+    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
+        return heights[top:bottom, left:right].astype(np.float32)
+
+    col, row = outline(cols, rows)
+    corners = np.stack([west + (col + 0.5) * pitch_x, north - (row + 0.5) * pitch_y], axis=1)
+    return RasterFile(name, (rows, cols), to_source, corners, file_sha256(file), read)
+
+
+# ----------------------------------------------------------------------
 # The .npz form.
 
 # Rows of the tile that we ship (matplotlib does, too), and what it states as xmin, xmax, ymin and ymax, deg; a copy of
@@ -101,30 +143,11 @@ def open_npz(file: Path, name: str) -> RasterFile:
     Raises TerrainError.
     """
     heights, edges = _read_npz(file, name)
-    if heights.ndim != 2 or min(heights.shape) < 2 or heights.dtype.kind not in "iuf":
-        raise TerrainError(
-            f"{name}: elevation: a 2-D array of numbers of at least 2 x 2 is expected,"
-            f" got {heights.dtype} of shape {heights.shape}",
-            file=name, field="elevation", value=heights.shape,
-            allowed="a 2-D array of numbers of at least 2 x 2 is expected",
-        )  # fmt: skip
-    west, east, south, north = _edges(edges, heights.shape[0])
-    if not (-180.0 <= west < east <= 360.0 and -90.0 <= south < north <= 90.0):
-        allowed = "degrees of longitude -180..360 and latitude -90..90 are expected"
-        raise TerrainError.at(name, "xmin..ymax", edges, allowed)
-    rows, cols = heights.shape
-    pitch_x, pitch_y = (east - west) / cols, (north - south) / rows
-
-    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
-        near = longitude_near(lon, (west + east) / 2)
-        return (near - west) / pitch_x - 0.5, (north - lat) / pitch_y - 0.5
-
-    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
-        return heights[top:bottom, left:right].astype(np.float32)
-
-    col, row = outline(cols, rows)
-    corners = np.stack([west + (col + 0.5) * pitch_x, north - (row + 0.5) * pitch_y], axis=1)
-    return RasterFile(name, (rows, cols), to_source, corners, file_sha256(file), read)
+    if heights.ndim != 2 or heights.dtype.kind not in "iuf":
+        allowed = "a 2-D array of numbers is expected"
+        shown = f"{heights.dtype} of shape {heights.shape}"
+        raise TerrainError.at(name, "elevation", heights.shape, allowed, shown=shown)
+    return grid_in_degrees(file, name, heights, _edges(edges, heights.shape[0]))
 
 
 def _edges(stated: list[float], rows: int) -> tuple[float, float, float, float]:
@@ -234,8 +257,7 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
     if block > MAX_BLOCK:
         allowed = f"at most {MAX_BLOCK:,} are; tile the file"
         raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
-    if min(rows, cols) < 2:
-        raise TerrainError.at(file, "rows, columns", (rows, cols), "at least 2 x 2 pixels are expected")
+    _refuse_few(file, (rows, cols))
 
     inverse = ~forward
     middle = _applied(forward, cols / 2, rows / 2)[0] if crs.is_geographic else math.nan
@@ -260,37 +282,24 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
     return RasterFile(str(file), (rows, cols), to_source, np.stack([lon, lat], axis=1), file_sha256(file), read)
 
 
+def open_geotiff(file: Path, _name: str) -> RasterFile:
+    """Open a GeoTIFF in any reference system, with heights in metres.  Raises TerrainError."""
+    return _open_rasterio(file, "GTiff")
+
+
+def open_hgt(file: Path, _name: str) -> RasterFile:
+    """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
+    return _open_rasterio(file, "SRTMHGT")
+
+
 # ----------------------------------------------------------------------
-# The formats, and which of them a file is in.
-
-
-@dataclass(frozen=True, slots=True)
-class ElevationFormat:
-    """A kind of elevation file.
-
-    name: in messages.  begins: what its files begin with, one of these; none for a kind known by its suffix alone.
-    open: opens a file by its path; the second argument is the path as it was given.  Raises TerrainError.
-    """
-
-    name: str
-    suffix: str
-    begins: tuple[bytes, ...]
-    open: Callable[[Path, str], RasterFile]
-
-
-_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-# All that are read: by what a file begins with, else by its suffix.
-FORMATS = (
-    ElevationFormat("a GeoTIFF", ".tif", _TIFF, lambda file, _: _open_rasterio(file, "GTiff")),
-    ElevationFormat("an SRTM .hgt", ".hgt", (), lambda file, _: _open_rasterio(file, "SRTMHGT")),
-    ElevationFormat("an .npz with `elevation`", ".npz", (b"PK",), open_npz),
-)
+# A file of any format.
 
 
 def open_raster(path: str, base: Path | None = None) -> RasterFile:
     """Open an elevation file or an embedded name.  Relative paths count from ``base``.
 
-    Raises TerrainError for anything that is not a file of one band in one of `FORMATS`.
+    Raises TerrainError for anything that is not a file of one band in one of `world.elevation_formats.FORMATS`.
 
     >>> open_raster("jacksboro").shape
     (344, 403)
@@ -302,7 +311,7 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
         raise TerrainError(f"{path}: terrain path: {allowed}", file=path, allowed=allowed)
     file = Path(path) if base is None else base / path
     if not file.is_file():
-        suffixes, known = _listed([one.suffix for one in FORMATS]), ", ".join(sorted(EMBEDDED))
+        suffixes, known = _listed(SUFFIXES), ", ".join(sorted(EMBEDDED))
         raise TerrainError(
             f"{file}: terrain path: no such file (a {suffixes} file, or one of: {known}){did_you_mean(path, EMBEDDED)}",
             file=file,
@@ -314,12 +323,13 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
         raise TerrainError(f"{file}: cannot be read: {error.strerror}", file=file) from error
     by_suffix = [one for one in FORMATS if not one.begins and one.suffix == file.suffix.lower()]
     for one in (*(one for one in FORMATS if head.startswith(one.begins)), *by_suffix):
-        return one.open(file, path)
+        opener: Callable[[Path, str], RasterFile] = globals()[one.opener]
+        return opener(file, path)
     expected = _listed([one.name for one in FORMATS])
     raise TerrainError(f"{file}: not an elevation file: {expected} is expected", file=file)
 
 
-def _listed(words: list[str]) -> str:
+def _listed(words: Sequence[str]) -> str:
     return f"{', '.join(words[:-1])} or {words[-1]}"
 
 

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from world.airspace.zone_files import read_zone_files
 from world.airspace.zones import Zone
 from world.airspace.zones_on_map import check_ends, make_zones
+from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
 from world.files import did_you_mean, whole_path
 from world.frames import GeoOrigin, to_geo, to_map
-from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
+from world.raster import RasterFile, open_raster, read_terrain, tile_bounds
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
 from world.scenario_tables import (
     MAX_ZONES,

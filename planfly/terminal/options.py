@@ -22,6 +22,7 @@ from planfly.terminal.arguments import (
     wind,
 )
 from planfly.terminal.command_parser import CommandParser, OptionTaker
+from world.elevation_formats import EMBEDDED, SUFFIXES
 
 Returned = TypeVar("Returned")
 
@@ -88,7 +89,8 @@ def world_options(parser: CommandParser) -> None:
 
 def terrain_option(group: OptionTaker) -> None:
     """The ground."""
-    group.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name: jacksboro")
+    suffixes, names = ", ".join(SUFFIXES), ", ".join(EMBEDDED)
+    group.add_argument("--terrain", metavar="DEM", help=f"elevation file ({suffixes}) or embedded name: {names}")
 
 
 def fence_option(group: OptionTaker) -> None:

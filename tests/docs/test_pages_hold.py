@@ -14,6 +14,7 @@ from logs.verdict.rules.registry import RULES
 from planfly.commands.registry import build_parser
 from planfly.terminal.exit_codes import EXIT_CODES
 from tests.docs.page_blocks import PAGES, ROOT
+from world.elevation_formats import SUFFIXES
 
 sys.path.insert(0, str(ROOT / "docs"))
 from making.placeholders import filled
@@ -34,6 +35,11 @@ def section(text: str, title: str) -> str:
     return re.split(r"^## ", text.split(f"\n## {title}\n", 1)[1], maxsplit=1, flags=re.MULTILINE)[0]
 
 
+def section_of_table(name: str, head: str) -> str:
+    """The rows of a page's table, known by the head of its first column."""
+    return text_of(name).split(f"\n| {head} |", 1)[1].split("\n\n", 1)[0]
+
+
 def numbers(value: object) -> list[float]:
     return list(value.values()) if isinstance(value, dict) else [float(value)]  # type: ignore[arg-type]
 
@@ -44,8 +50,7 @@ def test_every_rule_has_a_section_with_the_tolerances_that_it_uses() -> None:
         assert f"\n### {rule}\n" in page, rule
     source = (ROOT / "docs" / "verdict.md").read_text(encoding="utf-8")
     made = set(re.findall(r"^<!-- made: tolerances (\w+) -->$", source, re.MULTILINE))
-    # The landing has the take-off's table.
-    assert made == {rule.name for rule in RULES.values() if rule.tolerances} - {"landing"}
+    assert made == {rule.name for rule in RULES.values() if rule.tolerances}
 
 
 def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
@@ -62,6 +67,11 @@ def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
                 for number, degrees in re.findall(r"(-?[\d.]+(?:e[+-]?\d+)?)(°?)", shown)
             ]
             assert told == pytest.approx(numbers(getattr(tolerances, name)), rel=1e-5), name
+
+
+def test_every_elevation_format_stands_on_its_page() -> None:
+    kinds = section_of_table("your-dem.md", "kind")
+    assert [suffix for suffix in SUFFIXES if f"(`{suffix}`)" not in kinds] == []
 
 
 def test_every_command_stands_in_the_reference_with_its_options_and_what_they_do() -> None:

@@ -1,4 +1,4 @@
-"""An .npz file that is odd, damaged or too large is refused in one line."""
+"""Elevation files of every format: the same ground at the same places; the tile that we ship; odd .npz files."""
 
 import hashlib
 import math
@@ -51,7 +51,8 @@ Floats = NDArray[np.float64]
         ({"ymax": None}, "ymax: missing"),
         ({"elevation": None}, "elevation: missing"),
         ({"elevation": np.zeros(9)}, "2-D"),
-        ({"elevation": np.zeros((1, 9))}, "2-D"),
+        ({"elevation": np.zeros((1, 9))}, "at least 2 x 2"),
+        ({"elevation": np.zeros((9, 0))}, "at least 2 x 2"),
         ({"elevation": np.array([["a", "b"], ["c", "d"]])}, "2-D"),
         ({"elevation": np.zeros((3, 3), dtype=complex)}, "2-D"),
         ({"elevation": np.array([[{}, {}], [{}, {}]])}, "not a readable"),  # a pickle
@@ -77,6 +78,8 @@ def test_damaged_and_bloated_npz(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("world.raster.MAX_PIXELS", 1_000_000)
     np.savez_compressed(tmp_path / "bomb.npz", elevation=np.zeros((1001, 1000)), xmin=0, xmax=1, ymin=0, ymax=1)
     assert_refused(tmp_path / "bomb.npz", "unpacked: at most")
+    assert_refused(write_npz(tmp_path / "large.npz", elevation=np.zeros((1001, 1000), np.float32)), "pixels: 1,001,000")
+    assert read_window(write_npz(tmp_path / "fits.npz", elevation=np.zeros((1000, 1000), np.float32))).heights.size
 
 
 # ----------------------------------------------------------------------

@@ -61,7 +61,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     "a scenario's terrain": (_no_terrain, _Known("a.toml", "terrain.path", "none.tif", "")),
     "an elevation file's edges": (
         lambda: _terrain(np.zeros((9, 9)), xmax=1000.0),
-        _Known("a.npz", "xmin..ymax", [8.0, 1000.0, 46.0, 46.5], "degrees of longitude"),
+        _Known("a.npz", "west, east, south, north edge", [8.0, 1000.0, 46.0, 46.5], "degrees of longitude"),
     ),
     "an elevation file's heights": (
         lambda: _terrain(np.zeros(9)),

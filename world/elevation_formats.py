@@ -1,0 +1,32 @@
+"""The elevation files that are read, and those that we ship: lists that the command line's help reads, too.
+
+`world.raster.open_raster` opens them.
+"""
+
+from typing import NamedTuple
+
+
+class ElevationFormat(NamedTuple):
+    """A kind of elevation file.
+
+    name: in messages.
+    suffix: of its files, in lower case.
+    begins: what its files begin with, one of these; none for a kind that is known by its suffix alone.
+    opener: function of `world.raster` that opens a file by its path and the path as it was given.
+    """
+
+    name: str
+    suffix: str
+    begins: tuple[bytes, ...]
+    opener: str
+
+
+# All that are read: by what a file begins with, else by its suffix.
+FORMATS = (
+    ElevationFormat("a GeoTIFF", ".tif", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), "open_geotiff"),
+    ElevationFormat("an SRTM .hgt", ".hgt", (), "open_hgt"),
+    ElevationFormat("an .npz with `elevation`", ".npz", (b"PK",), "open_npz"),
+)
+SUFFIXES = tuple(known.suffix for known in FORMATS)
+# Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
+EMBEDDED = {"jacksboro": "jacksboro.npz"}
