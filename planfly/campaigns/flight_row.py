@@ -145,6 +145,7 @@ class Column:
 
     kind: SQLite's type and constraint.
     write, read: the field's value to the column's, and back.
+    entry: of an array's bytes (a BLOB, float32), the shape of each of its entries; () for numbers.
     same: whether the same flight has the same value whoever flew it, and however long that took.
     """
 
@@ -152,6 +153,7 @@ class Column:
     write: Callable[[Any], Any] = lambda value: value
     read: Callable[[Any], Any] = lambda value: value
     same: bool = True
+    entry: tuple[int, ...] = ()
 
 
 def _failed_text(failed: Iterable[tuple[str, Place]]) -> str:
@@ -176,7 +178,8 @@ _FAILED = Column("TEXT NOT NULL", _failed_text, failed_of)
 class FlightRow:
     """A flight in the campaign's table: each field that is ``Annotated`` with a `Column` is one.
 
-    The draw, the margins and the closeness take the columns that `COLUMNS` lists for them; tables follow from it.
+    The draw takes a column a dispersion, the margins two a rule and one for the closeness; the tables of
+    `planfly.campaigns.tables` follow from all this.
 
     ended: how, "completed" or why not.
     failed: rule and place of each finding that failed, in the verdict's order.
@@ -199,7 +202,7 @@ class FlightRow:
     duration: Annotated[float, _REAL] = 0.0
     made_of: Annotated[str, _TEXT] = field(default="", compare=False)
     clearance: Annotated[bytes, _BLOB] = b""
-    crossings: Annotated[bytes, _BLOB] = b""
+    crossings: Annotated[bytes, Column("BLOB NOT NULL", entry=(2,))] = b""
     seconds: Annotated[float, Column("REAL NOT NULL", same=False)] = 0.0
     worker: Annotated[str, Column("TEXT NOT NULL", same=False)] = ""
     narrow: tuple[NarrowPass, ...] = ()

@@ -27,7 +27,7 @@ from planfly.campaigns.statistics.decision import Tally
 from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------
-# A flight's row as values of the table's columns, and back: all follows from `FlightRow`, `RULES` and `QUANTITIES`.
+# A flight's row as values of the table's columns, and back: all follows from `FlightRow`, `RULES` and `NAMES`.
 
 # Columns that a second campaign of the same flights may have otherwise.
 NOT_THE_SAME = tuple(name for name, column in FIELDS.items() if not column.same)
@@ -463,19 +463,17 @@ def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
     Raises StoreError for a file that is none of ours or is held.
     """
     with _opened(path) as connection:
-        clearance, crossings = (_singles(connection, name) for name in SHAPES)
-    count, width = crossings.shape
-    return {"clearance": clearance, "crossings": crossings.reshape(count, width // 2, 2)}
+        return {name: _singles(connection, name, FIELDS[name].entry) for name in SHAPES}
 
 
-def _singles(connection: sqlite3.Connection, name: str) -> NDArray[np.float32]:
-    """(n, m) the arrays of a column, m the longest one's length."""
+def _singles(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) -> NDArray[np.float32]:
+    """(n, m, *entry) the arrays of a column, m the longest one's length."""
     count, size = connection.execute(f"SELECT COUNT(*), MAX(LENGTH({name})) FROM flights").fetchone()
     found = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
     for row, (data,) in zip(found, connection.execute(f"SELECT {name} FROM flights ORDER BY flight"), strict=True):
         if data:
             row[:] = np.frombuffer(data, np.float32)
-    return found
+    return found.reshape(count, found.shape[1] // math.prod(entry), *entry)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 # The probability of success behind a fixed number of flights: intervals and one-sided bounds.
 #
 # They hold for a number of flights that was fixed beforehand; where flying stops by what came out,
-# `planfly.campaigns.statistics.decision` holds.
+# the bounds of `StoppingBound` hold.
 
 
 class Interval(NamedTuple):

@@ -85,15 +85,21 @@ def made_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -
     margin = LeastMargin(1.0 if good else -1.0, "m", Place("leg", 1))
     failed = () if good else (("clearance", Place("leg", 1)),)
     return FlightRow(
-        draw, "flyable" if good else "not flyable", "completed", failed, (("clearance", margin),), 50.0 * luck, 60.0,
+        draw,
+        outcome="flyable" if good else "not flyable",
+        ended="completed",
+        failed=failed,
+        margins=(("clearance", margin),),
+        energy_left=50.0 * luck,
+        duration=60.0,
         seconds=0.01,
-    )  # fmt: skip
+    )
 
 
 def all_fly(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """A made flight that always flies."""
     draw = draw_flight(base.dispersions, base.seed, index)
-    return FlightRow(draw, "flyable", "completed", (), (), 50.0, 60.0)
+    return FlightRow(draw, "flyable", "completed", energy_left=50.0, duration=60.0)
 
 
 def slow_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
