@@ -235,7 +235,7 @@ def _page(
         failing=[row for row in rows if row.state == "fail"],
         counts=count_sentence(rows),
         flight_line=tables.flight_sentence(setup, track),
-        levels=level_rows(verdict),
+        levels=level_rows(verdict, setup.autopilot),
         rules=rule_rows(verdict.findings),
         findings=rows,
         notes=[note for note in tables.notes_of(setup) if note not in verdict.notes],

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import MissionStretch
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.imported.model_comparison import Reflight
@@ -142,11 +143,11 @@ class Badge:
     word: str
 
 
-# What each level asks, and who flies for it.
+# What each level asks, and who flies for it; "" for the flight's own autopilot.
 _LEVELS = {
     "geometry": ("Does the path ask for more than the envelope gives?", "nobody"),
     "airframe": ("Can this aircraft follow it at all?", "planfly's guidance"),
-    "autopilot": ("Does it go well with the autopilot that will fly?", "ArduPlane, by its parameters"),
+    "autopilot": ("Does it go well with the autopilot that will fly?", ""),
 }
 _SIGNS = {"pass": "✓", "fail": "✗", "unjudged": "?"}
 _WORDS = {"pass": "ok", "fail": "fails", "unjudged": "not judged"}
@@ -206,13 +207,18 @@ def badge_of(verdict: Verdict) -> Badge:
     return Badge("fail", _SIGNS["fail"], "Not flyable" if verdict.complete else "Not flyable, and incomplete")
 
 
-def level_rows(verdict: Verdict) -> list[LevelRow]:
-    """Each level that was asked, geometry first; the verdict's own is the last."""
+def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
+    """Each level that was asked, geometry first; the verdict's own is the last.
+
+    autopilot: of the flight.
+    """
+    own = autopilot.title if autopilot.parameters is None else f"{autopilot.title}, by its parameters"
     rows = []
     for level in verdict.levels:
         state = state_of(level.flyable)
         asks, flown_by = _LEVELS[level.name]
-        rows.append(LevelRow(state, f"{_SIGNS[state]} {_WORDS[state]}", level.name, asks, flown_by, level.headline))
+        sign = f"{_SIGNS[state]} {_WORDS[state]}"
+        rows.append(LevelRow(state, sign, level.name, asks, flown_by or own, level.headline))
     return rows
 
 

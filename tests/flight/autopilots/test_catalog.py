@@ -21,6 +21,7 @@ from flight.autopilots.catalog import (
     stored_name,
 )
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from flight.simulation.airborne import ProgramAutopilot
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario, with_flight
 
@@ -54,8 +55,11 @@ def test_a_scenario_names_its_autopilot() -> None:
 def test_a_name_that_is_not_listed_is_one_line() -> None:
     with pytest.raises(ScenarioError) as refused:
         load_autopilot(tight(autopilot="ardupilott"), AEROSONDE)
+    laws = [kind.name for kind in AUTOPILOTS if not issubclass(kind, ProgramAutopilot)]
+    assert laws[:2] == ["ardupilot", "ideal"]
+    expected = " or ".join(f"'{name}'" for name in laws)
     assert str(refused.value) == (
-        "tight: flight.autopilot: 'ardupilott': 'ardupilot' or 'ideal' is expected: did you mean 'ardupilot'?"
+        f"tight: flight.autopilot: 'ardupilott': {expected} is expected: did you mean 'ardupilot'?"
     )
     assert (refused.value.field, refused.value.value) == ("flight.autopilot", "ardupilott")
 

@@ -7,17 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import MissionStretch
 from logs.recording.example_log import example_log
 from logs.verdict.findings import Finding, Verdict, make_finding
 from logs.verdict.imported.flown_legs import flown_legs
 from logs.verdict.imported.model_comparison import Spread, compare_with_model
-from logs.verdict.places import FLIGHT, Change, DecidingParameter, Place
+from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, LevelName, Place
 from logs.verdict.wording import place_text
 from logs.views.report.text import (
     badge_of,
     finding_rows,
     left_lines,
+    level_rows,
     number,
     quantity,
     refly_lines,
@@ -29,6 +33,7 @@ from tests.logs.views.report.report_data import FINDINGS, finding
 from world.scenario import with_wind
 
 LEG = Place("leg", 4)
+LEVELS: tuple[LevelName, ...] = ("geometry", "airframe", "autopilot")
 DECIDING = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", LEG, -8.2)
 
 
@@ -96,6 +101,15 @@ def test_badge_states_the_verdict(
     badge = badge_of(Verdict(findings, flyable, complete, (), level))
     assert badge.word == label
     assert badge.state == ("pass" if flyable else "fail")
+
+
+def test_each_level_says_who_flies_for_it() -> None:
+    answers = tuple(LevelAnswer(name, name != "autopilot", f"{name} says") for name in LEVELS)
+    verdict = Verdict((), False, True, (), "flown", answers)
+    rows = level_rows(verdict, ArduPlane(default_parameters()))
+    assert [row.flown_by for row in rows] == ["nobody", "planfly's guidance", "ArduPlane, by its parameters"]
+    assert [row.state for row in rows] == ["pass", "pass", "fail"]
+    assert level_rows(verdict, PlanflyGuidance("path"))[-1].flown_by == "planfly's guidance"
 
 
 @given(st.floats(-1e9, 1e9))
