@@ -103,8 +103,8 @@ MASS_TOLERANCE = 0.01
 def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat_earth: bool, tried: bool) -> None:
     """Check a model, copy it into an empty folder, and load it from there: some models write into their own folder.
 
-    instance: a JSBSim instance with no model yet, made for this folder.  dt: s a step.  flat_earth, tried: see
-    `flight.dynamics.fdm.Fdm`.
+    instance: a JSBSim instance with no model yet, made for this folder.  dt: s a step.  flat_earth, tried: as
+    `Fdm` takes them.
 
     Raises FlightError for a model that is missing, refused or not loadable.
     """

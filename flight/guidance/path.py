@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# Where on a `flight.guidance.path.FlyByPath` one is, its curvature, its height: for the compiled loop.
+# Where on a `FlyByPath` one is, its curvature, its height: for the compiled loop.
 
 
 # A straight piece or an arc of the path.
@@ -146,8 +146,8 @@ CHORD = math.radians(5.0)
 class FlyByPath:
     """A path by distance along it.
 
-    pieces: (p,) of `flight.guidance.path.PIECE`, straight pieces and arcs.
-    nodes: (k,) of `flight.guidance.path.NODE`, the corners of the height profile.
+    pieces: (p,) of `PIECE`, straight pieces and arcs.
+    nodes: (k,) of `NODE`, the corners of the height profile.
     length: m.
     """
 

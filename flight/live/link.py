@@ -196,7 +196,7 @@ def read_key(path: Path) -> bytes:
 
 
 class Refused(Enum):
-    """Why a frame is not believed; see `flight.live.link.Dropped`."""
+    """Why a frame is not believed; `Dropped` counts them."""
 
     UNSIGNED = auto()
     FORGED = auto()

@@ -168,11 +168,10 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     """Mission with a scenario's area, threats and zones as its fence, its own beside, the ends as rally points; notes.
 
     The area becomes an inclusion polygon, its four corners; each missile's kill radius an exclusion circle, which has
-    no height.  Radars are no fence: being detected is not forbidden.  Zones follow as
-    `flight.mission.fences` makes them.  What is to be kept out of and ``passes`` says that the mission passes, as
-    it does above or below it, is left out: an autopilot with such a fence refuses the mission or breaks it off.  Rally
-    points are the first and last position of the mission, at the mission's height over home.  The notes say, for
-    people, what a fence cannot hold, and what was left out for it.
+    no height.  Radars are no fence: being detected is not forbidden.  Zones follow as `zone_fences` makes them.  An
+    exclusion that the mission passes above or below, as ``passes`` tells, is left out: an autopilot with such a fence
+    refuses the mission or breaks it off.  Rally points are the first and last position of the mission, at the mission's
+    height over home.  The notes say, for people, what a fence cannot hold, and what was left out for it.
 
     >>> from world.scenario import load_scenario
     >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"), lambda shape: False)

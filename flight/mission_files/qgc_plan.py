@@ -1,6 +1,6 @@
 """The `.plan` JSON form of a mission (QGroundControl's "Plan File Format"): read, and written for QGC and MAVSDK.
 
-ComplexItems are read as the simple items that they stand for (`flight.mission_files.qgc_plan`).
+ComplexItems, such as surveys, are read as the simple items that they stand for.
 """
 
 import json

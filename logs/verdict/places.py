@@ -83,7 +83,7 @@ Suggestion = tuple[Change, ...]
 class Disagreement:
     """A rule at a place that another level and the verdict judge differently.
 
-    level: the other level, a name of `logs.verdict.places.LevelName`.
+    level: the other level, a `LevelName`.
     there, here: whether it passes at that level, and in the verdict.
     """
 
