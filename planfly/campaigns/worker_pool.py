@@ -33,6 +33,7 @@ from aircraft.catalog import find_aircraft, model_hash
 from planfly import __version__
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.private_cluster import private_security
 from planfly.pipeline import Advance
 from world.errors import PlanflyError
 from world.files import temporary_folder
@@ -84,6 +85,8 @@ def kept_workers(cluster: Any, count: int, patience: float = _PATIENCE) -> Itera
 # `WorkerPool.fly` sends it again then, twice at most.
 ALLOWED_FAILURES = 2
 _CONNECT_SECONDS = 20
+# The module that scheduler and workers of our own are shut by.
+_PRIVATE = private_security.__module__
 
 
 class SchedulerError(PlanflyError):
@@ -182,13 +185,14 @@ def _local_cluster(cluster_types: Any, number: int, folder: Path) -> Any:
             processes=True,
             host="127.0.0.1",
             dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
+            security=private_security(),
+            scheduler_kwargs={"dashboard": False, "preload": [_PRIVATE]},
             worker_dashboard_address=None,
             memory_limit=0,
             silence_logs=logging.CRITICAL,
             local_directory=str(folder),
             # Imported before the scheduler knows the worker: a flight that waited for it would die with the worker.
-            preload=["planfly.campaigns.worker_pool", "scipy.stats"],
+            preload=["planfly.campaigns.worker_pool", "scipy.stats", _PRIVATE],
             # What a worker leaves that is killed goes with it, too.
             env={"TMPDIR": str(folder)},
         )

@@ -94,12 +94,12 @@ def test_each_flight_comes_back_once_and_a_foreign_worker_is_refused(
         assert sorted(one.request.index for one in flown) == list(range(12))
         for request, row in flown:
             assert same_flight(row, made_flight(base, request.index))
-            assert row.worker.startswith("tcp://127.0.0.1")
+            assert row.worker.startswith("tls://127.0.0.1")
 
         monkeypatch.setattr("planfly.campaigns.worker_pool.fingerprint", lambda name: {"planfly": "0.0.1"})
         other = WorkerPool(client, base, made_flight)
         once = iter([FlightRequest(0)])
-        with pytest.raises(WorkerError, match=r"worker tcp://127.0.0.1:\d+: planfly .* not 0.0.1 as here"):
+        with pytest.raises(WorkerError, match=r"worker tls://127.0.0.1:\d+: planfly .* not 0.0.1 as here"):
             list(other.fly(lambda: next(once, None)))
         other.close()
 
