@@ -9,12 +9,12 @@ from logs.verdict.rules import (
     clearance_rule,
     completion_rule,
     corridor_rule,
-    departure_rule,
     energy_rule,
     fence_rule,
     height_rule,
     loiter_rule,
-    px4_rule,
+    loss_of_control_rule,
+    mission_rule,
     slope_rule,
     speed_rule,
     stall_rule,
@@ -28,7 +28,7 @@ from logs.verdict.rules import (
 RULES: dict[str, Rule] = {
     rule.name: rule
     for rule in (
-        px4_rule.RULE,
+        mission_rule.RULE,
         turn_rule.RULE,
         loiter_rule.RULE,
         slope_rule.RULE,
@@ -44,7 +44,7 @@ RULES: dict[str, Rule] = {
         takeoff_landing_rule.TAKEOFF,
         takeoff_landing_rule.LANDING,
         energy_rule.RULE,
-        departure_rule.RULE,
+        loss_of_control_rule.RULE,
         completion_rule.RULE,
     )
 }

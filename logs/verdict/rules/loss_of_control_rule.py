@@ -1,4 +1,4 @@
-"""The departure rule: numbers that are none, extreme bank, too slow to fly, or ground contact."""
+"""The rule of loss of control, `departure`: numbers that are none, extreme bank, too slow to fly, or ground contact."""
 
 import math
 
