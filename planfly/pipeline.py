@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from flight.autopilots.catalog import program_autopilot
+from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
@@ -15,7 +16,7 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission
 from flight.mission.route import lay_route, make_route, with_end_courses
 from flight.mission_files.formats import mission_text
-from flight.simulation.airborne import Airborne, ProgramAutopilot
+from flight.simulation.airborne import Airborne
 from flight.simulation.setup import FDM_HZ, FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks

@@ -8,7 +8,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import Autopilot, StoredAutopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
-from flight.simulation.airborne import ProgramAutopilot
+from flight.autopilots.program import ProgramAutopilot
 from world.errors import ScenarioError
 from world.files import did_you_mean
 from world.scenario import Scenario

@@ -29,7 +29,7 @@ from typing import Protocol
 from aircraft.catalog import Aircraft
 from flight.live.telemetry import CRITICAL, Snapshot, SnapshotMaker, StatusText
 from flight.mission.items import Home, Mission
-from flight.simulation.airborne import LocalMap
+from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import TICK, Flight
 from flight.simulation.track import Rows, Track, as_track, join_rows

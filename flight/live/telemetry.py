@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.mission.items import Home
-from flight.simulation.airborne import LocalMap
+from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import THROTTLE, TRACK_ROW
 from world.frames import GeoOrigin, to_geo

@@ -145,7 +145,7 @@ class ImportedLog:
     heights: which was taken.
     wind: where the wind is from: "XKF2", "" for none.
     mission: where the mission is from: "CMD of the log, at 22.4 s", or a file.
-    missing: items of that mission that the log does not hold; None where it is judged whole.
+    missing: items of that mission that the log does not hold; None where it is judged in full.
     plan_heights: whether the mission states heights.
     aircraft_known: whether the aircraft was named; if not, none of its limits count.
     gaps: pauses between rows, over the whole of what was imported.

@@ -13,7 +13,8 @@ from flight.dynamics.jsbsim_properties import Getter, Setter
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
-from flight.simulation.airborne import Airborne, LocalMap
+from flight.simulation.airborne import Airborne
+from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import Rows, Track, as_track, join_rows

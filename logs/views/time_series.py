@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
-from flight.simulation.airborne import control_limits, held_at_limit
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track
+from flight.simulation.track import Track, control_limits, held_at_limit
 from logs.views.charts import Chart, Floats, Panel, filled_series, held_band, leg_marks, series, shorten
 from world.geometry import segment_exposure
 from world.kernels import compiled

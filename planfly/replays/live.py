@@ -23,7 +23,7 @@ from flight.live.telemetry import (
     telemetry_message,
 )
 from flight.mission.items import Home
-from flight.simulation.airborne import LocalMap
+from flight.simulation.local_map import LocalMap
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog, LogChannel, LogMessage, log_channels, log_messages
 from logs.recording.state_channel import EPOCH_NS

@@ -44,7 +44,7 @@ STAGES = (
     "flight.mission.route:lay_route",
     "planfly.pipeline:make_setup",
     "flight.guidance.path:fly_by_path",
-    "flight.simulation.airborne:LocalMap.around",
+    "flight.simulation.local_map:LocalMap.around",
     "flight.simulation.simulate:fly_to_end",
     "logs.verdict.judge_flight:judge_flight",
     "logs.verdict.judge_flight:judge_geometry",

@@ -9,7 +9,7 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.autopilot import AutopilotProgram, StoredAutopilot, describe_program
-from flight.simulation.airborne import ProgramAutopilot, ProgramFlight
+from flight.autopilots.program import ProgramAutopilot, ProgramFlight
 from flight.simulation.setup import FlightSetup
 
 

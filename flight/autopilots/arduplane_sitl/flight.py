@@ -32,9 +32,10 @@ from flight.autopilots.arduplane_sitl.process import (
     person_parameters,
 )
 from flight.autopilots.autopilot import AutopilotProgram
+from flight.autopilots.program import ProgramFlight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import profile, project
-from flight.simulation.airborne import Ground, ProgramFlight
+from flight.simulation.local_map import Ground
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Progress, SimulatedFlight, Sink, fly_to_end
 from flight.simulation.tick import (

@@ -25,7 +25,7 @@ from flight.live.telemetry import (
     telemetry_message,
 )
 from flight.mission.items import OVER_HOME, Home
-from flight.simulation.airborne import LocalMap
+from flight.simulation.local_map import LocalMap
 from flight.simulation.track import PITCH, ROLL, THROTTLE, YAW, track_rows
 from logs.recording.reader import FlightLog
 from logs.recording.state_channel import EPOCH_NS, FIELDS

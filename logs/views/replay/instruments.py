@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.simulation.airborne import control_limits
+from flight.simulation.track import control_limits
 from logs.recording.reader import FlightLog
 from logs.views.replay.timeline import TimelineEntry, log_with_legs, timeline_of_legs, waypoint_name
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.simulation.airborne import control_limits, held_at_limit
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track
+from flight.simulation.track import Track, control_limits, held_at_limit
 from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns

@@ -21,7 +21,7 @@ from flight.autopilots.catalog import (
     stored_name,
 )
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
-from flight.simulation.airborne import ProgramAutopilot
+from flight.autopilots.program import ProgramAutopilot
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario, with_flight
 

@@ -23,7 +23,7 @@ from flight.live.flight_process import (
 )
 from flight.live.telemetry import Snapshot
 from flight.mission.items import Mission
-from flight.simulation.airborne import LocalMap
+from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.mission_lines import setup_of, wp

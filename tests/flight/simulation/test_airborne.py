@@ -1,82 +1,16 @@
-"""The controls' limits, and the rows at which one is asked for all that it gives."""
+"""An aircraft in the air: where its route has it start, and how long it may take."""
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.guidance.gains import load_gains
-from flight.simulation.airborne import PATIENCE, PATIENCE_SECONDS, Airborne, LocalMap, control_limits, held_at_limit
-from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE, TRACK_ROW, Track, as_track
-from tests.setups import MakeSetup, setup_maker
+from flight.simulation.airborne import PATIENCE, PATIENCE_SECONDS, Airborne
+from tests.setups import setup_maker
 from world.errors import FlightError
-from world.frames import GeoOrigin, to_map
-
-
-def commanded(column: int, *values: float) -> Track:
-    rows: Any = np.zeros(len(values), TRACK_ROW)
-    rows["commands"][:, column] = values
-    return as_track(rows)
-
-
-def test_limits_stand_in_the_order_of_the_commands() -> None:
-    # 30 degrees of each surface: aircraft/aerosonde/aerosonde.toml.
-    named = control_limits("aerosonde")
-    assert [name for name, _ in named] == ["elevator", "aileron", "rudder", "throttle"]
-    assert [limit for _, limit in named[:3]] == pytest.approx([math.radians(30.0)] * 3, abs=1e-3)
-    assert named[THROTTLE] == ("throttle", 1.0)
-
-
-def test_an_unknown_aircraft_has_a_throttle_and_no_limits() -> None:
-    named = dict(control_limits("zeppelin"))
-    assert named["throttle"] == 1.0
-    assert all(math.isnan(named[name]) for name in ("elevator", "aileron", "rudder"))
-
-
-@pytest.mark.parametrize("column", [ELEVATOR, AILERON, RUDDER])
-def test_a_surface_is_held_at_either_limit_or_beyond(column: int) -> None:
-    # Within a thousandth of the range, which is 1 here.
-    track = commanded(column, -0.6, -0.5, -0.4995, -0.498, 0.0, 0.498, 0.4995, 0.5, 0.6)
-    assert held_at_limit(track, column, -0.5, 0.5).tolist() == [True] * 3 + [False] * 3 + [True] * 3
-    other = AILERON if column == ELEVATOR else ELEVATOR
-    assert not held_at_limit(track, other, -0.5, 0.5).any()
-
-
-def test_a_throttle_is_held_closed_and_open() -> None:
-    track = commanded(THROTTLE, 0.0, 0.002, 0.5, 0.998, 1.0)
-    assert held_at_limit(track, THROTTLE, 0.0, 1.0).tolist() == [True, False, False, False, True]
-
-
-def test_unknown_limits_hold_nothing() -> None:
-    assert not held_at_limit(commanded(ELEVATOR, -9.0, 0.0, 9.0), ELEVATOR, math.nan, math.nan).any()
-
-
-# ----------------------------------------------------------------------
-# The local map projection against the map that it copies.
-
-
-@pytest.mark.parametrize("origin", [GeoOrigin(36.6, -84.2), GeoOrigin(70.0, 179.0), GeoOrigin(-45.0, 10.0)])
-def test_positions_and_the_course_of_north_are_the_maps(make_setup: MakeSetup, origin: GeoOrigin) -> None:
-    at = {"lat_deg": origin.lat_deg, "lon_deg": origin.lon_deg}
-    setup = make_setup([[-15000, 0, 500], [15000, 9000, 500]], origin=at)
-    local = LocalMap.around(setup)
-    lat = origin.lat_deg + np.linspace(-0.05, 0.1, 40)
-    lon = origin.lon_deg + np.linspace(-0.2, 0.15, 40)
-    east, north = to_map(origin, lat, lon)
-    got = local.position(np.radians(lat), np.radians(lon))
-    assert np.hypot(got[0] - east, got[1] - north).max() < 1e-3
-    # Map course of true north, by a step of a hundredth of a second of arc to the north.
-    ahead_e, ahead_n = to_map(origin, lat + 1e-4, lon)
-    back_e, back_n = to_map(origin, lat - 1e-4, lon)
-    turn = local.angle(np.radians(lat), np.radians(lon))[0]
-    assert turn == pytest.approx(np.arctan2(ahead_e - back_e, ahead_n - back_n), abs=1e-7)
-
-
-# ----------------------------------------------------------------------
-# An aircraft in the air: where its route has it start, and how long it may take.
 
 AEROSONDE = load_aircraft("aerosonde")
 MAKE = setup_maker(AEROSONDE)

@@ -1,9 +1,11 @@
 """Tracks and their rows: types, and a resolution that is kept once and for all."""
 
 import csv
+import math
 import sys
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,13 +14,19 @@ import pytest
 from pyarrow import parquet
 
 from flight.simulation.track import (
+    AILERON,
     COLUMN_NAMES,
     COLUMNS,
     DIGITS,
+    ELEVATOR,
+    RUDDER,
+    THROTTLE,
     TRACK_ROW,
     Rows,
     Track,
     as_track,
+    control_limits,
+    held_at_limit,
     join_tracks,
     quantised,
     track_columns,
@@ -163,3 +171,45 @@ def test_a_notebook_shows_what_each_column_spans(track: Track) -> None:
     assert rows["clearance_seen_m"][2:] == [f"{seen.min():.6g}", f"{seen.max():.6g}"]
     assert len(rows) == 35
     assert ElementTree.fromstring(join_tracks([])._repr_html_()).findtext("strong") == "Track: no rows"
+
+
+# ----------------------------------------------------------------------
+# The controls' limits, and the rows at which one is asked for all that it gives.
+
+
+def commanded(column: int, *values: float) -> Track:
+    rows: Any = np.zeros(len(values), TRACK_ROW)
+    rows["commands"][:, column] = values
+    return as_track(rows)
+
+
+def test_limits_stand_in_the_order_of_the_commands() -> None:
+    # 30 degrees of each surface: aircraft/aerosonde/aerosonde.toml.
+    named = control_limits("aerosonde")
+    assert [name for name, _ in named] == ["elevator", "aileron", "rudder", "throttle"]
+    assert [limit for _, limit in named[:3]] == pytest.approx([math.radians(30.0)] * 3, abs=1e-3)
+    assert named[THROTTLE] == ("throttle", 1.0)
+
+
+def test_an_unknown_aircraft_has_a_throttle_and_no_limits() -> None:
+    named = dict(control_limits("zeppelin"))
+    assert named["throttle"] == 1.0
+    assert all(math.isnan(named[name]) for name in ("elevator", "aileron", "rudder"))
+
+
+@pytest.mark.parametrize("column", [ELEVATOR, AILERON, RUDDER])
+def test_a_surface_is_held_at_either_limit_or_beyond(column: int) -> None:
+    # Within a thousandth of the range, which is 1 here.
+    track = commanded(column, -0.6, -0.5, -0.4995, -0.498, 0.0, 0.498, 0.4995, 0.5, 0.6)
+    assert held_at_limit(track, column, -0.5, 0.5).tolist() == [True] * 3 + [False] * 3 + [True] * 3
+    other = AILERON if column == ELEVATOR else ELEVATOR
+    assert not held_at_limit(track, other, -0.5, 0.5).any()
+
+
+def test_a_throttle_is_held_closed_and_open() -> None:
+    track = commanded(THROTTLE, 0.0, 0.002, 0.5, 0.998, 1.0)
+    assert held_at_limit(track, THROTTLE, 0.0, 1.0).tolist() == [True, False, False, False, True]
+
+
+def test_unknown_limits_hold_nothing() -> None:
+    assert not held_at_limit(commanded(ELEVATOR, -9.0, 0.0, 9.0), ELEVATOR, math.nan, math.nan).any()

@@ -1,0 +1,109 @@
+"""The map and the ground around one flight, as the compiled loop needs them.
+
+JSBSim gives latitudes and longitudes; everything else knows positions on the map.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.setup import FlightSetup
+from world.errors import FlightError
+from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo, to_map
+from world.terrain import Heights, Terrain
+
+Floats = NDArray[np.float64]
+
+# The local map extends this far (m) beyond the area and the route.
+MAP_BUFFER = 5000.0
+# Worst error of the local map that a flight accepts, m and rad.
+WORST = (0.01, 1e-6)
+
+
+@dataclass(frozen=True, slots=True)
+class LocalMap:
+    """From geodetic radians to the map, fitted around one flight: a copy of the projection that compiled code takes.
+
+    position: (latitude, longitude) to (east, north).
+    angle: (latitude, longitude) to the map course of true north (rad), and 0.
+    middle: longitude of its middle, rad; longitudes are taken within half a turn of it.
+    """
+
+    position: PolyMap
+    angle: PolyMap
+    middle: float
+
+    @staticmethod
+    def around(setup: FlightSetup) -> "LocalMap":
+        """Fit the area and the route with `MAP_BUFFER` around them; 0.1 mm and 1e-9 rad on areas up to 600 km wide.
+
+        Raises FlightError where the map cannot be fitted: an area about a pole.
+        """
+        origin: GeoOrigin = setup.scenario.origin
+        points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
+        low, high = points.min(axis=0) - MAP_BUFFER, points.max(axis=0) + MAP_BUFFER
+        outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
+        lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
+        # Longitudes about the origin's, so that an area may lie across the 180th meridian.
+        here = math.radians(origin.lon_deg)
+        lon = here + (lon - here + math.pi) % (2.0 * math.pi) - math.pi
+        bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
+        if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
+            raise FlightError(f"{setup.mission.source}: the area lies about a pole", file=setup.mission.source)
+
+        def position(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+            return to_map(origin, np.degrees(phi), np.degrees(lam))
+
+        def angle(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+            step = 1e-5
+            east0, north0 = position(phi - step, lam)
+            east1, north1 = position(phi + step, lam)
+            return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(phi)
+
+        middle = float((bounds[1, 0] + bounds[1, 1]) / 2)
+        local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), middle)
+        if not (local.position.residual <= WORST[0] and local.angle.residual <= WORST[1]):
+            raise FlightError(
+                f"{setup.mission.source}: the area is too large to fly in: its map is out by"
+                f" {local.position.residual:.2g} m; {WORST[0]:g} m is allowed",
+                file=setup.mission.source,
+            )
+        return local
+
+    def convergence(self, lat_deg: float, lon_deg: float) -> float:
+        """Map course of true north at a position, rad."""
+        lon = self.middle + math.remainder(math.radians(lon_deg) - self.middle, 2.0 * math.pi)
+        return float(self.angle(math.radians(lat_deg), lon)[0])
+
+
+class Ground:
+    """Terrain for the compiled tick; unknown ground is a raster without data.
+
+    known: whether there is terrain.  heights: (rows, cols) m.  to_pixel: from the map to the raster.
+    """
+
+    def __init__(self, terrain: Terrain | None) -> None:
+        self.known = terrain is not None
+        self.terrain = terrain
+        self.heights: Heights
+        if terrain is None:
+            self.heights, self.to_pixel = np.full((2, 2), np.nan, dtype=np.float32), _off_the_raster()
+            # Locked like a terrain's: a compiled function has one type for locked arrays and one for others.
+            self.heights.setflags(write=False)
+        else:
+            self.heights, self.to_pixel = terrain.heights, terrain.to_pixel
+
+    def height(self, east: float, north: float) -> float:
+        """Ground height at a map position, m; NaN where it is unknown."""
+        return math.nan if self.terrain is None else float(self.terrain.height(east, north))
+
+
+def _off_the_raster() -> PolyMap:
+    """Make a map that takes every position to a pixel that no raster has."""
+
+    def nowhere(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        return np.full_like(x, -9.0), np.full_like(y, -9.0)
+
+    return fit_polymap(nowhere, [[-1.0, 1.0], [-1.0, 1.0]], 1e-6)

@@ -1,0 +1,92 @@
+"""How a flight starts: where, how fast and on which slope its route begins, and the aircraft trimmed there."""
+
+import math
+from dataclasses import dataclass
+
+from aircraft.catalog import Aircraft
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import Trim
+from flight.simulation.local_map import Ground, LocalMap
+from flight.simulation.setup import FlightSetup
+from world.errors import FlightError, StartError
+from world.frames import to_geo
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where and how a route begins.
+
+    lat_deg, lon_deg: geodetic.  amsl, ground: m.
+    course: true, of the first leg, rad.  slope: of the first leg, rad.
+    airspeed: m/s, true.
+    wind: (3,) m/s, north, east, down, the way the air moves.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    amsl: float
+    course: float
+    slope: float
+    airspeed: float
+    wind: tuple[float, float, float]
+    ground: float
+
+
+def find_start(
+    setup: FlightSetup,
+    local_map: LocalMap,
+    ground: Ground,
+    aircraft: Aircraft,
+    airspeed: float,
+    offset: tuple[float, float, float],
+) -> Start:
+    """Where the route begins.
+
+    airspeed: of the first leg, m/s.  offset: east, north and up from the first waypoint to the start, m.
+
+    Raises StartError for a place that is not above the terrain.
+    """
+    points = setup.route.waypoints
+    east, north, up = (float(value + off) for value, off in zip(points[0], offset, strict=True))
+    under = ground.height(east, north)
+    if not math.isnan(under) and up <= under:
+        reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+        raise StartError(setup.mission.source, reason, field="start", value=up)
+    lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
+    step = points[1] - points[0]
+    # A map course is the true course and this.
+    turn = local_map.convergence(lat, lon)
+    # A speed or a first slope that the aircraft cannot hold is the verdict's business, not the start's: it starts
+    # at the nearest speed it can, and level.
+    east_wind, north_wind = setup.scenario.wind.at(up)
+    cos, sin = math.cos(turn), math.sin(turn)
+    return Start(
+        lat_deg=lat,
+        lon_deg=lon,
+        amsl=up,
+        course=math.atan2(step[0], step[1]) - turn,
+        slope=math.atan2(step[2], math.hypot(step[0], step[1])),
+        airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, airspeed)),
+        wind=(north_wind * cos + east_wind * sin, east_wind * cos - north_wind * sin, 0.0),
+        ground=min(0.0, up - 1000.0) if math.isnan(under) else under,
+    )
+
+
+def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
+    """Begin trimmed on the start's slope if the aircraft can hold it, else level.
+
+    Raises StartError, which names the mission's file, ``source``.
+    """
+    begin = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
+    try:
+        trimmed = fdm.start(*begin, start.slope, start.wind, start.ground)
+    except FlightError:
+        try:
+            trimmed = fdm.start(*begin, 0.0, start.wind, start.ground)
+        except FlightError as error:
+            known = {"field": error.field, "value": error.value, "allowed": error.allowed}
+            raise StartError(source, str(error), **known) from error
+    # All that blows is set as a gust.
+    fdm.set_wind(0.0, 0.0, 0.0)
+    fdm.set_gust(*start.wind)
+    return trimmed
