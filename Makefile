@@ -49,7 +49,7 @@ bench: $(TESTED)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
 	$(BIN)/python -m benchmarks
 
-# Full counts.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of most.
+# Full counts.  The figures of all tests go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of most.
 # make soak GO_ON=1: go on with one that was stopped, of the same sources.
 SOAKED := PLANFLY_SOAK=1 PLANFLY_SOAK_WHOLE=1
 soak: $(TESTED) clients docs

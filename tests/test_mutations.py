@@ -35,7 +35,7 @@ def test_two_hundred_of_them_are_the_same_each_time_and_of_all_rooms() -> None:
     assert chosen == chosen_mutants(200)
     assert len(set(chosen)) == 200
     assert set(listed_mutants()) < set(chosen)
-    assert {mutant.room for mutant in chosen} == {"limits", "rules", "measures", "physics"}
+    assert {mutant.part for mutant in chosen} == {"limits", "rules", "measures", "physics"}
 
 
 def test_a_modules_own_tests_come_first_and_its_limits_are_found_where_they_are_used() -> None:

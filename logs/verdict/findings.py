@@ -128,7 +128,7 @@ class Verdict:
 
     def __repr__(self) -> str:
         answer = "flyable" if self.flyable else "not flyable" if self.complete else "incomplete"
-        answer = "not judged whole" if self.undecided else answer
+        answer = "not judged in full" if self.undecided else answer
         return f"<Verdict {self.level}: {answer}; {len(self.findings)} findings, {len(self.failed)} failed>"
 
     def _repr_html_(self) -> str:

@@ -76,7 +76,9 @@ def test_every_elevation_format_stands_on_its_page() -> None:
 
 def test_every_command_stands_in_the_reference_with_its_options_and_what_they_do() -> None:
     page = text_of("commands.md")
+    rows = section_of_table("commands.md", "command")
     for name, parser in build_parser().commands.items():
+        assert re.search(rf"^\| `planfly {name}\b", rows, re.MULTILINE), name
         part = section(page, name)
         defined = " ".join(re.findall(r"^`(.*)`$", part, re.MULTILINE))
         assert [option for option in parser.options() if option not in defined] == [], name

@@ -1,7 +1,7 @@
 """``python -m tests.mutations``: change the verdict's sources and the physics a little at a time, and see tests fail.
 
 Each mutant is tried in a copy of the sources with the tests that cover it, two at a time; the list and its order are
-the same each time.  Printed: killed and alive by room; ``runs/mutations.json`` holds every trial as it ends, so that
+the same each time.  Printed: killed and alive by part; ``runs/mutations.json`` holds every trial as it ends, so that
 ``--go-on`` goes on with a run of the same sources that was stopped.  Exit code 1 where more than `MAX_SURVIVAL` of them
 survive, or any change of a limit.
 """
@@ -18,7 +18,7 @@ from dataclasses import asdict
 from pathlib import Path
 from queue import SimpleQueue
 
-from tests.mutations.choice import ROOMS, chosen_mutants
+from tests.mutations.choice import PARTS, chosen_mutants
 from tests.mutations.covering import covering_tests, kernels_on, limits_at
 from tests.mutations.mutant import ROOT, Mutant
 from tests.mutations.workplace import Trial, Workplace
@@ -34,7 +34,7 @@ def main() -> int:
     """Try mutants out; the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutations", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=200, help="how many mutants (0: all; default 200)")
-    parser.add_argument("--room", action="append", choices=ROOMS, help="may be given more than once; default: all")
+    parser.add_argument("--part", action="append", choices=PARTS, help="may be given more than once; default: all")
     parser.add_argument("--match", default="", help="only mutants of files or texts with this in them")
     parser.add_argument("--at-once", type=int, default=2, help="how many are tried at the same time (2)")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds after which a mutant counts as noticed")
@@ -42,7 +42,7 @@ def main() -> int:
     parser.add_argument("--go-on", action="store_true", help=f"try only what {TARGET} does not hold for these sources")
     parser.add_argument("--list", action="store_true", help="list the mutants and try none")
     args = parser.parse_args()
-    chosen = chosen_mutants(None if args.match else args.count or None, args.room or ROOMS)
+    chosen = chosen_mutants(None if args.match else args.count or None, args.part or PARTS)
     mutants = [mutant for mutant in chosen if args.match in _text(mutant)][: args.count or None]
     if args.list:
         for mutant in mutants:
@@ -104,15 +104,15 @@ def _tried(mutants: list[Mutant], known: list[Trial], folder: Path, at_once: int
 def _report(trials: list[Trial]) -> int:
     """Print and write what became of the mutants; the exit code."""
     alive = [trial for trial in trials if trial.status == "alive"]
-    rooms = Counter((trial.mutant.room, trial.status == "alive") for trial in trials)
+    parts = Counter((trial.mutant.part, trial.status == "alive") for trial in trials)
     print()
-    for room in sorted({trial.mutant.room for trial in trials}):
-        print(f"{room:10} {rooms[room, False]:4d} killed {rooms[room, True]:4d} alive")
+    for part in sorted({trial.mutant.part for trial in trials}):
+        print(f"{part:10} {parts[part, False]:4d} killed {parts[part, True]:4d} alive")
     for trial in alive:
         print(f"alive: {_text(trial.mutant)}")
     _keep(trials)
     print(f"written to {TARGET}")
-    limits = any(trial.mutant.room == "limits" for trial in alive)
+    limits = any(trial.mutant.part == "limits" for trial in alive)
     return int(limits or len(alive) > MAX_SURVIVAL * len(trials))
 
 
@@ -131,8 +131,8 @@ def _line(mutant: Mutant) -> int:
 
 
 def _text(mutant: Mutant) -> str:
-    limits = f"{', '.join(limits_at(mutant))}: " if mutant.room == "limits" else ""
-    return f"{mutant.room:9}{mutant.file}:{_line(mutant)}: {limits}{_short(mutant.old)} -> {_short(mutant.new)}"
+    limits = f"{', '.join(limits_at(mutant))}: " if mutant.part == "limits" else ""
+    return f"{mutant.part:9}{mutant.file}:{_line(mutant)}: {limits}{_short(mutant.old)} -> {_short(mutant.new)}"
 
 
 def _short(text: str) -> str:

@@ -9,8 +9,8 @@ from pathlib import Path
 from tests.mutations.mutant import ROOT, Mutant
 
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
-# Beside the tests of its own name: where what a room's modules do shows.
-ROOM_TESTS: dict[str, tuple[str, ...]] = {
+# Beside the tests of its own name: where what a part's modules do shows.
+PART_TESTS: dict[str, tuple[str, ...]] = {
     "rules": ("tests/logs/verdict",),
     "measures": ("tests/logs/verdict",),
     "physics": ("tests/flight/simulation/test_tick.py", "tests/flight/dynamics/test_fdm.py"),
@@ -22,8 +22,8 @@ def covering_tests(mutant: Mutant) -> list[list[str]]:
 
     First those of the module's own name, of a limit those with its pair of cases; then the rest.
     """
-    if mutant.room != "limits":
-        own, rest = _own_tests(mutant.file), [place for place in ROOM_TESTS[mutant.room] if (ROOT / place).exists()]
+    if mutant.part != "limits":
+        own, rest = _own_tests(mutant.file), [place for place in PART_TESTS[mutant.part] if (ROOT / place).exists()]
         return [stage for stage in (own, rest) if stage]
     # A limit's pair of cases stands with a module that reads it, or with a rule that uses that module.
     users = _users(limits_at(mutant))
@@ -39,7 +39,7 @@ def kernels_on(mutant: Mutant) -> list[str]:
     Numba compiles a cached kernel anew when its own file changes, not when a constant or a kernel of another does.
     """
     file = mutant.file
-    ahead = _users(limits_at(mutant)) if mutant.room == "limits" else [file]
+    ahead = _users(limits_at(mutant)) if mutant.part == "limits" else [file]
     seen = {file, *ahead}
     while ahead:
         for user in sorted(_importers()[ahead.pop()]):

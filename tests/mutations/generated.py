@@ -48,17 +48,17 @@ def limit_mutants() -> list[Mutant]:
     return found
 
 
-def walked_mutants(room: str, file: str) -> list[Mutant]:
+def walked_mutants(part: str, file: str) -> list[Mutant]:
     """Mutants of a module's code: comparisons, signs, choices and truths turned round, numbers half as large again."""
-    source = _Source(room, file)
+    source = _Source(part, file)
     return [mutant for node in _code(source.tree) for mutant in _of_node(source, node)]
 
 
 class _Source:
     """A file's bytes and tree."""
 
-    def __init__(self, room: str, file: str) -> None:
-        self.room, self.file = room, file
+    def __init__(self, part: str, file: str) -> None:
+        self.part, self.file = part, file
         self.data = (ROOT / file).read_bytes()
         self.tree = ast.parse(self.data)
         self.starts = [0, *accumulate(len(line) for line in self.data.splitlines(keepends=True))]
@@ -73,7 +73,7 @@ class _Source:
         return self.between(*self.span(node), new)
 
     def between(self, start: int, stop: int, new: str) -> Mutant:
-        return Mutant(self.room, self.file, start, stop, self.data[start:stop].decode(), new)
+        return Mutant(self.part, self.file, start, stop, self.data[start:stop].decode(), new)
 
     def operator(self, left: ast.expr, right: ast.expr, old: str, new: str) -> Mutant:
         """The operator that stands between two nodes replaced, with both of them for what it says."""

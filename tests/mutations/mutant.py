@@ -11,13 +11,13 @@ ROOT = Path(__file__).parents[2]
 class Mutant:
     """A piece of a file replaced by another.
 
-    room: "limits", "rules", "measures" or "physics".
+    part: "limits", "rules", "measures" or "physics".
     file: relative to the repository.
     start, stop: bytes of the file that are replaced.
     old, new: the text there, and what stands in its place.
     """
 
-    room: str
+    part: str
     file: str
     start: int
     stop: int
@@ -41,10 +41,10 @@ class Mutant:
         return hashlib.sha256(place).hexdigest()
 
 
-def replacing(room: str, file: str, old: str, new: str) -> Mutant:
+def replacing(part: str, file: str, old: str, new: str) -> Mutant:
     """The mutant that puts ``new`` in place of ``old``.  Raises ValueError unless the file has ``old`` exactly once."""
     source = (ROOT / file).read_bytes()
     if source.count(old.encode()) != 1:
         raise ValueError(f"{file}: {source.count(old.encode())} times instead of once: {old!r}")
     start = source.index(old.encode())
-    return Mutant(room, file, start, start + len(old.encode()), old, new)
+    return Mutant(part, file, start, start + len(old.encode()), old, new)

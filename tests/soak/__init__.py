@@ -1,4 +1,4 @@
-"""Full counts with PLANFLY_SOAK=1, and one file with the figures of all rooms: build/soak.json.
+"""Full counts with PLANFLY_SOAK=1, and one file with the figures of all packages: build/soak.json.
 
 A soak takes hours.  ``make soak GO_ON=1`` goes on with one that was stopped: files of tests that passed as a whole,
 with these very sources, are not run again, and what a file had noted before it was cut off is taken out.
@@ -24,7 +24,7 @@ _SOURCES = ("*.py", "*.toml", "*.txt", "*.xml", "*.js", "*.html")
 # Rows with a figure of each file, or of each test.
 SECONDS, CORE_SECONDS = "seconds by the clock", "seconds of a core"
 _SHARED = (PASSED_WITH, SECONDS, CORE_SECONDS)
-_ROOMS = ("aircraft", "flight", "logs", "planfly", "planner", "tests", "world")
+_PACKAGES = ("aircraft", "flight", "logs", "planfly", "planner", "tests", "world")
 
 
 def scaled(full: int, few: int) -> int:
@@ -85,8 +85,8 @@ def sources() -> str:
 
 def source_files() -> list[Path]:
     """What the hash is made of."""
-    rooms = [path for room in _ROOMS for kind in _SOURCES for path in (ROOT / room).rglob(kind)]
-    return sorted([*rooms, ROOT / "pyproject.toml", ROOT / "constraints.txt"])
+    found = [path for package in _PACKAGES for kind in _SOURCES for path in (ROOT / package).rglob(kind)]
+    return sorted([*found, ROOT / "pyproject.toml", ROOT / "constraints.txt"])
 
 
 def _change(row: str, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:

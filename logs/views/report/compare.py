@@ -11,9 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from flight.simulation.airborne import control_limits, held_at_limit
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track
+from flight.simulation.track import Track, control_limits, held_at_limit
 from logs.recording.reader import FlightLog
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
@@ -210,7 +209,7 @@ def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
 
 def _label(verdict: Verdict) -> str:
     if verdict.undecided:
-        return "not judged whole"
+        return "not judged in full"
     return "flyable" if verdict.flyable else "not flyable" if verdict.complete else "incomplete"
 
 

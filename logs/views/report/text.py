@@ -200,7 +200,7 @@ def badge_of(verdict: Verdict) -> Badge:
     if verdict.level == "plan":
         return Badge("fail", _SIGNS["fail"], "Not flyable: no feasible plan")
     if verdict.undecided:
-        return Badge("fail", _SIGNS["unjudged"], "Not judged whole")
+        return Badge("fail", _SIGNS["unjudged"], "Not judged in full")
     broken = {finding.rule for finding in verdict.findings if finding.ok is False} - {"completion"}
     if not broken and not verdict.complete:
         return Badge("fail", "!", "Incomplete, so not flyable")

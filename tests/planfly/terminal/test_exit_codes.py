@@ -14,9 +14,9 @@ MEANT = {
     "flyable": exit_codes.FLYABLE,
     "internal or system error": exit_codes.FAULT,
     "incorrect usage or invalid input": exit_codes.BAD_INPUT,
-    "finished with a reported loss": exit_codes.LOSS,
+    "finished, but data of a damaged log is lost": exit_codes.LOSS,
     "not flyable, or no feasible plan": exit_codes.NOT_FLYABLE,
-    "and 143 ended by SIGINT (Ctrl-C) and SIGTERM": exit_codes.INTERRUPTED,
+    "stopped by SIGINT (Ctrl-C), 143 by SIGTERM": exit_codes.INTERRUPTED,
 }
 
 
