@@ -1,6 +1,7 @@
 """A recorded flight again: as a timeline, as instruments, as a film, in Foxglove and in ground stations."""
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from world.errors import LogError
 
 # Numbers that may be meant as ports that ground stations listen at.
 _PORTS = range(1024, 65536)
+# A scheme, a name in small letters, as browsers write it, and a port.
+_ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9._\[\]:-]+")
 # Seconds to wait for a ground station unless another time is given.
 _STATION_PATIENCE = 10.0
 
@@ -113,6 +116,7 @@ def play_to_foxglove(
     end: float | None = None,
     speed: float | None = None,
     port: int = 8765,
+    allow_origin: str | Sequence[str] = (),
     wait: float | None = None,
     stop: Callable[[], bool] = _never,
     on_message: Callable[[str], None] = _ignore,
@@ -121,6 +125,8 @@ def play_to_foxglove(
 
     start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
     port: 0 for any that is free.  wait: for the first viewer, s; None without end.
+    allow_origin: web pages that may connect beside Foxglove's own, each as "https://HOST"; several are a sequence, or
+    separated by commas.
     stop: asked all the time; once it is true the call returns.  on_message: called with the address.
     Raises a `planfly.PlanflyError` for bad input, and where nobody subscribes in time.
     """
@@ -128,11 +134,22 @@ def play_to_foxglove(
     from planfly.replays import live
 
     check_arguments(speed=speed, port=port, wait=wait)
+    given = allow_origin.split(",") if isinstance(allow_origin, str) else allow_origin
+    allowed = [_origin(one.strip()) for one in given if one.strip()]
     found = _opened(log)
     first, last = replayed_part(found, start, end)
     live.play_to_foxglove(
-        found, first, last, speed=speed or 1.0, port=port, wait=wait, stopped=stop, on_message=on_message
-    )
+        found, first, last, speed=speed or 1.0, port=port, allowed=allowed, wait=wait, stopped=stop,
+        on_message=on_message,
+    )  # fmt: skip
+
+
+def _origin(text: str) -> str:
+    """The origin of web pages, as browsers state it.  Raises LogError for what is none."""
+    if not _ORIGIN.fullmatch(text):
+        allowed = "the origin of a web page is expected, such as https://example.com or http://localhost:8080"
+        raise LogError.of_argument("allow_origin", text, allowed)
+    return text
 
 
 @with_warm_up()

@@ -71,6 +71,9 @@ def replay_options(line: LineParser) -> None:
         "--port", metavar="N", type=number("port"), default=8765, help="of --foxglove (default: 8765; 0: any)"
     )
     other.add_argument(
+        "--allow-origin", metavar="URL,URL", help="web pages that --foxglove lets in beside Foxglove's (https://HOST)"
+    )
+    other.add_argument(
         "--wait", metavar="S", type=number("wait"),
         help="wait S seconds for a ground station (default: 10) or for Foxglove (default: forever)",
     )  # fmt: skip

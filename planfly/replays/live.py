@@ -1,8 +1,9 @@
 """A log played as if it were flown now: to Foxglove on this machine, and into ground stations."""
 
+import contextlib
 import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -27,7 +28,9 @@ from flight.simulation.local_map import LocalMap
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog, LogChannel, LogMessage, log_channels, log_messages
 from logs.recording.state_channel import EPOCH_NS
+from planfly.certificates import temporary_certificate
 from planfly.open_mission import CUT_SHORT
+from planfly.replays.origin_gate import HOST, VIEWERS, OriginGate
 from world.errors import FlightError, PlanflyError
 
 Stopped = Callable[[], bool]
@@ -37,9 +40,8 @@ OnMessage = Callable[[str], None]
 # A log played to Foxglove over a WebSocket that only this machine reaches.
 #
 # The server is foxglove-sdk's: it speaks the WebSocket subprotocol `foxglove.sdk.v1` alone, and refuses a viewer that
-# asks for its older name `foxglove.websocket.v1`.
+# asks for its older name `foxglove.websocket.v1`.  It asks nobody where he is from: a gate stands before it.
 
-_HOST = "127.0.0.1"
 # What the server of foxglove-sdk speaks.
 SUBPROTOCOL = "foxglove.sdk.v1"
 # Time between looks at the clock and at who is listening, s, and until a new subscription is active, s.
@@ -53,11 +55,14 @@ def play_to_foxglove(
     *,
     speed: float,
     port: int,
+    allowed: Collection[str],
     wait: float | None,
     stopped: Stopped,
     on_message: OnMessage,
 ) -> None:
     """Play a log's messages from ``start`` to ``end`` (s) to the clients of a Foxglove server.
+
+    allowed: origins of web pages that are let in beside those of `planfly.replays.origin_gate.VIEWERS`.
 
     It waits for the first client that subscribes, ``wait`` s at most; a later one is sent the scenes as they are then.
     Raises PlanflyError where foxglove-sdk is not installed, FlightError where nobody comes in time, OSError for a
@@ -70,20 +75,29 @@ def play_to_foxglove(
         raise PlanflyError.of_argument("foxglove", None, message, shown="") from error
     file = Path(log.source)
     broadcast = _Broadcast(foxglove, log_channels(file))
-    try:
-        server = foxglove.start_server(
-            name=f"planfly {file.name}", host=_HOST, port=port, server_listener=broadcast,
-            capabilities=[foxglove.Capability.Time], context=broadcast.context,
-        )  # fmt: skip
-    except RuntimeError as error:
-        raise OSError(0, str(error), f"{_HOST}:{port}") from error
-    on_message(f"foxglove  ws://{_HOST}:{server.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})")
-    try:
+    with contextlib.ExitStack() as opened:
+        gate = OriginGate(port, {*VIEWERS, *allowed}, lambda why: on_message(f"foxglove  refused {why}"))
+        opened.callback(gate.close)
+        server = _start_server(foxglove, f"planfly {file.name}", broadcast, gate)
+        opened.callback(server.stop)
+        on_message(f"foxglove  ws://{HOST}:{gate.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})")
         messages = broadcast.up_to(log_messages(file), round(start * 1e9) + EPOCH_NS)
         _wait(broadcast, wait, stopped)
         _play(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, stopped)
-    finally:
-        server.stop()
+
+
+def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
+    """The server behind the gate, which lets any page in: its certificate is one that no browser trusts."""
+    certificate = temporary_certificate()
+    try:
+        server = foxglove.start_server(
+            name=name, host=HOST, port=0, server_listener=broadcast, capabilities=[foxglove.Capability.Time],
+            context=broadcast.context, tls_cert=certificate.certificate.encode(), tls_key=certificate.key.encode(),
+        )  # fmt: skip
+    except RuntimeError as error:
+        raise OSError(0, str(error), HOST) from error
+    gate.open(server.port, certificate)
+    return server
 
 
 def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> None:
