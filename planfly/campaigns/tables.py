@@ -8,6 +8,7 @@ import errno
 import hashlib
 import json
 import math
+import os
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -141,6 +142,7 @@ class LockedTable:
         try:
             with translated_errors(path):
                 self._prepare(settings)
+            self._file = path.stat()
         except BaseException:
             self._connection.close()
             raise
@@ -197,8 +199,10 @@ class LockedTable:
     def insert(self, values: Mapping[str, Any]) -> None:
         """Write a flight, for good: a value a column.
 
-        Raises OSError for a full disk; what was written before stays.  Raises StoreError for a number that is there.
+        Raises OSError for a full disk; what was written before stays.  Raises OSError for a table that was removed, and
+        StoreError for a number that is there.
         """
+        self._refuse_removed()
         with translated_errors(self.path):
             marks = ", ".join("?" * len(self._kind.columns))
             self._connection.execute(
@@ -206,9 +210,23 @@ class LockedTable:
             )
 
     def drop_from(self, flight: int) -> None:
-        """Take out the flights from this number on: those that were flown while an earlier one decided."""
+        """Take out the flights from this number on: those that were flown while an earlier one decided.
+
+        Raises OSError for a table that was removed.
+        """
+        self._refuse_removed()
         with translated_errors(self.path):
             self._connection.execute("DELETE FROM flights WHERE flight >= ?", (flight,))
+
+    def _refuse_removed(self) -> None:
+        """Refuse to write into a file that has lost its name: on POSIX that works, and all of it is lost at the end."""
+        try:
+            there = os.path.samestat(self.path.stat(), self._file)
+        except OSError:
+            there = False
+        if not there:
+            words = "was removed, or another file took its place: the flights that were written into it are lost"
+            raise OSError(errno.EIO, words, str(self.path))
 
     def tally(self) -> Tally:
         """How many flights came out how."""

@@ -1,9 +1,10 @@
 """A row as values and back: all of it, and what makes it another flight."""
 
+import shutil
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -88,6 +89,33 @@ def test_what_was_added_stays_after_a_kill(base: CampaignBase, tmp_path: Path) -
     subprocess.run([sys.executable, "-c", code, str(path)], check=False)
     with opened(path, resume=True) as store:
         assert list(store.outcomes()) == [0, 1, 2]
+
+
+@pytest.mark.parametrize("how", ["folder removed", "file removed", "file replaced", "folder moved"])
+@pytest.mark.parametrize("adding", [add_to_campaign, add_to_search])
+def test_nothing_is_written_into_a_table_that_was_removed(
+    base: CampaignBase, tmp_path: Path, adding: Callable[..., None], how: str
+) -> None:
+    """It ends at the next flight: what is written after it has no name any more."""
+    folder = tmp_path / "campaign"
+    path = folder / "c.sqlite"
+    folder.mkdir()
+
+    def rows() -> Iterator[FlightRow]:
+        yield all_fly(base, 0)
+        if how == "folder removed":
+            shutil.rmtree(folder)
+        elif how == "folder moved":
+            folder.rename(tmp_path / "moved")
+        else:
+            path.unlink()
+            if how == "file replaced":
+                path.write_bytes(b"another's")
+        yield all_fly(base, 1)
+        raise AssertionError("a second flight was taken")
+
+    with pytest.raises(OSError, match=r"was removed, or another file took its place.*c\.sqlite"):
+        adding(path, rows(), resume=False)
 
 
 def test_another_campaign_and_a_missing_one_are_refused(tmp_path: Path) -> None:

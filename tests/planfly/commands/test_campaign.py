@@ -1,6 +1,10 @@
 """``planfly campaign``: from its first flight to its report, on, again, and one line for what cannot be."""
 
 import json
+import shutil
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -77,6 +81,32 @@ def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys
     assert main([*line[:-1], str(tmp_path / "none"), "--resume"]) == 2
     assert "no campaign there" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize("command", [["campaign", "--flights", "2000"], ["winds", "--directions", "4"]])
+def test_a_folder_that_is_removed_ends_it_at_the_next_flight(tmp_path: Path, command: list[str]) -> None:
+    """With exit code 1 and a line that says so, long before its last flight."""
+    mission, scenario = write_short(tmp_path)
+    out = tmp_path / "out"
+    line = [*command[:1], str(mission), "--scenario", str(scenario), "--workers", "1", "--out", str(out), *command[1:]]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "planfly", *line], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    table, end = out / f"{command[0]}.sqlite", time.monotonic() + 300.0
+    # The log of what is written grows with the first flights.
+    while process.poll() is None and time.monotonic() < end and not _grown(Path(f"{table}-wal")):
+        time.sleep(0.02)
+    shutil.rmtree(out)
+    _, told = process.communicate(timeout=300.0)
+    assert process.returncode == 1, told
+    last = told.splitlines()[-1]
+    assert last.startswith(f"planfly: {table}: was removed, or another file took its place")
+    assert "Traceback" not in told
+    assert not out.exists()
+
+
+def _grown(log: Path) -> bool:
+    return log.is_file() and log.stat().st_size > 30_000
 
 
 def test_a_planned_scenario_goes_on_with_its_plan(tmp_path: Path, scheduler: str) -> None:
