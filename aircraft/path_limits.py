@@ -15,7 +15,7 @@ from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
 from aircraft.tracking import TrackingError
 from world.by_reference import by_reference
 from world.geometry import wrap
-from world.kernels import compiled, inlined
+from world.kernels import compiled, compiled_inline, inlined
 from world.wind import W20, Wind, mean_wind_speed
 
 Floats = NDArray[np.float64]
@@ -154,7 +154,7 @@ def wind_speed_at(table: PerformanceTable, amsl: float) -> float:  # pragma: no 
     return mean_wind_speed(table.wind_speed, table.wind_gradient, table.wind_reference_amsl, amsl)
 
 
-@inlined
+@compiled_inline
 def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> float:  # pragma: no cover - compiled
     """Ground speed on a course held against the mean wind, m/s; NaN where it cannot be held."""
     wind = wind_speed_at(table, amsl)
@@ -162,7 +162,7 @@ def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> floa
     return ground_speed(table.airspeed, wind * math.cos(angle), wind * math.sin(angle))
 
 
-@inlined
+@compiled_inline
 def downwind(table: PerformanceTable) -> tuple[float, float]:  # pragma: no cover - compiled
     """East and north components of the downwind unit vector."""
     return math.sin(table.wind_to), math.cos(table.wind_to)
@@ -189,7 +189,7 @@ def slopes_along(
     return up, down
 
 
-@inlined
+@compiled_inline
 def aircraft_slopes(
     table: PerformanceTable, course: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -221,7 +221,7 @@ def _turn_radius(
     return radius
 
 
-@inlined
+@compiled_inline
 def turn_radius_between(
     table: PerformanceTable, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
@@ -255,7 +255,7 @@ def corner_tangent(
     return radius * abs(cross) / (1.0 + dot), radius
 
 
-@inlined
+@compiled_inline
 def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
     """Tangent of the slope along a fly-by arc: height difference of its tangent points over the arc's length.
 
@@ -268,7 +268,7 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
     return 0.5 * (tan_in + tan_out) * tangent / (radius * half)
 
 
-@inlined
+@compiled_inline
 def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
     """Distance along the leg after a fly-over turn (rad) until the track is back on it, in radii.
 

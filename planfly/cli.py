@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from planfly.commands.registry import build_parser, find_command
+from planfly.process_setup import prepare_process, with_large_stack
 from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
 from planfly.terminal.command_parser import coloured, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
@@ -21,12 +22,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is not None:
         return _outcome(argv)
+    prepare_process()
     open_standard_streams()
     if ASKS_COMPLETION in os.environ:
         answer_shell(build_parser())
     with ended_by_signals() as heard:
         try:
-            code = _outcome(argv)
+            code = with_large_stack(lambda: _outcome(argv))
         except Exception:
             if not heard:
                 raise

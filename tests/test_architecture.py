@@ -23,7 +23,8 @@ CODE = sorted(
 )
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
 LONGEST = 60
-KERNELS = {"compiled", "inlined"}
+KERNELS = {"compiled", "compiled_inline", "inner", "inlined"}
+INNER = {"inner", "inlined"}
 # Phrases that lean on a text the reader does not have; taken apart, so that this file may hold them.
 LEANING = ("Do the" + " same", "the design" + " document", "the" + " issue")
 # A dotted name in single backquotes that begins with a folder of ours; a file such as flight.mcap is none.
@@ -134,6 +135,52 @@ def test_no_function_is_longer_than_60_lines() -> None:
         for function in functions(file)
     }
     assert {function: length for function, length in lengths.items() if length > LONGEST} == {}
+
+
+def kernels_by_place() -> dict[tuple[str, str], str]:
+    """The decorator of each kernel, by its module and name."""
+    return {
+        (module_name(file), node.name): decorator.id
+        for file in CODE
+        if file.relative_to(ROOT).parts[0] in PACKAGES
+        for node in parsed(file).body
+        if isinstance(node, ast.FunctionDef)
+        for decorator in node.decorator_list
+        if isinstance(decorator, ast.Name) and decorator.id in KERNELS
+    }
+
+
+def module_name(file: Path) -> str:
+    return name_of(file).removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
+def called_from_python(kernels: dict[tuple[str, str], str]) -> set[tuple[str, str]]:
+    """Kernels that a function of ours names which is none itself, or that a module names outside its functions."""
+    found = set()
+    for file in CODE:
+        module = module_name(file)
+        if file.relative_to(ROOT).parts[0] not in PACKAGES:
+            continue
+        known = {
+            alias.asname or alias.name: (node.module, alias.name)
+            for node in ast.walk(parsed(file))
+            if isinstance(node, ast.ImportFrom) and node.module
+            for alias in node.names
+        } | {name: (home, name) for home, name in kernels if home == module}
+        for node in parsed(file).body:
+            inside = isinstance(node, ast.FunctionDef) and (module, node.name) in kernels
+            if not inside and not isinstance(node, ast.Import | ast.ImportFrom):
+                names = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+                found |= {known[name] for name in names & set(known) if known[name] in kernels}
+    return found
+
+
+def test_kernels_that_only_kernels_call_have_no_wrapper_for_python() -> None:
+    """It is a seventh of what compiling takes."""
+    kernels = kernels_by_place()
+    called = called_from_python(kernels)
+    assert len(called) > 50
+    assert {place for place, decorator in kernels.items() if decorator in INNER} == set(kernels) - called
 
 
 def test_kernels_name_what_they_read() -> None:

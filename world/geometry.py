@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from world.kernels import inlined
+from world.kernels import compiled_inline, inlined
 
 Floats = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def fly_by_offset(turn: float, radius: float) -> float:
     return radius * (1.0 / math.cos(0.5 * turn) - 1.0)
 
 
-@inlined
+@compiled_inline
 def wrap(angle: float) -> float:  # pragma: no cover - compiled
     """Bring an angle into [-pi, pi), rad."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)

@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
-_KERNEL = re.compile(rb"^@(?:compiled|inlined)$", re.MULTILINE)
+_KERNEL = re.compile(rb"^@(?:compiled|compiled_inline|inner|inlined)$", re.MULTILINE)
 _IMPORT = re.compile(rb"^from ((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import (\(?[^\n]*)", re.MULTILINE)
 
 

@@ -3,6 +3,7 @@
 Compiled code lies in the user's cache folder; `world.kernel_cache` says for which sources.
 """
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
@@ -10,6 +11,7 @@ from typing import Any, TypeAlias, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import event
+from numba.extending import models, register_model, typeof_impl
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
@@ -63,27 +65,85 @@ def compiled(kernel: _Kernel) -> _Kernel:
     >>> steepest_slopes(np.array([[0.0, 3.0], [0.0, 3.0]], dtype=np.float32), 1.0).round(3)
     array([[3.]], dtype=float32)
     """
-    return _compiled(kernel)
+    return cast("_Kernel", _compiled(kernel))
 
 
-def inlined(kernel: _Kernel) -> _Kernel:
-    """Compile a small function once, and have LLVM copy it into the kernels that call it in their inner loops.
-
-    A call hands over seven numbers an array, and counts a reference to each: more than many a kernel's own work.  The
-    planner's graded scores take a quarter longer with calls alone.  Copied by numba (`inline="always"`) it would run no
-    faster, but each copy would be typed and translated again.
+def compiled_inline(kernel: _Kernel) -> _Kernel:
+    """As `compiled`, and LLVM copies the function into the kernels that call it, as with `inlined`.
 
     >>> from world.geometry import wrap
     >>> round(wrap(4.0), 6)
     -2.283185
     """
-    return _compiled(kernel, forceinline=True)
+    return cast("_Kernel", _compiled(kernel, forceinline=True))
 
 
-def _compiled(kernel: _Kernel, **options: bool) -> _Kernel:
+def inner(kernel: _Kernel) -> _Kernel:
+    """Compile a function that other kernels call, without the wrapper that Python would call it by.
+
+    The wrapper is a seventh of what it takes to compile a kernel.  Tests may still call the function: a wrapper is then
+    compiled, and not kept.
+
+    >>> from world.airspace.zone_kernels import box_distance
+    >>> callable(box_distance)
+    True
+    """
+    return cast("_Kernel", _InnerKernel(kernel))
+
+
+def inlined(kernel: _Kernel) -> _Kernel:
+    """As `inner`, and LLVM copies the function into the kernels that call it, in their inner loops.
+
+    A call hands over seven numbers an array, and counts a reference to each: more than many a kernel's own work.  The
+    planner's graded scores take a quarter longer with calls alone.  Copied by numba (`inline="always"`) it would run no
+    faster, but each copy would be typed and translated again.
+    """
+    return cast("_Kernel", _InnerKernel(kernel, forceinline=True))
+
+
+def _compiled(kernel: Any, **options: bool) -> Any:
     njit: Any = numba.njit
     # No kernel is handed to another as a value, which the wrapper for C is for.
-    return cast("_Kernel", njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel))
+    return njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
+
+
+class _InnerKernel:
+    """A function that kernels call as it is compiled, and Python through a function around it."""
+
+    def __init__(self, kernel: Callable[..., Any], **options: bool) -> None:
+        functools.update_wrapper(self, kernel)
+        self._options = options
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """Numba's, made when a kernel that calls it is compiled: kernels from the cache hold it already."""
+        return _compiled(vars(self)["__wrapped__"], no_cpython_wrapper=True, **self._options)
+
+    @functools.cached_property
+    def _around(self) -> Any:
+        kernel = self
+        return numba.njit(error_model="numpy")(lambda *given: kernel(*given))
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it from Python, which would end the process without a wrapper."""
+        return self._around(*arguments)
+
+
+class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states no types
+    """Numba's type of a function that kernels call: one compiled form for a number, whatever literal stands there."""
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        """As numba has it, which would compile a function anew for each literal number."""
+        plain = tuple(numba.types.unliteral(given) for given in args)
+        return super().get_call_type(context, plain, {name: numba.types.unliteral(kws[name]) for name in kws})
+
+
+register_model(_InnerType)(models.OpaqueModel)
+
+
+@typeof_impl.register(_InnerKernel)
+def _type_of_inner_kernel(kernel: _InnerKernel, _: Any) -> _InnerType:
+    return _InnerType(kernel.dispatcher)
 
 
 @inlined
@@ -99,6 +159,23 @@ def copy_into(out: NDArray[Any], values: NDArray[Any]) -> None:  # pragma: no co
     """
     for k in range(values.size):
         out[k] = values[k]
+
+
+@inner
+def sort_few(values: NDArray[Any]) -> None:  # pragma: no cover - compiled
+    """Sort numbers (n,) in place by insertion: a second of compiling less than numba's own sort, for a few numbers.
+
+    >>> some = np.array([3.0, 1.0, 2.0])
+    >>> sort_few(some)
+    >>> some
+    array([1., 2., 3.])
+    """
+    for k in range(1, values.size):
+        value, at = values[k], k
+        while at > 0 and values[at - 1] > value:
+            values[at] = values[at - 1]
+            at -= 1
+        values[at] = value
 
 
 def read_only(array: _Array) -> _Array:

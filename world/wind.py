@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import compiled, inlined
+from world.kernels import compiled, compiled_inline
 
 Floats = NDArray[np.float64]
 Turbulence = Literal["none", "light", "moderate"]
@@ -15,7 +15,7 @@ Turbulence = Literal["none", "light", "moderate"]
 W20 = {"none": 0.0, "light": 7.7, "moderate": 15.4}
 
 
-@inlined
+@compiled_inline
 def mean_wind_speed(
     speed: float, gradient: float, reference_amsl: float, amsl: float
 ) -> float:  # pragma: no cover - compiled

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from world.kernels import Record, compiled, record_dtype
+from world.kernels import Record, inner, record_dtype
 
 # What guidance keeps from tick to tick, and what one tick leaves for the track.
 GUIDANCE_MEMORY = record_dtype(
@@ -56,7 +56,7 @@ GUIDANCE_MEMORY = record_dtype(
 )
 
 
-@compiled
+@inner
 def steer_elevator(
     state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, push: float
 ) -> None:  # pragma: no cover - compiled
@@ -85,7 +85,7 @@ def steer_elevator(
     )
 
 
-@compiled
+@inner
 def roll_model(
     wanted: float, bank: float, rate: float, gains: Record, dt: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -102,7 +102,7 @@ def roll_model(
     return bank + rate * dt, rate, change
 
 
-@compiled
+@inner
 def follow_roll(
     state: Record, gains: Record, memory: Record, commands: Record, bank: float, rate: float, turn: float, dt: float
 ) -> None:  # pragma: no cover - compiled

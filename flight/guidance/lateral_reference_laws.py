@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from world.geometry import wrap
-from world.kernels import Record, compiled, record_dtype
+from world.kernels import Record, inner, record_dtype
 
 # A waypoint, and the leg that begins there.
 WAYPOINT = record_dtype(
@@ -35,13 +35,13 @@ _CAPTURE = math.sqrt(0.5)
 _PASSED = 3.0
 
 
-@compiled
+@inner
 def l1_length(speed: float, period: float, damping: float) -> float:  # pragma: no cover - compiled
     """How far ahead L1 aims, m, at a ground speed (m/s)."""
     return period * damping * speed / math.pi
 
 
-@compiled
+@inner
 def l1_angles(
     estimated: Record, a_east: float, a_north: float, b_east: float, b_north: float, length: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -66,7 +66,7 @@ def l1_angles(
     return wrap(course - math.atan2(leg_e, leg_n)), aim
 
 
-@compiled
+@inner
 def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:  # pragma: no cover - compiled
     """The integral after a tick, rad."""
     if math.isnan(aim) or abs(aim) >= _INTEGRATES:
@@ -74,14 +74,14 @@ def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:  # 
     return min(_MAX_INTEGRAL, max(-_MAX_INTEGRAL, total + aim * gain * dt))
 
 
-@compiled
+@inner
 def l1_acceleration(angle: float, speed: float, length: float, damping: float) -> float:  # pragma: no cover - compiled
     """Acceleration to the right, m/s^2, for a total angle that the velocity stands right of the aim, rad."""
     angle = min(0.5 * math.pi, max(-0.5 * math.pi, angle))
     return -4.0 * damping * damping * speed * speed / length * math.sin(angle)
 
 
-@compiled
+@inner
 def l1_reached(
     estimated: Record, a: Record, b: Record, length: float, radius: float
 ) -> bool:  # pragma: no cover - compiled
@@ -99,7 +99,7 @@ def l1_reached(
     return within
 
 
-@compiled
+@inner
 def field_course(
     course: float, cross: float, curvature: float, approach: float, path_gain: float, orbit_gain: float
 ) -> float:  # pragma: no cover - compiled

@@ -10,7 +10,7 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
-from world.kernels import Record, compiled, field_names, record_dtype
+from world.kernels import Record, field_names, inner, record_dtype
 
 Floats = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def start_navigation(noise: Floats, lags: Record) -> None:
     lags.second = 0.5 * noise[:3] + 0.5 * noise[3:]
 
 
-@compiled
+@inner
 def navigate(
     true: Record,
     estimated: Record,
@@ -59,7 +59,7 @@ def navigate(
     estimated.velocity_up = true.velocity_up + velocity_up
 
 
-@compiled
+@inner
 def _error(
     lags: Record, axis: int, noise: Floats, sigma: float, time_constant: float, dt: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled

@@ -16,7 +16,7 @@ from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.route import Route
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
-from world.kernels import Record, compiled, record_dtype
+from world.kernels import Record, compiled, inner, record_dtype
 
 Records = NDArray[np.record]
 Floats = NDArray[np.float64]
@@ -46,7 +46,7 @@ NODE = record_dtype(
 )
 
 
-@compiled
+@inner
 def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Distance along a piece (m), cross-track error to the right (m) and the path's course there (rad)."""
     course, curvature = piece.course, piece.curvature
@@ -68,7 +68,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
     return turned / abs(curvature), side * (1.0 / abs(curvature) - math.hypot(ve, vn)), here
 
 
-@compiled
+@inner
 def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  # pragma: no cover - compiled
     """Note in the memory where on the path the aircraft is, and return the path's course there, rad.
 
@@ -89,7 +89,7 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  
     return course
 
 
-@compiled
+@inner
 def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
     """Mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
     total = 0.0
@@ -104,7 +104,7 @@ def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float: 
     return total / (end - start)
 
 
-@compiled
+@inner
 def max_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
     """Sharpest curvature of the path between two distances, both at or after piece ``k``, 1/m, positive."""
     sharpest = 0.0

@@ -22,7 +22,7 @@ from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE, TRACK_R
 from flight.simulation.turbulence import GUST_FILTERS, step_gusts
 from world.frames import POLYMAP, polymap
 from world.geometry import wrap
-from world.kernels import Record, compiled, field_names, record_dtype
+from world.kernels import Record, field_names, inner, record_dtype
 from world.terrain import Heights, pixel_height
 from world.wind import mean_wind_speed
 
@@ -189,7 +189,7 @@ ENDS = {
 _STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
 
 
-@compiled
+@inner
 def begin_tick(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
     """Take the state as JSBSim gave it, in its units, and estimate the motion; False where the state is no number.
 
@@ -205,7 +205,7 @@ def begin_tick(work: Record, heights: Heights) -> bool:  # pragma: no cover - co
     return True
 
 
-@compiled
+@inner
 def _sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
     """Take the state to SI and to the map, and look up the ground; False where the state is no number.
 
@@ -234,7 +234,7 @@ def _sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compil
     return True
 
 
-@compiled
+@inner
 def end_tick(work: Record) -> int:  # pragma: no cover - compiled
     """Make the next wind, fill a row of the track, count the tick, and state what to set in JSBSim, in its units.
 
@@ -255,7 +255,7 @@ def end_tick(work: Record) -> int:  # pragma: no cover - compiled
     return _status(state, work.memory, place.clearance, work.settings.slowest, air.energy >= work.settings.battery)
 
 
-@compiled
+@inner
 def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compiled
     """Take the state to SI; False where it has a NaN or an infinity."""
     total = 0.0
@@ -266,7 +266,7 @@ def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compil
     return total == 0.0
 
 
-@compiled
+@inner
 def _status(
     state: Record, memory: Record, clearance: float, slowest: float, empty: bool
 ) -> int:  # pragma: no cover - compiled
@@ -282,7 +282,7 @@ def _status(
     return EMPTY if empty else 0
 
 
-@compiled
+@inner
 def _output(
     output: Record, commands: Record, air: Record, above: Record, below: Record
 ) -> None:  # pragma: no cover - compiled
@@ -296,7 +296,7 @@ def _output(
         output[name] *= above[name] if output[name] > 0.0 else below[name]
 
 
-@compiled
+@inner
 def _blow(
     state: Record, wind: Record, gusts: Record, noise: Floats, clearance: float, up: float, turn_cos: float,
     turn_sin: float, air: Record, dt: float,
@@ -316,7 +316,7 @@ def _blow(
         air.gust_down = down
 
 
-@compiled
+@inner
 def _fill(
     row: Record, state: Record, true: Record, commands: Record, memory: Record, time: float,
     energy: float, clearance: float,
@@ -346,7 +346,7 @@ def _fill(
     row.clearance = clearance
 
 
-@compiled
+@inner
 def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:  # pragma: no cover - compiled
     """The row's wind in map axes.  cos, sin: of the map course of true north."""
     wind = row.wind

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.dynamics.jsbsim_properties import FOOT
-from world.kernels import Record, compiled, record_dtype
+from world.kernels import Record, inner, record_dtype
 
 Floats = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 GUST_FILTERS = record_dtype("along", "across_first", "across_second", "down_first", "down_second")
 
 
-@compiled
+@inner
 def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Length scales L_u = L_v and L_w (m), and sigma_u / sigma_w, at a height above ground (m).
 
@@ -41,7 +41,7 @@ def start_gusts(noise: Floats, filters: Record) -> None:
     filters.down_second = 0.5 * filters.down_first + 0.5 * down
 
 
-@compiled
+@inner
 def step_gusts(
     filters: Record, noise: Floats, w20: float, height: float, airspeed: float, dt: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -66,7 +66,7 @@ def step_gusts(
     return sigma_u * filters.along, sigma_u * across, sigma_w * down
 
 
-@compiled
+@inner
 def _transverse(
     first: float, second: float, noise: float, decay: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled

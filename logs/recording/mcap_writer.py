@@ -31,7 +31,7 @@ from mcap.records import (
 from numpy.typing import NDArray
 
 from logs.recording.mcap_reader import FRAME, MAGIC, record_stream, records
-from world.kernels import compiled, copy_into
+from world.kernels import compiled, copy_into, inner
 
 Index = NDArray[np.uint64]
 Bytes = NDArray[np.uint8]
@@ -317,7 +317,7 @@ class Layout:
     channels: ChannelIndexes
 
 
-@compiled
+@inner
 def _put(out: Bytes, at: int, value: int, size: int) -> int:
     """Write a number of ``size`` bytes, low first; returns where it ends."""
     for k in range(size):
@@ -325,7 +325,7 @@ def _put(out: Bytes, at: int, value: int, size: int) -> int:
     return at + size
 
 
-@compiled
+@inner
 def _put_varint(out: Bytes, at: int, value: int) -> int:
     while value > 127:
         out[at] = (value & 127) | 128

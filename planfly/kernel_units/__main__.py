@@ -4,12 +4,14 @@ Lines out: ``ready KERNEL`` for each kernel of a unit that is compiled or loaded
 The process ends at once when its standard input does, since nobody waits for it any more.
 """
 
-import gc
+import functools
 import os
 import queue
 import signal
 import sys
 import threading
+
+from planfly.process_setup import prepare_process, with_large_stack
 
 
 def answer_requests() -> int:
@@ -18,14 +20,13 @@ def answer_requests() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     requested: queue.Queue[str] = queue.Queue()
     threading.Thread(target=_listen, args=(requested,), daemon=True).start()
-    # Looking for garbage among what numba makes takes a twentieth of the compiling, and finds little.
-    gc.set_threshold(200_000, 50, 50)
+    prepare_process()
     from planfly.kernel_units.ready_kernels import do_unit
 
     while True:
         unit = requested.get()
         try:
-            do_unit(unit, _report)
+            with_large_stack(functools.partial(do_unit, unit, _report))
         except Exception:
             # What it was to compile is compiled where it is needed, and fails there by its own name.
             _report(f"failed {unit}")

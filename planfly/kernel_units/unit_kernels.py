@@ -84,9 +84,9 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
 }
 
 # What a default plan and a flight call, the longest first: whoever shares units out begins with those.
-PLANNING = ("scores", "shortening", "certificates", "routes", "paper")
+PLANNING = ("scores", "shortening", "routes", "certificates", "paper")
 FLYING = ("flight",)
-BOTH = ("scores", "flight", "shortening", "certificates", "routes", "paper")
+BOTH = ("scores", "flight", "shortening", "routes", "certificates", "paper")
 
 
 def kernels_of(units: tuple[str, ...]) -> frozenset[str]:

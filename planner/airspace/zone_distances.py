@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from planner.airspace.zone_limits import MapSegment, ZonesWithMargins, first_exclusion_near, segment_between, view_shape
 from world.airspace.zone_kernels import ZoneRecords, box_distance, edge_distance
 from world.frames import PolyMapRecord, polymap
-from world.kernels import Record, compiled, inlined
+from world.kernels import Record, inlined, inner
 from world.terrain import pixel_height, segment_clearance
 
 Floats = NDArray[np.float64]
@@ -43,7 +43,7 @@ class AltitudeBand(NamedTuple):
     highest_above_ground: float
 
 
-@compiled
+@inner
 def zone_excess(
     zones: ZonesWithMargins,
     heights: Heights,
@@ -91,7 +91,7 @@ def zone_excess(
     return total
 
 
-@compiled
+@inner
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, wanted: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -111,7 +111,7 @@ def penetration_depth(
     return max(depth, 1e-9), min(1.0, max(0.0, first)), min(1.0, max(0.0, last))
 
 
-@compiled
+@inner
 def _aside_excess(
     records: ZoneRecords, z: int, line: MapSegment, wanted: float
 ) -> float:  # pragma: no cover - compiled
@@ -138,7 +138,7 @@ def altitude_band(up: float, to_up: float, below: float, above: float) -> Altitu
     return AltitudeBand(lowest, highest, -UNKNOWN, UNKNOWN)
 
 
-@compiled
+@inner
 def _sampled_band(
     heights: Heights,
     to_pixel: PolyMapRecord,
@@ -195,7 +195,7 @@ CUT = 25.0
 ZONE_MARGIN = np.dtype([("nearest", np.float64), ("satisfied", np.bool_), ("zone", np.int64)])
 
 
-@compiled
+@inner
 def measure_zone_margin(
     zones: ZonesWithMargins,
     heights: Heights,
@@ -247,7 +247,7 @@ def measure_zone_margin(
             _update_margin(zone, need, z, away, over, margin)
 
 
-@compiled
+@inner
 def _update_margin(
     zone: Record, need: Record, z: int, away: float, over: float, margin: Record
 ) -> None:  # pragma: no cover - compiled
@@ -266,13 +266,13 @@ def _update_margin(
     margin.nearest = min(margin.nearest, here)
 
 
-@compiled
+@inner
 def _distance_to_violation(zone: Record, away: float, over: float) -> float:  # pragma: no cover - compiled
     """Distance from violating a zone, given the horizontal and vertical distances, m."""
     return max(away, over) if zone.exclusion else min(away, -over)
 
 
-@compiled
+@inner
 def _map_distance(
     records: ZoneRecords, z: int, a: Floats, b: Floats, within: float
 ) -> float:  # pragma: no cover - compiled
@@ -291,7 +291,7 @@ def _map_distance(
     return -max(0.0, edge_distance(records, z, a[0], a[1]), edge_distance(records, z, b[0], b[1]))
 
 
-@compiled
+@inner
 def _exact_band(
     heights: Heights,
     depths: Heights,

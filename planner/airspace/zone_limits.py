@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.airspace.zones import Zone
 from world.by_reference import by_reference
-from world.kernels import Records, compiled, inlined, record_dtype
+from world.kernels import Records, compiled, inlined, inner, record_dtype
 from world.scenario import Scenario
 from world.terrain import Terrain
 
@@ -103,7 +103,7 @@ def _reduce_margins(
                     need.vertical = max(0.0, share * over)
 
 
-@compiled
+@inner
 def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:  # pragma: no cover - compiled
     """Index of the first exclusion that may reach as far east as `west` (m)."""
     low, high = zones.inclusions, zones.required.shape[0]
@@ -212,7 +212,7 @@ def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  
     return MapSegment(ax, ay, dx / run, dy / run, run)
 
 
-@compiled
+@inner
 def view_shape(
     records: ZoneRecords, z: int, line: MapSegment, within: float
 ) -> ShapeView:  # pragma: no cover - compiled

@@ -17,7 +17,7 @@ from planner.evaluation.corners import ARC_STEP, blended_vertices, fly_by_radii,
 from planner.evaluation.paper_scores import POINTS
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_headroom
 from planner.evaluation.terrain_clearance import lag_at, segment_pixels, terrain_excess
-from world.kernels import Record, Records, compiled, copy_into, inlined
+from world.kernels import Record, Records, compiled, copy_into, inlined, inner
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]
@@ -74,7 +74,7 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragm
     return out
 
 
-@compiled
+@inner
 def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
     """`TRACKED_PIECE` records of a path flown without tracking error: its legs, then the chords of its arcs."""
     last, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
@@ -103,7 +103,7 @@ def _exact_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma:
     return out[:made]
 
 
-@compiled
+@inner
 def _greatest_height(data: ProblemArrays, piece: Record) -> float:  # pragma: no cover - compiled
     """Greatest height above ground along a piece and on both sides of it, m; NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
@@ -127,7 +127,7 @@ _LAG_CUTS = (0.0, 1.0, 2.5)
 _MIN_OFFSET = 0.5
 
 
-@compiled
+@inner
 def add_airspace_violations(
     data: ProblemArrays,
     path: Floats,
@@ -173,7 +173,7 @@ def add_airspace_violations(
                 violations.terrain += _excess_height_around(data, required, a, b, across + width, more)
 
 
-@compiled
+@inner
 def airspace_excess(
     data: ProblemArrays, a: Floats, b: Floats, below: float, above: float
 ) -> float:  # pragma: no cover - compiled
@@ -189,7 +189,7 @@ def airspace_excess(
     return total
 
 
-@compiled
+@inner
 def _zone_excess(
     data: ProblemArrays, a: Floats, b: Floats, lateral: float, below: float, above: float
 ) -> float:  # pragma: no cover - compiled
@@ -197,7 +197,7 @@ def _zone_excess(
     return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, a, b, lateral, below, above)
 
 
-@compiled
+@inner
 def _excess_height(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, leg: Record, lag: Record, across: float
 ) -> float:  # pragma: no cover - compiled
@@ -215,7 +215,7 @@ def _excess_height(
     return total
 
 
-@compiled
+@inner
 def _excess_height_around(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float
 ) -> float:  # pragma: no cover - compiled

@@ -26,7 +26,7 @@ from planner.evaluation.corners import (
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import BUFFER_GROWTH, ProblemArrays
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags
-from world.kernels import Record, Records, compiled, copy_into
+from world.kernels import Record, Records, compiled, copy_into, inner, sort_few
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ _CUTS = (0.5, 1.0, 2.0, 4.0)
 ENDS = 100.0
 
 
-@compiled
+@inner
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
     """`TRACKED_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
     count = waypoints.shape[0]
@@ -103,7 +103,7 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma
     return out[:made]
 
 
-@compiled
+@inner
 def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
     """Fractions of a leg at which its pieces end, increasing; the last is 1."""
     cuts = np.ones(len(_CUTS) + 3)
@@ -111,10 +111,11 @@ def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
         cuts[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
     end = min(1.0, ENDS / max(1e-9, run))
     cuts[len(_CUTS)], cuts[len(_CUTS) + 1] = end, 1.0 - end
-    return np.sort(cuts)
+    sort_few(cuts)
+    return cuts
 
 
-@compiled
+@inner
 def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> None:  # pragma: no cover - compiled
     """Fill the ends of the part of a-b between two fractions of it."""
     for axis in range(3):
@@ -122,14 +123,14 @@ def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> Non
         piece.end[axis] = a[axis] + after * (b[axis] - a[axis])
 
 
-@compiled
+@inner
 def _set_below(lag: Record, share: float, after: float, piece: Record) -> None:  # pragma: no cover - compiled
     """Fill the deviations below and above of the piece between two fractions of a leg."""
     one, two = lag_at(lag, share), lag_at(lag, after)
     piece.below, piece.above = max(0.0, one, two), max(0.0, -one, -two)
 
 
-@compiled
+@inner
 def _lateral_deviation(data: ProblemArrays, place: Floats, across: float) -> float:  # pragma: no cover - compiled
     """Lateral deviation of the flight at a point of the path, m: reduced near the fixed ends."""
     away = min(
@@ -175,7 +176,7 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma
     return nearest
 
 
-@compiled
+@inner
 def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) -> float:  # pragma: no cover - compiled
     """Distance from a-b to the surface of the nearest missile sphere, or `nearest` if that is smaller."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
@@ -263,7 +264,7 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # 
     return out[:count]
 
 
-@compiled
+@inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma: no cover - compiled
     """`CERTIFIED_PIECE` records of `TRACKED_PIECE` records: smallest heights along them and to both sides."""
     out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
@@ -286,7 +287,7 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma
     return out
 
 
-@compiled
+@inner
 def _measure_piece(
     data: ProblemArrays, a: Floats, b: Floats, of_arc: bool, number: int, out: Record
 ) -> None:  # pragma: no cover - compiled
@@ -295,7 +296,7 @@ def _measure_piece(
     out.buffer = required_buffer(data, data.buffer, (data.start_buffer, data.destination_buffer), a, b)
 
 
-@compiled
+@inner
 def required_buffer(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:  # pragma: no cover - compiled

@@ -23,7 +23,7 @@ from aircraft.path_limits import (
 from aircraft.tracking import corner_deviation, true_airspeed_excess
 from planner.evaluation.problem import ProblemArrays
 from world.geometry import turning_angle
-from world.kernels import Record, Records, compiled, copy_into, inlined
+from world.kernels import Record, Records, compiled, compiled_inline, copy_into, inlined, inner
 
 Floats = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def measure_legs(path: Floats, legs: Records) -> None:  # pragma: no cover - com
         legs[i].length = math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@compiled
+@inner
 def measure_corners(
     data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records
 ) -> None:  # pragma: no cover - compiled
@@ -74,7 +74,7 @@ def measure_corners(
         measure_corner(aircraft, tracking, wind, turning, ux, uy, vx, vy, path[i, 2], corners[i])
 
 
-@compiled
+@inner
 def measure_corner(
     aircraft: PerformanceTable,
     tracking: Record,
@@ -117,7 +117,7 @@ def courses_at(
     return ux, uy, vx, vy
 
 
-@inlined
+@compiled_inline
 def settling_length(need: float, run: float) -> float:  # pragma: no cover - compiled
     """Length of a leg (m) kept straight between its turns so that the first settles; need: length of both turns."""
     return SETTLING_SHARE * run + min(SETTLING_LENGTH, need)
@@ -137,7 +137,7 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: n
     return max(back, corners[i].after) if corners[i].excursion > 0.0 else back
 
 
-@compiled
+@inner
 def roll_length(
     aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind
 ) -> float:  # pragma: no cover - compiled
@@ -168,7 +168,7 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # prag
     return length
 
 
-@compiled
+@inner
 def fly_by_vertices(
     aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
 ) -> Floats:  # pragma: no cover - compiled
@@ -176,7 +176,7 @@ def fly_by_vertices(
     return blended_vertices(half_blend_length(aircraft, at[2]), before, at, after, radius)
 
 
-@compiled
+@inner
 def blended_vertices(
     blend: float, before: Floats, at: Floats, after: Floats, radius: float
 ) -> Floats:  # pragma: no cover - compiled
@@ -225,7 +225,7 @@ def blended_vertices(
     return out
 
 
-@compiled
+@inner
 def legs_about(
     before: Floats, at: Floats, after: Floats, length_before: float, length_after: float
 ) -> Floats:  # pragma: no cover - compiled

@@ -37,7 +37,7 @@ from planner.evaluation.terrain_clearance import (
 )
 from planner.evaluation.threat_index import MissileIndex, kill_density
 from world.frames import PolyMapRecord
-from world.kernels import Record, Records, compiled, inlined
+from world.kernels import Record, Records, compiled, inlined, inner
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -83,7 +83,7 @@ class PathScratch(NamedTuple):
     lags: Records
 
 
-@compiled
+@inner
 def make_scratch(count: int) -> PathScratch:  # pragma: no cover - compiled
     """Scratch for paths of `count` waypoints."""
     return PathScratch(
@@ -98,7 +98,7 @@ def make_scratch(count: int) -> PathScratch:  # pragma: no cover - compiled
     )
 
 
-@compiled
+@inner
 def score_path(
     data: ProblemArrays,
     limits: PrecomputedLimits,
@@ -116,8 +116,7 @@ def score_path(
     count, has_error = path.shape[0], data.tracking.has_error
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
-    graded = count > 0  # no literal: numba would compile what takes it for each
-    add_leg_violations(data, limits, path, legs, corners, graded, violations)
+    add_leg_violations(data, limits, path, legs, corners, True, violations)
     if has_error:
         measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
         _measure_tracked(corners, flown, extents)
@@ -202,7 +201,7 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
     return radius
 
 
-@compiled
+@inner
 def _measure_exact(
     aircraft: PerformanceTable,
     legs_hold_turns: bool,
@@ -252,7 +251,7 @@ def _measure_tracked(corners: Records, flown: Records, extents: Floats) -> None:
         extents[i] = max(corners[i].before, corners[i].after)
 
 
-@compiled
+@inner
 def _corner_depth(
     heights: Heights,
     slope_bounds: SlopeBounds,
@@ -271,7 +270,7 @@ def _corner_depth(
     return total
 
 
-@compiled
+@inner
 def _corner_kill(
     missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float
 ) -> float:  # pragma: no cover - compiled

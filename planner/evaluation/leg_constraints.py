@@ -15,7 +15,7 @@ from aircraft.path_limits import arc_slope, downwind, slopes_along, wind_speed_a
 from planner.evaluation.corners import Wind, courses_at, roll_length, settling_length, turn_length
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_clearance
 from world.frames import PolyMapRecord
-from world.kernels import Record, Records, compiled, inlined
+from world.kernels import Record, Records, compiled, inlined, inner
 
 Floats = NDArray[np.float64]
 
@@ -166,7 +166,7 @@ class PrecomputedLimits(NamedTuple):
     required: RequiredClearance
 
 
-@compiled
+@inner
 def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no cover - compiled
     """The limits that hold for all paths of a problem."""
     climb, dive = data.max_climb, data.max_dive
@@ -268,7 +268,7 @@ def _turn_excess(
     return max(1e-12, math.atan2(abs(ux * vy - uy * vx), dot) - largest)
 
 
-@compiled
+@inner
 def add_leg_violations(
     data: ProblemArrays,
     limits: PrecomputedLimits,

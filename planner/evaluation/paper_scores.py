@@ -37,7 +37,7 @@ from planner.evaluation.problem import (
 )
 from planner.evaluation.threat_index import Short, ThreatCells
 from world.geometry import CLOSEST
-from world.kernels import Record, Records, compiled, inlined
+from world.kernels import Record, Records, compiled, inlined, inner
 from world.terrain import EDGE
 
 Floats = NDArray[np.float64]
@@ -92,8 +92,7 @@ def _score_paths(
                 measure_legs(path, legs)
                 if data.legs_hold_turns:
                     measure_corners(data, limits.wind, path, legs, corners)
-                graded = size < 0  # no literal: numba would compile what takes it for each
-                add_leg_violations(data, limits, path, legs, corners, graded, violation)
+                add_leg_violations(data, limits, path, legs, corners, False, violation)
             violation.terrain = sums.below[b]
             objective.length_ratio = sums.length[b] / limits.straight_distance
             objective.kill_exposure, objective.detection_exposure = sums.kill[b], sums.detection[b]
@@ -107,7 +106,7 @@ def _by_numbers(data: ProblemArrays, limits: PrecomputedLimits) -> bool:  # prag
     return courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
 
 
-@compiled
+@inner
 def _score_block(
     data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, begin: int, size: int, block: Record
 ) -> None:  # pragma: no cover - compiled

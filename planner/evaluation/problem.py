@@ -21,7 +21,7 @@ from planner.plan import Objective, Violation
 from world.by_reference import by_reference
 from world.errors import ScenarioError
 from world.frames import PolyMapRecord
-from world.kernels import Record, Records, compiled, inlined
+from world.kernels import Record, Records, inlined, inner
 from world.scenario import Scenario
 from world.terrain import TILE, Terrain, steepest_slopes
 from world.threats import Threats
@@ -192,13 +192,13 @@ class RequiredClearance(NamedTuple):
     sample_pitch: float
 
 
-@compiled
+@inner
 def required_clearance(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
     """The clearance that a problem requires."""
     return _required(data, data.clearance, data.buffer, data.start_buffer, data.destination_buffer)
 
 
-@compiled
+@inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
     """The maximum height above ground as a required clearance, with the heights of path and ground negated."""
     space = data.airspace

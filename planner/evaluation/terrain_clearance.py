@@ -16,7 +16,7 @@ from aircraft.tracking import true_airspeed_excess
 from planner.evaluation.corners import Wind
 from planner.evaluation.problem import RequiredClearance, SlopeBounds, clearance_at
 from world.frames import PolyMapRecord, polymap
-from world.kernels import Record, Records, compiled, inlined
+from world.kernels import Record, Records, inlined, inner
 from world.terrain import TILE, pixel_height
 
 Floats = NDArray[np.float64]
@@ -75,7 +75,7 @@ def set_lag(
     return end
 
 
-@compiled
+@inner
 def measure_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
 ) -> None:  # pragma: no cover - compiled
@@ -217,7 +217,7 @@ def _begin_legs(
         column, row = after_column, after_row
 
 
-@compiled
+@inner
 def sample_terrain(
     heights: Heights,
     slope_bounds: SlopeBounds,

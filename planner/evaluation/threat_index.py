@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from world.by_reference import by_reference
 from world.geometry import window_exposure
-from world.kernels import Records, compiled, inlined
+from world.kernels import Records, compiled, inlined, inner
 
 Floats = NDArray[np.float64]
 Short = NDArray[np.int32]
@@ -205,7 +205,7 @@ def make_missile_index(threats: Records, side: float | None = None) -> MissileIn
     return MissileIndex(*arrays)
 
 
-@compiled
+@inner
 def kill_density(
     index: MissileIndex,
     margin: float,

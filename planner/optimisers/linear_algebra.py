@@ -6,7 +6,7 @@ BLAS and LAPACK sum and round differently on different machines; a search must d
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import compiled
+from world.kernels import compiled, inner
 
 Floats = NDArray[np.float64]
 
@@ -68,13 +68,13 @@ def times_sparse(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - c
     return out.T.copy()
 
 
-@compiled
+@inner
 def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: no cover - compiled
     for n in range(out.size):
         out[n] += values[n] * factor
 
 
-@compiled
+@inner
 def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - compiled
     """Fill the lower Cholesky factor (d, b) of a positive definite band matrix (d, b).
 
@@ -89,7 +89,7 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - co
             out[i, i - j] = total / out[j, 0] if j < i else np.sqrt(max(total, 1e-12 * matrix[i, 0] + 1e-300))
 
 
-@compiled
+@inner
 def solve_band(factor: Floats, right: Floats, out: Floats) -> None:  # pragma: no cover - compiled
     """Fill the solution (d,) of a linear system given the band factor (d, b) of its matrix."""
     size, wide = factor.shape

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import compiled
+from world.kernels import compiled, inner
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -127,7 +127,7 @@ def _select(
     return selected, numbers
 
 
-@compiled
+@inner
 def _is_distinct(row: Floats, others: Floats, clearing_radius: Floats) -> bool:  # pragma: no cover - compiled
     """Whether a sample (d,) differs from each of the others by at least `clearing_radius` in some variable."""
     for n in range(others.shape[0]):

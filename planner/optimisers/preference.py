@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import compiled
+from world.kernels import compiled, inner
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -63,7 +63,9 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
     """Ranks (n,) of a table (c, n) whose levels have these widths."""
     count = table.shape[1]
     total = np.zeros(count, dtype=np.int64)
-    order, scratch = np.arange(count), np.empty(count, dtype=np.int64)
+    order, scratch = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
+    for k in range(count):
+        order[k] = k
     sorted_ = np.empty((table.shape[0], count))
     below = np.empty(count, dtype=np.int64)
     # Groups of tied rows: the position in the order at which each begins, followed by the count.
@@ -102,7 +104,7 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
     return total
 
 
-@compiled
+@inner
 def _sort(
     table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int
 ) -> None:  # pragma: no cover - compiled
@@ -134,7 +136,7 @@ def _sort(
         size *= 2
 
 
-@compiled
+@inner
 def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # pragma: no cover - compiled
     """Whether row a precedes row b, column by column."""
     for c in range(column, column + width):
@@ -143,7 +145,7 @@ def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # 
     return False
 
 
-@compiled
+@inner
 def _count_any(
     rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints
 ) -> None:  # pragma: no cover - compiled
@@ -163,14 +165,15 @@ def _count_any(
                 dominators = _at_most(rows[1, begin:k], rows[1, k])
             elif width > 2:
                 less = below[: k - begin]
-                less[:] = 1
+                for j in range(less.size):
+                    less[j] = 1
                 for c in range(1, width):
                     _and_at_most(rows[c, begin:k], rows[c, k], less)
-                dominators = less.sum()
+                dominators = _count_marks(less)
         total[order[k]] += dominators
 
 
-@compiled
+@inner
 def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compiled
     """Number of values not above the limit. Without branches, so that the loop is vectorised."""
     count = 0
@@ -179,25 +182,50 @@ def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compile
     return count
 
 
-@compiled
+@inner
 def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:  # pragma: no cover - compiled
     """Clear the marks of values above the limit."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
 
 
-@compiled
+@inner
+def _count_marks(marks: Ints) -> int:  # pragma: no cover - compiled
+    """Number of marks that are 1; the others are 0."""
+    count = 0
+    for k in range(marks.size):
+        count += marks[k]
+    return count
+
+
+@inner
+def _places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:  # pragma: no cover - compiled
+    """Places of a group's rows in the order of the second column, from 1, equal ones alike; and how many there are."""
+    count = end - begin
+    order, places = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
+    for k in range(count):
+        order[k] = begin + k
+    _sort(rows, 1, 1, order, places, 0, count)
+    place = 0
+    for k in range(count):
+        if k == 0 or rows[1, order[k]] != rows[1, order[k - 1]]:
+            place += 1
+        places[order[k] - begin] = place
+    return places, place
+
+
+@inner
 def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -> None:  # pragma: no cover - compiled
     """Add the number of dominators of each row of a group to total, with a Fenwick tree over the second of two columns.
 
     O(n log n), for many rows.
     """
-    steps = np.unique(rows[1, begin:end])
-    tree = np.zeros(steps.size + 1, dtype=np.int64)
+    places, number = _places(rows, begin, end)
+    tree = np.zeros(number + 1, dtype=np.int64)
     k = begin
     while k < end:
         first = k
-        place = np.searchsorted(steps, rows[1, k]) + 1
+        place = places[k - begin]
         dominators = 0
         at = place
         while at > 0:
@@ -207,6 +235,6 @@ def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -
             total[order[k]] += dominators
             k += 1
         at = place
-        while at <= steps.size:
+        while at <= number:
             tree[at] += k - first
             at += at & -at

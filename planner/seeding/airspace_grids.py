@@ -27,7 +27,7 @@ from planner.seeding.grids import (
     position_of,
     proximity_cost,
 )
-from world.kernels import Record, Records, compiled
+from world.kernels import Record, Records, compiled, inner
 from world.terrain import ground_height
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ class _Passage(NamedTuple):
     high: float
 
 
-@compiled
+@inner
 def _column(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
 ) -> None:  # pragma: no cover - compiled
@@ -91,7 +91,7 @@ def _column(
         column.highest = min(column.highest, top)
 
 
-@compiled
+@inner
 def _passage(
     zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float
 ) -> _Passage:  # pragma: no cover - compiled
@@ -119,7 +119,7 @@ def _passage(
     return _Passage(low, high)
 
 
-@compiled
+@inner
 def _slopes(
     data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float
 ) -> Floats:  # pragma: no cover - compiled
@@ -134,7 +134,7 @@ def _slopes(
     return out
 
 
-@compiled
+@inner
 def _set_cell_costs(
     grid: AirspaceGrid, columns: Records, obstacles: Records, along: float, extra: Floats, price: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -159,7 +159,7 @@ def _set_cell_costs(
                     price[y, z] += KILL_COST * (3.0 - 2.0 * math.sqrt(away2) / obstacle.radius)
 
 
-@compiled
+@inner
 def _relax_stage(
     data: ProblemArrays,
     frame: RotatedFrame,
@@ -277,7 +277,7 @@ def cheapest_airspace_route(
     return points, total
 
 
-@compiled
+@inner
 def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: no cover - compiled
     """Index of the layer nearest to a height, m."""
     first = column.lowest if grid.follows else grid.floor

@@ -21,7 +21,7 @@ from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, clearance_at, required_clearance
 from world.by_reference import by_reference
 from world.frames import polymap
-from world.kernels import Records, compiled
+from world.kernels import Records, compiled, inner
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ class _PixelSteps(NamedTuple):
     rows_across: float
 
 
-@compiled
+@inner
 def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """East and north of a point in the rotated frame."""
     return (
@@ -80,7 +80,7 @@ def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float
     )
 
 
-@compiled
+@inner
 def _lowest_height(
     data: ProblemArrays,
     required: RequiredClearance,
@@ -112,7 +112,7 @@ def _lowest_height(
     return worst + clearance_at(required, east, north)
 
 
-@compiled
+@inner
 def _pixel_steps(
     data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float
 ) -> _PixelSteps:  # pragma: no cover - compiled
@@ -149,7 +149,7 @@ def find_obstacles(
     return out[:count]
 
 
-@compiled
+@inner
 def _add_danger(
     obstacles: Records, along: float, grid: Grid, low: int, high: int, price: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -175,7 +175,7 @@ def _add_danger(
                     price[z, y] += KILL_COST * (3.0 - 2.0 * math.sqrt(d2) / radius)
 
 
-@compiled
+@inner
 def set_cell_costs(
     data: ProblemArrays,
     required: RequiredClearance,
@@ -216,7 +216,7 @@ STEP_LAYERS = np.dtype([("climb", np.int64), ("sink", np.int64)], align=True)
 SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 
-@compiled
+@inner
 def layers_per_step(
     data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float
 ) -> Records:  # pragma: no cover - compiled
@@ -237,7 +237,7 @@ def layers_per_step(
     return out
 
 
-@compiled
+@inner
 def relax(
     cost: Floats,
     price: Floats,
@@ -260,7 +260,7 @@ def relax(
         parents[j] = start + k if better else parents[j]
 
 
-@compiled
+@inner
 def relax_stage(
     cost: Floats,
     after: Floats,
@@ -294,7 +294,7 @@ def relax_stage(
                 relax(flat, flat_price, flat_after, flat_parents, here, there, there, b - a, length)
 
 
-@compiled
+@inner
 def distance_to_goal(
     columns: int, home: int, left: int, step: float, ratio: float, out: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -310,7 +310,7 @@ def distance_to_goal(
         out[y] = step * (straight * far + more * further)
 
 
-@compiled
+@inner
 def prune(
     after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int
 ) -> None:  # pragma: no cover - compiled
@@ -372,7 +372,7 @@ def cheapest_route(
     return trace_back(parents, goal, home), cost[goal, home]
 
 
-@compiled
+@inner
 def trace_back(parents: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
     """`ROUTE_CELL` records from the start to this cell of the last stage; parents: (stages + 1, layers, across)."""
     wide = parents.shape[2]

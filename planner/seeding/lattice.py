@@ -22,7 +22,7 @@ from planner.evaluation.problem import ProblemArrays
 from planner.seeding.grids import position_of
 from planner.seeding.waypoint_fitting import leg_cost
 from world.by_reference import by_reference
-from world.kernels import Records, compiled, copy_into
+from world.kernels import Records, compiled, copy_into, inner
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -67,7 +67,7 @@ class Lattice(NamedTuple):
     goal_layer: int
 
 
-@compiled
+@inner
 def _set_position(
     frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -78,7 +78,7 @@ def _set_position(
     out[2] = lattice.low + layer * lattice.pitch
 
 
-@compiled
+@inner
 def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:  # pragma: no cover - compiled
     """Maximum climb and descent (8, 2) of a step on each course, in layers."""
     out, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
@@ -106,7 +106,7 @@ class _StateTable(NamedTuple):
     steps: Bytes
 
 
-@compiled
+@inner
 def _expand_state(
     data: ProblemArrays,
     limits: PrecomputedLimits,
@@ -216,7 +216,7 @@ def continue_lattice_search(
     return LatticeSearch(table, costs, states, seen, found)
 
 
-@compiled
+@inner
 def _nearest_course(frame: RotatedFrame, course: float) -> int:  # pragma: no cover - compiled
     """Index of the lattice course nearest to a course (rad, clockwise from north); -1 for NaN."""
     if math.isnan(course):
@@ -226,7 +226,7 @@ def _nearest_course(frame: RotatedFrame, course: float) -> int:  # pragma: no co
     return nearest
 
 
-@compiled
+@inner
 def _inside(data: ProblemArrays, point: Floats) -> bool:  # pragma: no cover - compiled
     """Whether a point (3,) is on the map and between floor and ceiling."""
     inside: bool = data.west <= point[0] <= data.east and data.south <= point[1] <= data.north

@@ -17,7 +17,7 @@ from planner.evaluation.graded_scores import PathScratch, make_scratch, score_pa
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays
 from planner.plan import Objective
-from world.kernels import Record, Records, compiled, copy_into
+from world.kernels import Record, Records, compiled, copy_into, inner
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -109,14 +109,15 @@ def _triangular_basis(inner: int) -> tuple[Floats, Ints]:
     return np.array(rows), np.array(axes)
 
 
-@compiled
+@inner
 def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:  # pragma: no cover - compiled
     path = np.empty((waypoints, 3))
-    path[0], path[-1] = data.start, data.destination
+    copy_into(path[0], data.start)
+    copy_into(path[-1], data.destination)
     return _Candidate(path, np.zeros(1, dtype=VIOLATIONS), np.zeros(1, dtype=OBJECTIVES), make_scratch(waypoints))
 
 
-@compiled
+@inner
 def _merit(
     data: ProblemArrays, limits: PrecomputedLimits, frames: WaypointFrames, vector: Floats, candidate: _Candidate
 ) -> tuple[float, bool]:  # pragma: no cover - compiled
@@ -133,7 +134,7 @@ def _merit(
     return _price(violations, objectives)
 
 
-@compiled
+@inner
 def _price(violations: Record, objectives: Record) -> tuple[float, bool]:  # pragma: no cover - compiled
     price, feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:

@@ -25,7 +25,7 @@ from planner.seeding.shortening_model import (
     constraint_count,
     lagrangian,
 )
-from world.kernels import compiled, copy_into
+from world.kernels import compiled, copy_into, inner
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ FIRST_PENALTY, LAST_PENALTY, ROUNDS, STEPS, HALVINGS = 0.1, 1.0, 9, 5, 5
 STILL = 0.05
 
 
-@compiled
+@inner
 def _newton_step(
     path: Floats, low: Floats, high: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:  # pragma: no cover - compiled
@@ -135,7 +135,7 @@ def continue_shortening(
     return Shortening(here, active, multipliers, number, made)
 
 
-@compiled
+@inner
 def _descend(
     data: ProblemArrays,
     limits: PrecomputedLimits,

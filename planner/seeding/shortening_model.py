@@ -30,7 +30,7 @@ from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_lim
 from planner.evaluation.problem import ProblemArrays, clearance_at
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, measure_lags
 from world.frames import polymap
-from world.kernels import Records, compiled, copy_into
+from world.kernels import Records, copy_into, inner
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
@@ -69,7 +69,7 @@ class ActiveConstraints(NamedTuple):
     turns_in_legs: bool
 
 
-@compiled
+@inner
 def active_constraints(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float
 ) -> ActiveConstraints:  # pragma: no cover - compiled
@@ -96,7 +96,7 @@ def active_constraints(
     return ActiveConstraints(pairs, distances, samples, low, climb, dive, before, after, roll, data.legs_hold_turns)
 
 
-@compiled
+@inner
 def _turn_shares(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -122,7 +122,7 @@ def _turn_shares(
             before[i], after[i] = 0.0, min(MAX_TURN_LENGTH, turn_length(True, corners, 0)) / share
 
 
-@compiled
+@inner
 def _near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
 ) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
@@ -155,7 +155,7 @@ def _near_missiles(
     return out, wanted
 
 
-@compiled
+@inner
 def constraint_count(active: ActiveConstraints) -> int:  # pragma: no cover - compiled
     """Number of constraints of `lagrangian`."""
     legs = active.low.size
@@ -163,7 +163,7 @@ def constraint_count(active: ActiveConstraints) -> int:  # pragma: no cover - co
     return count
 
 
-@compiled
+@inner
 def carry_multipliers(
     old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints
 ) -> Floats:  # pragma: no cover - compiled
@@ -205,7 +205,7 @@ class LagrangianModel(NamedTuple):
     slopes: Floats
 
 
-@compiled
+@inner
 def _add(
     value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel
 ) -> float:  # pragma: no cover - compiled
@@ -227,7 +227,7 @@ def _add(
     return (push * push - multiplier * multiplier) / (2.0 * penalty)
 
 
-@compiled
+@inner
 def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no cover - compiled
     """Add the path's length to the model; returns the length, m."""
     total, size, unit = 0.0, model.gradient.size, np.empty(3)
@@ -257,7 +257,7 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no co
     return total
 
 
-@compiled
+@inner
 def _add_missiles(
     data: ProblemArrays,
     active: ActiveConstraints,
@@ -287,7 +287,7 @@ def _add_missiles(
     return merit
 
 
-@compiled
+@inner
 def _add_ground(
     data: ProblemArrays,
     limits: PrecomputedLimits,
@@ -331,7 +331,7 @@ def _add_ground(
     return merit
 
 
-@compiled
+@inner
 def _add_slopes(
     active: ActiveConstraints,
     path: Floats,
@@ -359,7 +359,7 @@ def _add_slopes(
     return merit
 
 
-@compiled
+@inner
 def _add_turns(
     data: ProblemArrays,
     active: ActiveConstraints,
@@ -409,7 +409,7 @@ def _add_turns(
     return merit
 
 
-@compiled
+@inner
 def _turn_slopes(
     of_before: Floats, of_after: Floats, factor: float, slopes: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -420,7 +420,7 @@ def _turn_slopes(
         slopes[2, axis] += factor * of_after[axis]
 
 
-@compiled
+@inner
 def lagrangian(
     data: ProblemArrays,
     limits: PrecomputedLimits,

@@ -29,7 +29,7 @@ from planner.seeding.grids import (
     set_cell_costs,
     trace_back,
 )
-from world.kernels import Records, compiled, inlined
+from world.kernels import Records, compiled, inlined, inner
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
@@ -61,7 +61,7 @@ class GridCosts(NamedTuple):
     successors: Codes
 
 
-@compiled
+@inner
 def _relax_stage_back(
     left: Floats,
     price: Floats,
@@ -95,7 +95,7 @@ def _relax_stage_back(
                 relax(flat, flat_price, flat_before, flat_successors, after, here, after, b - a, length)
 
 
-@compiled
+@inner
 def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> None:  # pragma: no cover - compiled
     """Drop cells (layers, across) of one stage through which no route is within the bound."""
     for z in range(reached.shape[0]):

@@ -19,7 +19,7 @@ from planner.evaluation.problem import ProblemArrays, clearance_at, required_cle
 from planner.evaluation.threat_index import kill_density
 from planner.seeding.waypoint_fitting import leg_cost
 from world.frames import polymap
-from world.kernels import Records, compiled, inlined
+from world.kernels import Records, compiled, inlined, inner
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
@@ -140,7 +140,7 @@ def _through(
     return cost
 
 
-@compiled
+@inner
 def _extend(
     data: ProblemArrays,
     limits: PrecomputedLimits,
@@ -207,7 +207,7 @@ def _distance(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
-@compiled
+@inner
 def _corner_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
 ) -> float:  # pragma: no cover - compiled

@@ -19,7 +19,7 @@ from planner.evaluation.problem import ProblemArrays
 from planner.evaluation.terrain_clearance import lag_length, segment_pixels, terrain_excess
 from planner.evaluation.threat_index import kill_density
 from planner.seeding.grids import KILL_COST
-from world.kernels import compiled
+from world.kernels import compiled, inner
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -29,7 +29,7 @@ DEPTH_COST = 2e4
 SLOPE_COST = 1e6
 
 
-@compiled
+@inner
 def leg_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats
 ) -> float:  # pragma: no cover - compiled
@@ -67,7 +67,7 @@ def leg_cost(
     return total
 
 
-@compiled
+@inner
 def _below(
     data: ProblemArrays, limits: PrecomputedLimits, east: float, north: float, run: float, low: float, high: float
 ) -> float:  # pragma: no cover - compiled
@@ -207,8 +207,8 @@ def _pick(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tu
     """Chosen candidates (w, 3) in their frames, with fixed ends; number of legs evaluated."""
     count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.
-    for end, point, inner in ((0, data.start, 0), (-1, data.destination, count - 1)):
-        candidates[end] = frames.rotate(np.tile(point, (count, 1)))[inner]
+    for end, point, next_inside in ((0, data.start, 0), (-1, data.destination, count - 1)):
+        candidates[end] = frames.rotate(np.tile(point, (count, 1)))[next_inside]
     chosen, legs = _choose(data, np.ascontiguousarray(_restore(frames, candidates)))
     return candidates[np.arange(len(candidates)), chosen], int(legs)
 

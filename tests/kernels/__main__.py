@@ -16,6 +16,7 @@ from pathlib import Path
 from planfly.first_start import compile_units
 from planfly.kernel_units.ready_kernels import MISSION
 from planfly.kernel_units.unit_kernels import BOTH
+from planfly.process_setup import prepare_process, with_large_stack
 from world.kernels import cache_folder
 
 # Over which the climb and the corner of MISSION lead.
@@ -124,7 +125,8 @@ def main() -> int:
 def _run(commands: tuple[tuple[str, ...], ...]) -> int:
     from planfly.cli import main as planfly
 
-    return int(any(planfly(list(argv)) not in (0, 4) for argv in commands))
+    prepare_process()
+    return int(any(with_large_stack(lambda argv=argv: planfly(list(argv))) not in (0, 4) for argv in commands))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from numba.core.registry import cpu_target
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from world.by_reference import _layout, by_reference
 from world.kernel_cache import PACKAGES, kernel_sources, sources_digest
-from world.kernels import Record, compiled, field_names, inlined, record_dtype
+from world.kernels import Record, compiled, field_names, inlined, inner, record_dtype
 
 ROOT = Path(__file__).parents[2]
 INNER = record_dtype("east", "north")
@@ -190,6 +190,26 @@ def test_kernels_read_what_stands_behind_a_pointer() -> None:
     assert _sum_sites(sites) == 2.0 * of_site
     assert _sum_sites(sites._replace(weight=3.0)) == 3.0 * of_site
     assert _sum_sites(pickle.loads(pickle.dumps(sites))) == 2.0 * of_site
+
+
+@inner
+def _power(base: float, exponent: int) -> float:  # pragma: no cover - compiled
+    power = 1.0
+    for _ in range(exponent):
+        power *= base
+    return power
+
+
+@compiled
+def _sum_powers(base: float, last: int) -> float:  # pragma: no cover - compiled
+    return _power(base, 2) + _power(base, 3) + _power(base, last)
+
+
+def test_a_kernel_of_kernels_is_compiled_once_for_all_literal_numbers_and_can_be_called_from_python() -> None:
+    assert _sum_powers(2.0, 5) == 2.0**2 + 2.0**3 + 2.0**5
+    assert _power.dispatcher.signatures == [(numba.float64, numba.int64)]  # type: ignore[attr-defined]
+    assert _power(3.0, 4) == 81.0
+    assert _power.__name__ == "_power"
 
 
 def test_what_stands_behind_a_pointer_lies_as_compiled_code_has_it() -> None:

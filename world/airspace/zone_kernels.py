@@ -11,7 +11,7 @@ import numpy as np
 
 from world.airspace.zones import Cylinder, Ring, Zone, ZoneLevel
 from world.by_reference import by_reference
-from world.kernels import Record, Records, compiled, inlined, record_dtype
+from world.kernels import Record, Records, compiled, compiled_inline, inlined, inner, record_dtype
 
 # One zone.  round: whether it is a cylinder, of which `centre_east`, `centre_north` and `radius` say all.  first_edge,
 # last_edge: its edges in the array of edges, the last not included.  west to north: its box on the map.  floor,
@@ -128,7 +128,7 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:  # pragm
     return math.sqrt(off_e * off_e + off_n * off_n)
 
 
-@compiled
+@inner
 def nearest_edge(
     records: ZoneRecords, z: int, east: float, north: float
 ) -> tuple[float, int]:  # pragma: no cover - compiled
@@ -168,7 +168,7 @@ def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> fl
     return away
 
 
-@inlined
+@compiled_inline
 def outside_band(zone: Record, up: float, ground: float) -> float:  # pragma: no cover - compiled
     """Height below a zone's floor or above its ceiling, m; negative between them, by the nearer.
 
@@ -182,7 +182,7 @@ def outside_band(zone: Record, up: float, ground: float) -> float:  # pragma: no
     return below if below > above or below != below else above
 
 
-@compiled
+@inner
 def inside_share(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, first: float, last: float
 ) -> float:  # pragma: no cover - compiled
@@ -237,7 +237,7 @@ def _between(
     return off_e * off_e + off_n * off_n, share
 
 
-@compiled
+@inner
 def segment_distance(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled

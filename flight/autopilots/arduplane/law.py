@@ -12,7 +12,7 @@ from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l
 from flight.guidance.path import find_on_path, profile
 from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
 from world.geometry import wrap
-from world.kernels import Record, Records, compiled, record_dtype
+from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import Heights
 
 Floats = NDArray[np.float64]
@@ -95,7 +95,7 @@ def turn_distance(
     return right_angle * min(1.0, turn / (0.5 * math.pi))
 
 
-@compiled
+@inner
 def past_line(estimated: Record, from_east: float, from_north: float, b: Record) -> bool:  # pragma: no cover - compiled
     """Whether the line across the leg at its end is passed; a leg without length is.
 
@@ -107,7 +107,7 @@ def past_line(estimated: Record, from_east: float, from_north: float, b: Record)
     return passed
 
 
-@compiled
+@inner
 def navigate_legs(
     estimated: Record,
     waypoints: Records,
@@ -149,7 +149,7 @@ def navigate_legs(
         own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
 
 
-@compiled
+@inner
 def _reached(
     estimated: Record, b: Record, parameters: Record, own: Record, length: float, air_density_factor: float
 ) -> bool:  # pragma: no cover - compiled
@@ -167,7 +167,7 @@ def _reached(
     return passed or distance <= reach
 
 
-@compiled
+@inner
 def _around(
     estimated: Record, b: Record, parameters: Record, own: Record, length: float, speed: float
 ) -> float:  # pragma: no cover - compiled
@@ -194,7 +194,7 @@ def _around(
     return demanded
 
 
-@compiled
+@inner
 def _past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - compiled
     """Whether the aircraft on a circle has passed the corner of the route that stands for this part of it."""
     corner = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
@@ -203,7 +203,7 @@ def _past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - co
     return 0.0 <= turned < 0.5 * math.pi
 
 
-@compiled
+@inner
 def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:  # pragma: no cover - compiled
     """Bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.  pitch: rad."""
     level = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
@@ -212,7 +212,7 @@ def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> f
     return within
 
 
-@compiled
+@inner
 def min_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover - compiled
     """Least airspeed that is flown in a wanted bank (rad), equivalent, m/s: AIRSPEED_MIN, for the load in the bank.
 
@@ -223,7 +223,7 @@ def min_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover 
     return slowest
 
 
-@compiled
+@inner
 def roll_demand(
     side_acceleration: float, pitch: float, airspeed: float, parameters: Record
 ) -> float:  # pragma: no cover - compiled
@@ -275,7 +275,7 @@ _NEARLY = 0.003
 _UNDERSPEED, _ALL_BUT_FULL = 0.9, 0.95
 
 
-@compiled
+@inner
 def demand_height(
     estimated: Record, b: Record, parameters: Record, own: Record, dt: float
 ) -> None:  # pragma: no cover - compiled
@@ -304,7 +304,7 @@ def demand_height(
     own.height_rate = behind / max(dt, parameters.tecs_height_demand_time)
 
 
-@compiled
+@inner
 def _leg_height(estimated: Record, b: Record, parameters: Record, own: Record) -> float:  # pragma: no cover - compiled
     """Height on the leg's slope at the aircraft's place along it; that of its end where it is flown as a step."""
     end: float = b.up
@@ -329,7 +329,7 @@ def _leg_height(estimated: Record, b: Record, parameters: Record, own: Record) -
     return here
 
 
-@compiled
+@inner
 def _estimate_airspeed(
     state: Record, estimated: Record, parameters: Record, own: Record, dt: float
 ) -> None:  # pragma: no cover - compiled
@@ -355,7 +355,7 @@ def _estimate_airspeed(
     own.acceleration = gained - own.acceleration_mean
 
 
-@compiled
+@inner
 def update_tecs(
     state: Record, estimated: Record, parameters: Record, own: Record, airspeed: float, factor: float, dt: float
 ) -> None:  # pragma: no cover - compiled
@@ -390,7 +390,7 @@ def update_tecs(
     _set_pitch(state, parameters, own, high, fast, climbing, gaining, under, dt)
 
 
-@compiled
+@inner
 def _set_throttle(
     state: Record, parameters: Record, own: Record, high: float, missing: float, rate: float, max_rate: float,
     min_rate: float, dt: float,
@@ -422,7 +422,7 @@ def _set_throttle(
     own.held = 1 if throttle >= highest - _NEARLY else (-1 if throttle <= parameters.throttle_min else 0)
 
 
-@compiled
+@inner
 def _set_pitch(
     state: Record, parameters: Record, own: Record, high: float, fast: float, climbing: float, gaining: float,
     under: bool, dt: float,
@@ -510,7 +510,7 @@ def arduplane_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     return end_tick(work)
 
 
-@compiled
+@inner
 def fly_as_ardupilot(
     state: Record,
     estimated: Record,
@@ -547,7 +547,7 @@ def fly_as_ardupilot(
     _follow(state, estimated, gains, memory, parameters, own, factor, commands, dt)
 
 
-@compiled
+@inner
 def _begin(
     state: Record, estimated: Record, waypoints: Records, memory: Record, parameters: Record, own: Record
 ) -> None:  # pragma: no cover - compiled
@@ -570,7 +570,7 @@ def _begin(
     own.throttle_sum = memory.trim_throttle - parameters.throttle_cruise
 
 
-@compiled
+@inner
 def _follow(
     state: Record,
     estimated: Record,

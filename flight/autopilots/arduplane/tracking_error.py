@@ -24,7 +24,7 @@ from flight.autopilots.arduplane.law import (
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import ERRORS, MOTION
-from world.kernels import Record, Records, compiled, field_names, record_dtype
+from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
 from world.scenario_tables import Navigation
 from world.wind import Turbulence
 
@@ -138,7 +138,7 @@ def _fill(
             corner.before = 0.0 if fly_over else best
 
 
-@compiled
+@inner
 def _fly_corner(
     parameters: Record,
     airspeed: float,

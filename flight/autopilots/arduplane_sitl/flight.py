@@ -48,7 +48,7 @@ from flight.simulation.tick import (
 )
 from world.errors import FlightError
 from world.frames import to_geo
-from world.kernels import Record, Records, compiled
+from world.kernels import Record, Records, compiled, inner
 from world.terrain import Heights
 
 Floats = NDArray[np.float64]
@@ -84,7 +84,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     return end_tick(work)
 
 
-@compiled
+@inner
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
     """Fill leg, distance, cross-track and height error of the memory: the nearest of the pieces from the last one on.
 
@@ -105,7 +105,7 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
     memory.height_error = true.up - profile(nodes, distance)[0]
 
 
-@compiled
+@inner
 def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:  # pragma: no cover - compiled
     """How far right of the last leg (m), and how far past its end, the aircraft is."""
     a, b = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]

@@ -26,7 +26,7 @@ from flight.guidance.lateral_reference_laws import (
 from flight.guidance.path import find_on_path, max_curvature, mean_curvature, profile
 from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
 from world.geometry import wrap
-from world.kernels import Record, Records, compiled
+from world.kernels import Record, Records, compiled, inner
 from world.scenario_tables import Guidance
 from world.terrain import Heights
 
@@ -62,7 +62,7 @@ def planfly_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - 
     return end_tick(work)
 
 
-@compiled
+@inner
 def guide(
     state: Record,
     estimated: Record,
@@ -96,7 +96,7 @@ def guide(
     steer_bank(state, gains, memory, commands, bank, dt)
 
 
-@compiled
+@inner
 def _along_path(
     state: Record,
     estimated: Record,
@@ -139,7 +139,7 @@ def _along_path(
     return bank
 
 
-@compiled
+@inner
 def _roll_into_path(
     curvature: float, gains: Record, memory: Record, turn: float, speed: float, crab: float, dt: float
 ) -> float:  # pragma: no cover - compiled
@@ -159,7 +159,7 @@ def _roll_into_path(
     return home
 
 
-@compiled
+@inner
 def _correction(
     state: Record,
     estimated: Record,
@@ -184,14 +184,14 @@ def _correction(
     return push
 
 
-@compiled
+@inner
 def _pressure(state: Record, gains: Record) -> float:  # pragma: no cover - compiled
     """Dynamic pressure in that at the reference airspeed."""
     share: float = (state.airspeed / gains.reference_airspeed) ** 2
     return share
 
 
-@compiled
+@inner
 def _unexplained(
     state: Record, estimated: Record, gains: Record, memory: Record, speed: float, crab: float, dt: float
 ) -> float:  # pragma: no cover - compiled
@@ -211,7 +211,7 @@ def _unexplained(
     return side_now
 
 
-@compiled
+@inner
 def _l1(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:  # pragma: no cover - compiled
@@ -236,7 +236,7 @@ def _l1(
     return bank
 
 
-@compiled
+@inner
 def _field(
     estimated: Record, curvature: float, gains: Record, memory: Record, course: float, dt: float
 ) -> float:  # pragma: no cover - compiled
@@ -254,7 +254,7 @@ def _field(
     return bank
 
 
-@compiled
+@inner
 def steer_height(
     state: Record,
     estimated: Record,
@@ -289,7 +289,7 @@ def steer_height(
     _set_throttle(estimated, gains, memory, commands, airspeed, ahead_slope, along, dt)
 
 
-@compiled
+@inner
 def _push_ceiling(
     gains: Record, memory: Record, airspeed: float, climb_rate: float, rate_gain: float, dt: float
 ) -> float:  # pragma: no cover - compiled
@@ -312,7 +312,7 @@ def _push_ceiling(
     return ceiling
 
 
-@compiled
+@inner
 def _set_throttle(
     estimated: Record,
     gains: Record,
@@ -337,7 +337,7 @@ def _set_throttle(
         memory.speed_sum = min(60.0, max(-60.0, memory.speed_sum + slow * dt))
 
 
-@compiled
+@inner
 def steer_bank(
     state: Record, gains: Record, memory: Record, commands: Record, bank: float, dt: float
 ) -> None:  # pragma: no cover - compiled

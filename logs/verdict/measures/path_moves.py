@@ -14,7 +14,7 @@ from flight.guidance.path import FlyByPath, arc_point, profile
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from world.frames import PolyMapRecord, polymap
-from world.kernels import Record, Records, compiled, record_dtype
+from world.kernels import Record, Records, inner, record_dtype
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
@@ -39,7 +39,7 @@ MOVE = record_dtype(
 )
 
 
-@compiled
+@inner
 def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """East, north and up (m) at a share of a move."""
     run = share * move.length
@@ -130,7 +130,7 @@ BLOCK = record_dtype("west", "east", "south", "north", "low", "high", "steepest"
 BLOCK_MOVES = 64
 
 
-@compiled
+@inner
 def move_blocks(
     moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch: float, above_ground: bool
 ) -> Records:  # pragma: no cover - compiled
@@ -154,7 +154,7 @@ def move_blocks(
     return blocks
 
 
-@compiled
+@inner
 def _steepest(
     block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: float
 ) -> float:  # pragma: no cover - compiled

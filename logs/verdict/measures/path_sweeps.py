@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from logs.verdict.tolerances import FAR, FARTHEST, TOUCH
 from world.frames import PolyMapRecord
 from world.geometry import segment_exposure, sphere_window
-from world.kernels import compiled, read_only
+from world.kernels import compiled, inner, read_only
 from world.terrain import Heights, Terrain, segment_clearance
 
 Floats = NDArray[np.float64]
@@ -115,7 +115,7 @@ def _path_spheres(
     return out
 
 
-@compiled
+@inner
 def _boxes(points: Floats) -> _Boxes:  # pragma: no cover - compiled
     segments = max(0, points.shape[0] - 1)
     count = -(-segments // _BLOCK)
@@ -133,7 +133,7 @@ def _boxes(points: Floats) -> _Boxes:  # pragma: no cover - compiled
     return out
 
 
-@compiled
+@inner
 def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """Least and greatest distance of a block's box from a point."""
     low2 = 0.0
@@ -147,7 +147,7 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
     return math.sqrt(low2), math.sqrt(high2)
 
 
-@compiled
+@inner
 def _closest(
     points: Floats, time: Floats, block: int, centre: Floats, m: int, out: SphereVisits
 ) -> None:  # pragma: no cover - compiled
@@ -166,7 +166,7 @@ def _closest(
             out.closest_time[m] = time[k] + f * (time[k + 1] - time[k])
 
 
-@compiled
+@inner
 def _inside(
     points: Floats,
     time: Floats,

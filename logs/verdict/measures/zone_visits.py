@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from logs.verdict.measures.path_moves import BLOCK_MOVES, move_blocks, move_point
 from world.airspace.zone_kernels import ZoneRecords, box_distance, distance_to_edge, nearest_edge, outside_band
 from world.frames import POLYMAP, PolyMapRecord
-from world.kernels import Record, Records, compiled, inlined, record_dtype
+from world.kernels import Record, Records, compiled, inlined, inner, record_dtype
 from world.terrain import Terrain, ground_height
 
 Heights = NDArray[np.float32]
@@ -45,7 +45,7 @@ PART = record_dtype(
 )
 
 
-@compiled
+@inner
 def look_at_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:  # pragma: no cover - compiled
@@ -107,7 +107,7 @@ def between_ends(
     return max(level_low, low), max(level_high, high)
 
 
-@compiled
+@inner
 def farthest_from_outline(
     records: ZoneRecords, z: int, move: Record, part: Record, run: float
 ) -> float:  # pragma: no cover - compiled
@@ -220,7 +220,7 @@ def _path_zones(
     return visits
 
 
-@compiled
+@inner
 def _visit(
     moves: Records,
     blocks: Records,
@@ -258,7 +258,7 @@ def _visit(
             break
 
 
-@compiled
+@inner
 def _visit_block(
     moves: Records,
     turn: int,
@@ -291,7 +291,7 @@ def _visit_block(
             _cut_move(moves[k], turn == 2, records, z, heights, to_pixel, steepest, known, parts, visit)
 
 
-@compiled
+@inner
 def _cut_move(
     move: Record,
     ordered: bool,
@@ -353,14 +353,14 @@ def _cut_move(
         left += 1
 
 
-@compiled
+@inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:  # pragma: no cover - compiled
     """Whether both ends are above ground that would tell and is not known: all between counts as unknown."""
     before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
     return before != before and after != after
 
 
-@compiled
+@inner
 def _deepen(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
     """Take a part's ends for the deepest place of a visit where they are, and note unknown ground."""
     for at_end in range(2):
@@ -374,7 +374,7 @@ def _deepen(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
         visit.unknown = visit.unknown or depth != depth
 
 
-@compiled
+@inner
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
     """Add a part of a move, wrong or right throughout or passing the limit once, to a visit."""
     before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)

@@ -11,6 +11,7 @@ from planfly.kernel_units import ready_kernels
 from planfly.kernel_units.ready_kernels import do_unit, is_ready
 from planfly.kernel_units.unit_kernels import BOTH, UNIT_KERNELS, kernels_of
 from world.compile_events import kernel_is_compiled
+from world.kernels import compiled
 
 ROOT = Path(__file__).parents[3]
 # The kernels that a process calls are those with types, where all are in the cache: what they call comes with them.
@@ -60,6 +61,11 @@ def test_kernels_are_told_once_as_soon_as_they_are_ready(monkeypatch: pytest.Mon
     assert told == ["first", "ready first", "second", "third", "ready third"]
 
 
+@compiled
+def _never_called(number: float) -> float:  # pragma: no cover - compiled
+    return number
+
+
 def test_a_kernel_is_ready_once_it_has_been_called() -> None:
     import numpy as np
 
@@ -67,7 +73,7 @@ def test_a_kernel_is_ready_once_it_has_been_called() -> None:
 
     steepest_slopes(np.zeros((2, 2), np.float32), 1.0)
     assert is_ready("world.terrain.steepest_slopes")
-    assert not is_ready("world.airspace.zone_kernels.inside_share")
+    assert not is_ready(f"{__name__}._never_called")
 
 
 def test_a_unit_that_fails_is_told_and_the_end_of_input_ends_the_process() -> None:
