@@ -206,7 +206,7 @@ def _setup(
         scenario=scenario,
         mission=mission,
         mission_text=mission_text(mission, "waypoints"),
-        route=lay_route(placed, limits.airspeed, scenario.flight.fly_over, limits),
+        route=lay_route(placed, limits.airspeed, scenario.flight.fly_over, limits, autopilot.return_rules),
         limits=limits,
         aircraft=aircraft.name,
         battery=battery,

@@ -4,7 +4,8 @@ An `Autopilot` carries its own settings: a `FlightSetup` holds one, and whoever 
 and never which one it is.  Each has a folder beside this file; `flight.autopilots.catalog.AUTOPILOTS` lists them.
 
 The base class answers for an autopilot that flies the fly-by path as it was planned, at the true airspeeds that it is
-told, without parameters.  An autopilot overrides what it does otherwise.
+told, without parameters, and returns to launch as ArduPlane does by its defaults.  An autopilot overrides what it does
+otherwise.
 """
 
 from abc import ABC, abstractmethod
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
+from flight.mission.return_path import USUAL_RULES, ReturnRules
 from world.errors import ScenarioError
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Guidance, Navigation
@@ -271,6 +273,11 @@ class Autopilot(ABC):
         cruise: its airspeed until it takes up the first.
         """
         return commanded
+
+    @property
+    def return_rules(self) -> ReturnRules:
+        """How it returns to launch: where to, how high, how it turns and circles."""
+        return USUAL_RULES
 
     @property
     def stated_airspeed(self) -> tuple[float, str] | None:

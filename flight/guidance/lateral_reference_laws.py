@@ -24,6 +24,8 @@ WAYPOINT = record_dtype(
     "circle",  # m, radius of the loiter that it is a corner of, positive to the right; 0 for none
     "centre_east",  # m, of that circle
     "centre_north",
+    ("returns", np.bool_),  # whether the leg to it stands for a return; circle, centre and up are then of its target
+    "slope_base",  # m, as of `flight.mission.return_path.ReturnCircle`
 )
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.
 WAYPOINT_RADIUS = 90.0

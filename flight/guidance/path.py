@@ -266,6 +266,14 @@ def waypoint_records(route: Route) -> Records:
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
     waypoints["up"] = route.waypoints[:, 2]
     _set_circles(waypoints[1:-1], route)
+    if route.return_to is not None:
+        back = waypoints[route.return_from + 1 :]
+        back["returns"] = True
+        names = ("centre_east", "centre_north", "up", "circle", "slope_base")
+        for name, value in zip(names, route.return_to, strict=True):
+            back[name] = value
+        # Nothing says how the next leg turns: as at a mission's end, it is a right angle.
+        waypoints["turn"][route.return_from] = 0.5 * math.pi
     return waypoints
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Mission
-from flight.mission.itinerary import ItineraryStop, make_itinerary
-from flight.mission.placing import HIGHEST, PlacedMission, on_map, place_stops
+from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
+from flight.mission.placing import HIGHEST, PlacedMission, on_map, place_stops, rally_stops
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
@@ -44,7 +44,8 @@ def implied_scenario(
     flight: the aircraft and how it flies, the defaults if None.
     vertical_legs: as for `flight.mission.placing.place_stops`.
 
-    The area is the box of the positions flown to, their circles and 2 km around, clipped at the tile's edge.  Start
+    The area is the box of the positions flown to, their circles and 2 km around, clipped at the tile's edge; a mission
+    that ends with a return has the nearest rally point among them.  Start
     and destination are the first and last of these positions; where they are not above ground they are lifted to 1 m,
     because a scenario's ends must be, while the route (and its verdict) keeps the mission's heights.  Raises
     MissionError, and TerrainError where the mission leaves the tile.
@@ -61,7 +62,7 @@ def implied_scenario(
     flight = flight or FlightTable()
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
-    box, flown = _boxes(mission, itinerary.stops, origin)
+    box, flown = _boxes(mission, itinerary, origin)
     terrain, table, box = _ground(terrain_path, origin, box, flown)
     placed = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
     top = max(float(place.position[2]) for place in placed.stops)
@@ -102,12 +103,21 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
     return origin
 
 
-def _boxes(mission: Mission, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> tuple[Floats, Floats]:
+def _boxes(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[Floats, Floats]:
     """Area, and smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
+    stops = itinerary.stops
     points = on_map(mission.source, stops, origin)
     flown = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
     around = AREA_BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
-    return np.clip(flown + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
+    area = flown
+    if itinerary.returns and (rally := rally_stops(mission)):
+        # Which of them the aircraft may be near enough to fly to is not known here: the nearest to where it turns back.
+        far = on_map(mission.source, rally, origin)
+        away = np.hypot(*(far - points[max(0, len(points) - 2)]).T)
+        if away.min() <= _HOME_DISTANCE:
+            nearest = far[[int(np.argmin(away))]].T
+            area = np.stack([np.minimum(flown[:, 0], nearest[:, 0]), np.maximum(flown[:, 1], nearest[:, 0])], axis=1)
+    return np.clip(area + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
 
 
 def _ground(

@@ -107,6 +107,11 @@ class Itinerary:
     endless: int = -1
     landing: ItineraryStop | None = None
 
+    @property
+    def returns(self) -> bool:
+        """Whether it ends with a return to launch; the last stop is then home, at the height before it."""
+        return self.stops[-1].command == Command.NAV_RETURN_TO_LAUNCH
+
 
 def make_itinerary(mission: Mission) -> Itinerary:
     """Walk through the mission as an autopilot would.
@@ -258,9 +263,9 @@ class _Walk:
         elif not self.stops:
             self.notes.add("NAV_RETURN_TO_LAUNCH before the start: ignored", item.seq)
         else:
-            self.notes.add("NAV_RETURN_TO_LAUNCH: flown as a leg to home at the last height", item.seq)
+            # Where to and how high is for who flies: `flight.mission.return_path`.  No speed that was set counts there.
             home = replace(item, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
-            self.stops.append(self._stop(home))
+            self.stops.append(replace(self._stop(home), airspeed=math.nan))
             self.ended = True
 
     def _land(self, item: MissionItem) -> None:

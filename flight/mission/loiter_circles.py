@@ -57,8 +57,8 @@ class RoutePoint:
 
 
 @dataclass(frozen=True, slots=True)
-class _Node:
-    """A stop as a point, or as a circle about it.
+class Node:
+    """A stop as a point, or as a circle about it; east, north, up in m.
 
     turn: the circle's radius, m, positive to the right, 0 for a point.
     """
@@ -69,7 +69,8 @@ class _Node:
     up: float
     turn: float = 0.0
 
-    def away(self, other: "_Node") -> float:
+    def away(self, other: "Node") -> float:
+        """How far apart the middles are, m."""
         return math.hypot(other.east - self.east, other.north - self.north)
 
 
@@ -83,7 +84,7 @@ def lay_circles(
     to lay out.
     """
     nodes = _nodes(source, stops, notes, own_radius)
-    courses = [_course(a, b) for a, b in pairwise(nodes)]
+    courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
     up = float(stops[0].position[2])
     for k, node in enumerate(nodes):
@@ -96,7 +97,7 @@ def lay_circles(
         run = math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
         laid = _around(source, node, into, onward, up, run, slopes)
         if not k:
-            laid.insert(0, RoutePoint(node.stop, (*_rim(node, into), laid[0].position[2])))
+            laid.insert(0, RoutePoint(node.stop, (*on_rim(node, into), laid[0].position[2])))
         up = laid[-1].position[2]
         points += laid
         if len(points) > MAX_STOPS:
@@ -106,17 +107,17 @@ def lay_circles(
     return points
 
 
-def _nodes(source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius) -> list[_Node]:
+def _nodes(source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius) -> list[Node]:
     """Points and circles in flying order, each with a tangent to the next."""
-    nodes: list[_Node] = []
+    nodes: list[Node] = []
     for stop, (east, north, up) in stops:
-        node = _Node(stop, float(east), float(north), float(up))
+        node = Node(stop, float(east), float(north), float(up))
         if stop.loiter is not None:
             node = replace(node, turn=_turn(source, stop, stop.loiter, float(up), notes, own_radius))
             while nodes and nodes[-1].turn == 0.0 and nodes[-1].away(node) < abs(node.turn) + _CLEAR:
                 _left_out(nodes.pop().stop, node.stop, notes)
         before = nodes[-1] if nodes else None
-        if before is not None and before.turn != 0.0 and not _joined(before, node):
+        if before is not None and before.turn != 0.0 and not is_joined(before, node):
             if node.turn == 0.0:
                 _left_out(stop, before.stop, notes)
                 continue
@@ -149,13 +150,13 @@ def _turn(source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: No
     return math.copysign(radius, loiter.radius)
 
 
-def _joined(a: _Node, b: _Node) -> bool:
+def is_joined(a: Node, b: Node) -> bool:
     """Whether a tangent leads from one circle to another circle or point, or both are one circle."""
     apart = a.away(b)
     return apart > abs(b.turn - a.turn) + _CLEAR or (apart < 1.0 and abs(a.turn - b.turn) < 1.0)
 
 
-def _course(a: _Node, b: _Node) -> float:
+def tangent_course(a: Node, b: Node) -> float:
     """Course of the tangent from one circle (or point) to the next, rad; of one circle to itself, north."""
     apart = a.away(b)
     if apart < 1.0:
@@ -165,7 +166,7 @@ def _course(a: _Node, b: _Node) -> float:
     return bearing - math.asin(min(1.0, max(-1.0, (b.turn - a.turn) / apart)))
 
 
-def _rim(node: _Node, course: float, out: float = 1.0) -> tuple[float, float]:
+def on_rim(node: Node, course: float, out: float = 1.0) -> tuple[float, float]:
     """Where the circle is flown on this course; ``out``: that many radii from the centre instead."""
     return (
         node.east - node.turn * out * math.cos(course),
@@ -173,8 +174,20 @@ def _rim(node: _Node, course: float, out: float = 1.0) -> tuple[float, float]:
     )
 
 
+def circle_corners(node: Node, into: float, sweep: float) -> list[tuple[float, float]]:
+    """East and north (m) of the corners around a circle, joined on a course and flown around by an angle, rad.
+
+    >>> point = ItineraryStop(1, 16, 0.0, 0.0, 0.0, 0, 25.0)
+    >>> [(round(e), round(n)) for e, n in circle_corners(Node(point, 100.0, 0.0, 0.0, 100.0), 0.0, math.pi / 2.0)]
+    [(0, 41), (59, 100)]
+    """
+    count = max(1, math.ceil(sweep / CORNER - 1e-9))
+    step, side = sweep / count, math.copysign(1.0, node.turn)
+    return [on_rim(node, into + side * (k + 0.5) * step, 1.0 / math.cos(0.5 * step)) for k in range(count)]
+
+
 def _around(
-    source: str, node: _Node, into: float, onward: float | None, up: float, run: float, slopes: SpiralSlopes
+    source: str, node: Node, into: float, onward: float | None, up: float, run: float, slopes: SpiralSlopes
 ) -> list[RoutePoint]:
     """Corners around a circle, joined on one course and left on another (None: the mission ends there).
 
@@ -200,13 +213,11 @@ def _around(
         turns, allowed = sweep / (2.0 * math.pi), f"at most {MAX_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
         item = f"item {node.stop.item}"
         raise MissionError.at(source, item, turns, allowed, shown=f"{turns:,.0f} turns to loiter")
-    count = max(1, math.ceil(sweep / CORNER - 1e-9))
-    step = sweep / count
+    corners = circle_corners(node, into, sweep)
     points = []
-    for k in range(count):
-        share = 1.0 if count == 1 else k / (count - 1)
-        east, north = _rim(node, into + side * (k + 0.5) * step, 1.0 / math.cos(0.5 * step))
+    for k, (east, north) in enumerate(corners):
+        share = 1.0 if len(corners) == 1 else k / (len(corners) - 1)
         points.append(RoutePoint(node.stop, (east, north, first + share * (node.up - first)), radius))
     if onward is None and sweep > 0.0:
-        points.append(RoutePoint(node.stop, (*_rim(node, into + side * sweep), node.up)))
+        points.append(RoutePoint(node.stop, (*on_rim(node, into + side * sweep), node.up)))
     return points

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Home, Mission, Notes
+from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Command, Home, Mission, Notes
 from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
 from flight.mission.loiter_circles import PlacedStop
+from flight.mission.return_path import ReturnPlace
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
 from world.geometry import leg_courses
@@ -35,6 +36,8 @@ class PlacedMission:
     notes: what came up in placing them, after the itinerary's.
     takeoff_ground: height of the ground at home, m, NaN where it is not known or nothing takes off.
     landing_ground: height of the place to land at, m, NaN where it is not known or nothing lands.
+    return_places: home, at the height that heights over home count from, and then the rally points; empty where the
+        mission does not end with a return.
     """
 
     mission: Mission
@@ -44,6 +47,7 @@ class PlacedMission:
     notes: tuple[str, ...]
     takeoff_ground: float
     landing_ground: float
+    return_places: tuple[ReturnPlace, ...] = ()
 
 
 def place_stops(
@@ -77,7 +81,40 @@ def place_stops(
     stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs)
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
     landing_ground = heights.touchdown(itinerary)
-    return PlacedMission(mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground)
+    places = _return_places(mission, itinerary, origin, heights) if itinerary.returns else ()
+    return PlacedMission(
+        mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground, places
+    )
+
+
+def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
+    """A mission's rally points as places to fly to; one at 0, 0 is none, as in ArduPlane.
+
+    >>> from flight.mission.items import Frame, MissionItem
+    >>> point = MissionItem(0, 5100, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 90.0)
+    >>> [(stop.lat_deg, stop.alt) for stop in rally_stops(Mission(None, (), rally=(point,)))]
+    [(36.5, 90.0)]
+    """
+    return tuple(
+        ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
+        for item in mission.rally
+        if item.has_position
+    )
+
+
+def _return_places(
+    mission: Mission, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights"
+) -> tuple[ReturnPlace, ...]:
+    """Home and the rally points on the map.  Raises MissionError, naming the rally point, for one beyond any map."""
+    east, north = to_map(origin, itinerary.home.lat_deg, itinerary.home.lon_deg)
+    home = ReturnPlace(float(east), float(north), heights.home_amsl())
+    places = [home]
+    stops = rally_stops(mission)
+    for stop, (point_east, point_north) in zip(stops, on_map(mission.source, stops, origin).tolist(), strict=True):
+        # Ground stations have no rally point without a height: one is home's.
+        up = heights.amsl(stop, point_east, point_north, home.up)
+        places.append(ReturnPlace(point_east, point_north, up, home.up if stop.frame in OVER_HOME else 0.0))
+    return tuple(places)
 
 
 def _placed_stops(
@@ -91,6 +128,7 @@ def _placed_stops(
         last = float(kept[-1].position[2]) if kept else math.nan
         new = PlacedStop(stop, np.array([east, north, heights.amsl(stop, float(east), float(north), last)]))
         circles = stop.loiter is not None or bool(kept and kept[-1].stop.loiter is not None)
+        circles = circles or stop.command == Command.NAV_RETURN_TO_LAUNCH
         if kept and not circles and math.dist(kept[-1].position[:2], new.position[:2]) < SAME_PLACE:
             if vertical_legs and _is_vertical(kept[-1], new):
                 kept.append(PlacedStop(stop, _step_aside(kept, new.position)))
@@ -142,7 +180,7 @@ class _Heights:
         if stop.frame in AMSL:
             height = stop.alt
         elif stop.frame in OVER_HOME:
-            height = self._over_home(stop) + stop.alt
+            height = self.home_amsl() + stop.alt
         else:
             height = self._ground(stop, east, north) + stop.alt
         if not LOWEST <= height <= HIGHEST:
@@ -159,9 +197,10 @@ class _Heights:
             raise MissionError(f"{asked}: {lacks}", file=self.source, field="frame", value=stop.frame)
         return under
 
-    def _over_home(self, stop: ItineraryStop) -> float:
+    def home_amsl(self) -> float:
+        """Height that heights over home count from."""
         if self._home_amsl is None:
-            self._home_amsl = self._find_home(stop, self.home)
+            self._home_amsl = self._find_home(self.home)
         return self._home_amsl
 
     def touchdown(self, itinerary: Itinerary) -> float:
@@ -185,7 +224,7 @@ class _Heights:
                 return float(self.terrain.height(east, north))
         return math.nan
 
-    def _find_home(self, stop: ItineraryStop, home: Home) -> float:
+    def _find_home(self, home: Home) -> float:
         under = self.ground_at_home()
         if not math.isnan(home.alt):
             if abs(home.alt - under) > _HOME_ERROR:
@@ -238,4 +277,6 @@ def _merge(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> Itin
 
 
 def _name(stop: ItineraryStop) -> str:
+    if stop.command == Command.NAV_RALLY_POINT:
+        return f"rally point {stop.item + 1}"
     return f"item {stop.item}" if stop.item >= 0 else "home"

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +10,17 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import Mission, Notes, command_name
 from flight.mission.itinerary import Itinerary, ItineraryStop
-from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, PlacedStop, SpiralSlopes, lay_circles
-from flight.mission.placing import PlacedMission, place_stops
+from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, PlacedStop, RoutePoint, SpiralSlopes, lay_circles
+from flight.mission.placing import HIGHEST, LOWEST, PlacedMission, place_stops
+from flight.mission.return_path import (
+    USUAL_RULES,
+    ReturnAbility,
+    ReturnCircle,
+    ReturnRules,
+    choose_target,
+    described_return,
+    lay_return,
+)
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo
 from world.geometry import fly_by_offset, leg_courses, signed_turns, wrap
@@ -36,6 +46,9 @@ class Route:
     endless: seq of the jump that would have the last round flown for ever, -1 for none.
     takeoff_ground, landing_ground: m, the ground that the mission takes off from and the place that it lands at, which
         the flight begins and ends above; NaN where there is none or it is not known.
+    return_from: index of the waypoint at which a return to launch begins, -1 for none; what follows stands for the way
+        that an autopilot finds by itself.
+    return_to: the circle that the return ends in; None for no return.
     """
 
     waypoints: Floats
@@ -49,6 +62,8 @@ class Route:
     endless: int = -1
     takeoff_ground: float = math.nan
     landing_ground: float = math.nan
+    return_from: int = -1
+    return_to: ReturnCircle | None = None
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -156,6 +171,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         items=np.pad(route.items, (head, tail), constant_values=-1),
         arcs=np.pad(route.arcs, (head, tail)),
         started=started,
+        return_from=route.return_from + (head if route.return_from >= 0 else 0),
     )
 
 
@@ -191,6 +207,7 @@ def make_route(
     default_airspeed: float,
     fly_over: bool,
     limits: Limits | None = None,
+    rules: ReturnRules = USUAL_RULES,
 ) -> Route:
     """Route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
 
@@ -199,6 +216,7 @@ def make_route(
     fly_over: whether waypoints are flown through instead of by; one whose arc would miss its acceptance always is.
     limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
         a spiral (5 %).
+    rules: how whoever flies returns to launch.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
     has a horizontal length of at least `flight.mission.placing.SAME_PLACE`.  Raises MissionError, naming the item, for
@@ -215,10 +233,16 @@ def make_route(
     >>> route.started
     'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
     """
-    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits)
+    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
 
 
-def lay_route(placed: PlacedMission, default_airspeed: float, fly_over: bool, limits: Limits | None = None) -> Route:
+def lay_route(
+    placed: PlacedMission,
+    default_airspeed: float,
+    fly_over: bool,
+    limits: Limits | None = None,
+    rules: ReturnRules = USUAL_RULES,
+) -> Route:
     """Route through the places of a mission; arguments as of `make_route`.
 
     Raises MissionError for fewer than two places, and for a loiter too wide or too long to lay out.
@@ -231,7 +255,11 @@ def lay_route(placed: PlacedMission, default_airspeed: float, fly_over: bool, li
     """
     mission, notes = placed.mission, Notes()
     kept = [_with_airspeed(place, default_airspeed) for place in placed.stops]
+    returning = kept.pop() if placed.itinerary.returns else None
     points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits))
+    back: dict[str, Any] = {}
+    if returning is not None:
+        back = _lay_return(placed, returning.stop, points, rules, limits, notes)
     if len(points) < 2:
         raise MissionError(
             f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected",
@@ -255,7 +283,46 @@ def lay_route(placed: PlacedMission, default_airspeed: float, fly_over: bool, li
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground,
+        **back,
     )
+
+
+def _lay_return(
+    placed: PlacedMission,
+    stop: ItineraryStop,
+    points: list[RoutePoint],
+    rules: ReturnRules,
+    limits: Limits | None,
+    notes: Notes,
+) -> dict[str, Any]:
+    """Add a return's waypoints to those so far; gives the fields of the `Route` that are a return's.
+
+    Raises MissionError for a height beyond those that are flown.
+    """
+    source, here = placed.mission.source, points[-1].position
+    home, *rally = placed.return_places
+    target = choose_target(rules, here, home, rally)
+    up = target.position[2]
+    if not LOWEST <= up <= HIGHEST:
+        allowed = f"allowed {LOWEST:.0f}..{HIGHEST:.0f}"
+        where = f"item {stop.item}: return to {target.name}"
+        raise MissionError.at(source, where, up, allowed, shown=f"{up:.1f} m AMSL")
+    climb, dive = _spiral_slopes(limits)(stop.airspeed, max(here[2], up))
+    ability = ReturnAbility(
+        turn_radius=lambda a, b, amsl: (
+            DEFAULT_RADIUS if limits is None else limits.turn_radius(a, b, amsl, stop.airspeed)
+        ),
+        circle=_own_radius(limits)(stop.airspeed, up),
+        climb=climb,
+        dive=dive,
+        max_bank=math.radians(30.0) if limits is None else limits.max_bank,
+        airspeed=stop.airspeed,
+    )
+    notes.add(described_return(target, rules, here[2]), stop.item)
+    first = len(points) - 1
+    points += lay_return(points, stop, target, rules, ability)
+    circle = ReturnCircle(*target.position, rules.radius or ability.circle, target.slope_base)
+    return {"return_from": first, "return_to": circle}
 
 
 def _with_airspeed(place: PlacedStop, default: float) -> PlacedStop:

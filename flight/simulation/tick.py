@@ -18,6 +18,7 @@ from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION, NAVIGATION_LAGS, navigate
 from flight.guidance.path import NODE, PIECE, FlyByPath, Records
+from flight.mission.itinerary import UNLIMITED
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE, TRACK_ROW
 from flight.simulation.turbulence import GUST_FILTERS, step_gusts
 from world.frames import POLYMAP, polymap
@@ -177,6 +178,11 @@ STEEPEST_BANK = math.radians(75.0)
 COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY = 1, 2, 3, 4, 5, 6, 7
 # A flight that passes the end of its route further than this from it, m, has missed it.
 FAR = 100.0
+# A return to launch has come to its circle within this distance of the middle or two radii, m, and to its height, m.  A
+# circle of 60 m cannot be flown at 26 m/s and 30 degrees of bank: ArduPlane gets up to 260 m from its middle.
+NEAR, AT_HEIGHT = 300.0, 20.0
+# However its circles are flown, it is over after so many times the time that it is to circle.
+MOST_CIRCLES = 5.0
 ENDS = {
     COMPLETED: "completed",
     NOT_A_NUMBER: "departure: the state is not a number",
@@ -256,6 +262,24 @@ def end_tick(work: Record) -> int:  # pragma: no cover - compiled
 
 
 @inner
+def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
+    """Note how long a return to launch has circled at its end; it ends the flight as an end of the path does.
+
+    For an autopilot that returns by a law of its own, and need not follow the path: it ends where the path does once it
+    has come to its circle, and after `MOST_CIRCLES` of its time at the latest.
+
+    motion: a record of `flight.guidance.navigation_error.MOTION`.
+    b: any waypoint of the way back, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    """
+    memory.returning = True
+    there = math.hypot(motion.east - b.centre_east, motion.north - b.centre_north) < max(NEAR, 2.0 * abs(b.circle))
+    if memory.circled > 0.0 or (there and abs(motion.up - b.up) < AT_HEIGHT):
+        memory.circled += dt
+    memory.done = (memory.done and memory.circled > UNLIMITED) or memory.circled > MOST_CIRCLES * UNLIMITED
+
+
+@inner
 def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compiled
     """Take the state to SI; False where it has a NaN or an infinity."""
     total = 0.0
@@ -277,7 +301,7 @@ def _status(
     if state.airspeed < slowest:
         return STALLED
     if memory.done:
-        near = abs(memory.cross_track) <= FAR and abs(memory.height_error) <= FAR
+        near = memory.returning or (abs(memory.cross_track) <= FAR and abs(memory.height_error) <= FAR)
         return COMPLETED if near else MISSED
     return EMPTY if empty else 0
 

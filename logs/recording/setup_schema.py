@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from aircraft.envelope import Envelope
 from flight.autopilots.autopilot import AutopilotProgram, Origin, ParameterValue, StoredParameters
 from flight.mission.items import Home, Mission, MissionItem
+from flight.mission.return_path import ReturnCircle
 from flight.mission.route import Route
 from world.errors import LogError
 from world.geometry import leg_runs
@@ -107,6 +108,11 @@ class RouteTable(SetupModel):
     endless: Annotated[int, Field(alias="endless_jump")] = -1
     takeoff_ground: Annotated[_Height, Field(alias="takeoff_ground_m")] = None
     landing_ground: Annotated[_Height, Field(alias="landing_ground_m")] = None
+    return_from: Annotated[int, Field(ge=-1, alias="return_from_waypoint")] = -1
+    return_to: Annotated[
+        tuple[Finite, Finite, Finite, Finite, Finite] | None,
+        Field(alias="return_to_east_north_amsl_radius_slope_base_m"),
+    ] = None
 
     def route(self, file: str) -> Route:
         """The route of the table.  Raises LogError for columns that do not fit, and for a leg without length."""
@@ -117,9 +123,13 @@ class RouteTable(SetupModel):
             length, expected = len(getattr(self, field)), len(waypoints) - (field == "airspeed")
             if length != expected:
                 raise self.fault(file, field, f"{length} values: {expected} are expected")
+        if self.return_from >= len(waypoints) - 1 or (self.return_from < 0) != (self.return_to is None):
+            raise self.fault(file, "return_from", f"{self.return_from}: a waypoint before the last, with its target")
         heights = {field: getattr(self, field) for field in ("takeoff_ground", "landing_ground")}
         known = {field: math.nan if height is None else height for field, height in heights.items()}
-        return _made(Route, self, waypoints=waypoints, items=np.array(self.items, dtype=np.int64), **known)
+        circle = None if self.return_to is None else ReturnCircle(*self.return_to)
+        items = np.array(self.items, dtype=np.int64)
+        return _made(Route, self, waypoints=waypoints, items=items, return_to=circle, **known)
 
 
 class EnvelopeTable(SetupModel):

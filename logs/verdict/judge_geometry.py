@@ -65,11 +65,15 @@ def _judged(requirements: RouteRequirements, aligned: AlignedTrack | None, *, ge
 def with_suggestions(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend."""
-    out = []
+    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend.
+
+    The way of a return to launch is the autopilot's: no change of its legs can be made.
+    """
+    out, first = [], requirements.setup.route.return_from
+    back = {requirements.leg(i) for i in range(first, requirements.legs)} if first >= 0 else set()
     for item in findings:
         suggest = RULES[item.rule].suggest
-        if item.ok is False and suggest is not None:
+        if item.ok is False and suggest is not None and item.place not in back:
             item = replace(item, suggestions=suggest(requirements, aligned, item))
         out.append(item)
     return tuple(out)

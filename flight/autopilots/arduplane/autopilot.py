@@ -22,6 +22,7 @@ from flight.autopilots.arduplane.parameters import (
 )
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import Autopilot, Floats, SpeedLimits, StoredAutopilot, StoredParameters, Tick
+from flight.mission.return_path import ReturnRules
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Navigation
 from world.wind import Turbulence
@@ -107,6 +108,26 @@ class ArduPlane(Autopilot):
     def airspeed_factor(self, amsl: float) -> float:
         """True by equivalent airspeed."""
         return float(true_by_equivalent(amsl))
+
+    @property
+    def return_rules(self) -> ReturnRules:
+        """By RTL_ALTITUDE, RTL_RADIUS, RTL_CLIMB_MIN, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_SINK_MAX.
+
+        >>> made = ArduPlane(default_parameters().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16))
+        >>> made.return_rules.height, made.return_rules.climb_first, made.return_rules.rally_limit
+        (nan, inf, 5000.0)
+        """
+        made = self.parameters
+        return ReturnRules(
+            height=math.nan if made.rtl_altitude < 0.0 else made.rtl_altitude,
+            radius=made.return_radius,
+            climb_first=math.inf if made.climbs_before_turn else made.rtl_climb_min,
+            first_bank=min(made.level_roll_limit, made.roll_limit),
+            sink=made.tecs_sink_max or math.inf,
+            rally_limit=made.rally_limit,
+            includes_home=made.rally_includes_home > 0.0,
+            slope_to_stated_height=True,
+        )
 
     @property
     def speed_limits(self) -> SpeedLimits | None:

@@ -6,11 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
+from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, CLIMB_BEFORE_TURN
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from flight.guidance.path import find_on_path, profile
-from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
+from flight.simulation.tick import (
+    NOT_A_NUMBER,
+    PATH_ROW,
+    WORKSPACE,
+    WORKSPACE_NUMBERS,
+    begin_tick,
+    end_return,
+    end_tick,
+)
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import Heights
@@ -30,6 +38,8 @@ ARDUPILOT_MEMORY = record_dtype(
     "from_up",  # m, where its slope begins
     "cross_track_sum",  # rad, L1's integral
     ("on_circle", np.bool_),  # whether a loiter's circle is followed, not just approached
+    ("returning", np.bool_),  # whether it returns to launch; from_east, from_north and from_up are then where it began
+    ("climbed", np.bool_),  # whether it has climbed what it has to before it turns
     "side_acceleration",  # m/s^2 to the right, as last demanded
     "roll_demand",  # rad
     # Height.
@@ -129,8 +139,12 @@ def navigate_legs(
     damping = parameters.navl1_damping
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     length = l1_length(speed, parameters.navl1_period, damping)
+    if b.returns:
+        # A return goes on until the flight ends, in one leg.
+        _return(estimated, b, parameters, own, air_density_factor)
+        return
     if b.circle != 0.0:
-        own.side_acceleration = _around(estimated, b, parameters, own, length, speed)
+        own.side_acceleration = _around(estimated, b, abs(b.circle), parameters, own, length, speed)
         reached = own.on_circle and _past_corner(estimated, b)
     else:
         own.on_circle = False
@@ -168,12 +182,41 @@ def _reached(
 
 
 @inner
+def _return(
+    estimated: Record, b: Record, parameters: Record, own: Record, air_density_factor: float
+) -> None:  # pragma: no cover - compiled
+    """Demand the side acceleration of a return to launch (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
+
+    It turns to the middle of its circle at once, whatever leg it was on; the circle grows with height as the square of
+    true by equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until it has climbed what it has to, its bank is
+    LEVEL_ROLL_LIMIT, and only then its slope begins.
+    """
+    if not own.returning:
+        own.returning = True
+        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
+    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
+    length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
+    radius = abs(b.circle) * air_density_factor * air_density_factor
+    own.side_acceleration = _around(estimated, b, radius, parameters, own, length, speed)
+    if own.climbed:
+        return
+    if int(parameters.flight_options) & CLIMB_BEFORE_TURN:
+        own.climbed = estimated.up > b.up
+    else:
+        own.climbed = parameters.rtl_climb_min <= 0.0 or estimated.up - own.from_up > parameters.rtl_climb_min
+    if own.climbed:
+        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
+        return
+    most = GRAVITY * math.tan(parameters.level_roll_limit)
+    own.side_acceleration = min(most, max(-most, own.side_acceleration))
+
+
+@inner
 def _around(
-    estimated: Record, b: Record, parameters: Record, own: Record, length: float, speed: float
+    estimated: Record, b: Record, radius: float, parameters: Record, own: Record, length: float, speed: float
 ) -> float:  # pragma: no cover - compiled
     """Side acceleration for a loiter: straight to its centre until its circle asks for more, then around it, m/s^2."""
     side = math.copysign(1.0, b.circle)
-    radius = abs(b.circle)
     out_e, out_n = estimated.east - b.centre_east, estimated.north - b.centre_north
     distance = max(0.1, math.hypot(out_e, out_n))
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
@@ -285,7 +328,7 @@ def demand_height(
     b: the leg's end, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     parameters, own: as `flight.autopilots.arduplane.law.navigate_legs` takes them.
     """
-    target = _leg_height(estimated, b, parameters, own)
+    target = _return_height(estimated, b, parameters, own) if b.returns else _leg_height(estimated, b, parameters, own)
     share = dt / (dt + parameters.tecs_height_demand_time)
     # What the aircraft cannot follow is not asked of it: the demand waits, and its rate is brought down meanwhile.
     cannot_climb, cannot_sink = own.held > 0 and own.height_rate > 0.0, own.held < 0 and own.height_rate < 0.0
@@ -327,6 +370,29 @@ def _leg_height(estimated: Record, b: Record, parameters: Record, own: Record) -
         return end
     own.from_up = end - rest / left
     return here
+
+
+@inner
+def _return_height(
+    estimated: Record, b: Record, parameters: Record, own: Record
+) -> float:  # pragma: no cover - compiled
+    """Height that a return asks for: on a straight slope down to its target, or at once up to it, m.
+
+    The slope is that of the line from where it began to the middle of the circle; on the circle the target's height
+    counts (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).  Down to a rally point it is drawn as if the
+    point's height over home were one above the sea, and flown no higher than it began
+    (`Plane::set_offset_altitude_location`, `Plane::constrain_target_altitude_location`; seen in 20 flights).
+    """
+    end: float = b.up
+    fall = own.from_up - end
+    drawn = fall + b.slope_base
+    if own.on_circle or fall <= 0.0 or abs(drawn) < parameters.glide_slope_min:
+        return end
+    leg_e, leg_n = b.centre_east - own.from_east, b.centre_north - own.from_north
+    run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
+    along = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
+    height: float = min(own.from_up, end + drawn * (1.0 - min(1.0, max(0.0, along))))
+    return height
 
 
 @inner
@@ -532,6 +598,8 @@ def fly_as_ardupilot(
     and no part of the law.
     """
     find_on_path(estimated, pieces, memory)
+    if own.returning:
+        end_return(estimated, waypoints[own.leg + 1], memory, dt)
     memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
     factor = true_by_equivalent(estimated.up)
     if not own.begun:

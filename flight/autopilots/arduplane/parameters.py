@@ -129,6 +129,7 @@ AIRCRAFT_FILE = "ardupilot.parm"
 _DEGREE = math.pi / 180.0
 _PERCENT = 0.01
 _CENTI = 0.01
+_KILOMETRE = 1000.0
 
 
 class Definition(NamedTuple):
@@ -189,9 +190,19 @@ DEFINITIONS = {
     "tecs_height_demand_time": Definition("TECS_HDEM_TCONST", 3.0, 0.0, 20.0),
     "rtl_altitude": Definition("RTL_ALTITUDE", 100.0, -1.0, 9000.0, 1.0, ("ALT_HOLD_RTL", _CENTI)),
     "rtl_radius": Definition("RTL_RADIUS", 0.0, -32767.0, 32767.0),
+    "rtl_climb_min": Definition("RTL_CLIMB_MIN", 0.0, 0.0, 9000.0),
+    "flight_options": Definition("FLIGHT_OPTIONS", 0.0, 0.0, 2.0**31 - 1.0),
+    "level_roll_limit": Definition("LEVEL_ROLL_LIMIT", 5.0, 0.0, 45.0, _DEGREE),
+    "rally_limit": Definition("RALLY_LIMIT_KM", 5.0, 0.0, 20_000.0, _KILOMETRE),
+    "rally_includes_home": Definition("RALLY_INCL_HOME", 0.0, 0.0, 1.0),
+    "rtl_autoland": Definition("RTL_AUTOLAND", 0.0, 0.0, 4.0),
 }
-# Read, and no flight of ours shows them: a return is flown as a leg to home at the last height, and ends the flight.
-NOT_FLOWN = ("RTL_ALTITUDE", "RTL_RADIUS")
+# Bit of FLIGHT_OPTIONS that has a return climb to its height before it turns.
+CLIMB_BEFORE_TURN = 1 << 4
+# Of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
+_USUAL_LOITER_RADIUS = 60.0
+# Read, and no flight of ours shows it: a return ends in its circle, where this would have it land.
+NOT_FLOWN = ("RTL_AUTOLAND",)
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 
@@ -218,6 +229,11 @@ class ArduPilotParameters:
     tecs_pitch_max, tecs_pitch_min: rad, 0 for the pitch limits.
     tecs_height_demand_time: s, of the height demand's lag.
     rtl_altitude: m over home, negative for the present height.  rtl_radius: m, 0 for that of a loiter.
+    rtl_climb_min: m that a return climbs before it turns.  level_roll_limit: rad, its bank meanwhile.
+    flight_options: bits; bit 4 has a return climb to its height before it turns.
+    rally_limit: m, a nearest rally point further away than this is not flown to; 0 for no limit.
+    rally_includes_home: 1 where a return goes home if that is nearer than any rally point; 0 where not.
+    rtl_autoland: 0 where a return stays in its circle; other values have it land.
     """
 
     not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN
@@ -262,6 +278,12 @@ class ArduPilotParameters:
     tecs_height_demand_time: float = field(init=False)
     rtl_altitude: float = field(init=False)
     rtl_radius: float = field(init=False)
+    rtl_climb_min: float = field(init=False)
+    flight_options: float = field(init=False)
+    level_roll_limit: float = field(init=False)
+    rally_limit: float = field(init=False)
+    rally_includes_home: float = field(init=False)
+    rtl_autoland: float = field(init=False)
 
     def __post_init__(self) -> None:
         """Take the values to SI."""
@@ -282,6 +304,27 @@ class ArduPilotParameters:
             for parameter in self.values
         )
         return ArduPilotParameters(made, self.unused, self.source)
+
+    @property
+    def climbs_before_turn(self) -> bool:
+        """Whether a return climbs to its height before it turns: bit 4 of FLIGHT_OPTIONS."""
+        return bool(int(self.flight_options) & CLIMB_BEFORE_TURN)
+
+    @property
+    def return_radius(self) -> float:
+        """Radius of the circle that a return ends in, m at sea level, negative to the left.
+
+        RTL_RADIUS, or WP_LOITER_RAD where that is 1 m or less, or 60 m where both are; to the side of RTL_RADIUS if
+        that is not 0 (`ModeRTL::navigate` in ArduPlane/mode_rtl.cpp, `Plane::update_loiter` in navigation.cpp).
+
+        >>> made = default_parameters()
+        >>> [made.changed(RTL_RADIUS=m, WP_LOITER_RAD=-80.0).return_radius for m in (0.0, -150.0, 1.0)]
+        [-80.0, -150.0, 80.0]
+        >>> made.return_radius, made.changed(WP_LOITER_RAD=-1.0).return_radius
+        (60.0, -60.0)
+        """
+        size = next((abs(radius) for radius in (self.rtl_radius, self.wp_loiter_rad) if abs(radius) > 1.0), None)
+        return math.copysign(size or _USUAL_LOITER_RADIUS, self.rtl_radius or self.wp_loiter_rad)
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """The values (in ArduPlane's units) that one source states, by name."""

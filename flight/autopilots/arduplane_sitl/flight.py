@@ -44,6 +44,7 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
+    end_return,
     end_tick,
 )
 from world.errors import FlightError
@@ -67,7 +68,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     """Do a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
     The commands that stand in it are the other program's.  The flight completes where it passes the end of the path,
-    once the program says that it has nothing before it but that.
+    once the program says that it has nothing before it but that; a return to launch completes in its circle.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -76,7 +77,10 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
         return NOT_A_NUMBER
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
-    if settings.on_last_leg:
+    last = path.waypoint[settings.waypoints - 1]
+    if last.returns and settings.on_last_leg:
+        end_return(work.true, last, memory, work.timing.dt)
+    elif settings.on_last_leg:
         across, beyond = beyond_end(work.true, path.waypoint[: settings.waypoints])
         memory.done = beyond >= 0.0
         if memory.done:

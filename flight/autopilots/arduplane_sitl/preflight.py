@@ -29,9 +29,10 @@ Floats = NDArray[np.float64]
 # ----------------------------------------------------------------------
 # The mission that an autopilot is given to fly: the items that the route is made of, and one place more.
 #
-# What a flight from air to air cannot hold is made a waypoint where the route has it: a take-off, a landing, a return
-# to launch.  A place more, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it
-# takes a waypoint as reached a radius early, and returns to launch after the last.
+# What a flight from air to air cannot hold is made a waypoint where the route has it: a take-off, a landing.  A place
+# more, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it takes a waypoint as
+# reached a radius early, and returns to launch after the last.  A mission that ends with a return to launch has that at
+# its end, and its rally points go with it.
 
 
 # From the end of the route to the place more, m.
@@ -47,20 +48,24 @@ class UploadedMission:
     """What goes to the autopilot.
 
     home: its home; alt is AMSL.
-    items: numbered from 1; the last is the place more.
+    items: numbered from 1; the last is the place more, or a return to launch.
+    rally: the points that a return may go to, numbered from 0; none without a return.
     """
 
     home: Home
     items: tuple[MissionItem, ...]
+    rally: tuple[MissionItem, ...] = ()
 
 
 def uploaded_mission(setup: FlightSetup) -> UploadedMission:
-    """The mission of a setup as the autopilot gets it, all heights above mean sea level."""
+    """The mission of a setup as the autopilot gets it, all heights above mean sea level but those of rally points."""
     route, origin = setup.route, setup.scenario.origin
     kept: list[MissionItem] = []
     for item in setup.mission.items:
         rows = np.flatnonzero(route.items == item.seq)
-        if rows.size:
+        if item.command == Command.NAV_RETURN_TO_LAUNCH:
+            kept += [item] if rows.size else []
+        elif rows.size:
             kept.append(_place(item, route, rows, origin, kept))
         elif item.command in _KEPT:
             kept.append(item)
@@ -68,6 +73,8 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
         kept = _of_route(route, origin)
     elif route.items[-1] == -1:
         kept.append(_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
+    if route.return_from >= 0:
+        return UploadedMission(_home(setup), _renumbered(kept), setup.mission.rally)
     kept.append(_waypoint(kept[-1].seq + 1, _straight_on(route), 0.0, origin))
     return UploadedMission(_home(setup), _renumbered(kept))
 
@@ -132,12 +139,17 @@ def _renumbered(kept: list[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def _home(setup: FlightSetup) -> Home:
-    """The mission's home, or the start's place; at a height that lets the motor run from the start."""
+    """The mission's home, or the start's place; at a height that lets the motor run from the start.
+
+    A return to launch counts its heights from home: there it is the mission's.
+    """
     start = setup.route.waypoints[0]
     home = setup.mission.home
     if home is None:
         lat, lon = to_geo(setup.scenario.origin, start[0], start[1])
         home = Home(on_grid(float(lat)), on_grid(float(lon)), math.nan)
+    if setup.route.return_to is not None and not math.isnan(home.alt):
+        return home
     near = math.isnan(home.alt) or abs(home.alt - start[2]) < _NEAR
     return replace(home, alt=float(start[2]) - _BELOW) if near else home
 
@@ -240,7 +252,9 @@ class Preflight:
                 _WANTED[mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT],
             ),
         )
-        yield from self._upload(mission)
+        yield from self._upload([_home_item(mission.home), *mission.items], MissionType.MISSION)
+        if mission.rally:
+            yield from self._upload(list(mission.rally), MissionType.RALLY)
         yield from self._obeys(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
         yield from self._obeys(
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
@@ -310,12 +324,12 @@ class Preflight:
         while not (known.keys() >= set(names) or started.longer_than(_AGAIN)):
             yield
 
-    def _upload(self, mission: UploadedMission) -> Talk:
-        """Hand over the mission (MAVLink mission protocol), again while there is no space for it yet."""
+    def _upload(self, items: list[MissionItem], kind: MissionType) -> Talk:
+        """Hand over a list (MAVLink mission protocol), again while there is no space for it yet."""
         started = self._since()
-        items = [_home_item(mission.home), *mission.items]
+        what = "mission" if kind == MissionType.MISSION else "rally points"
         while True:
-            yield from self._offer(items)
+            yield from self._offer(items, kind)
             result = self._news.mission_result
             if result == mavlink.MAV_MISSION_ACCEPTED:
                 return
@@ -327,15 +341,15 @@ class Preflight:
                     else (f" at item {asked} ({command_name(items[asked].command)})")
                 )
                 name = "no answer" if result is None else _MISSION_RESULTS.get(result, str(result))
-                message = f"refused the mission{item}: {name}{self._last_text()}"
-                raise FlightError(message, field="mission", value=name)
+                message = f"refused the {what}{item}: {name}{self._last_text()}"
+                raise FlightError(message, field=what, value=name)
             yield from self._wait(_AGAIN)
 
-    def _offer(self, items: list[MissionItem]) -> Talk:
+    def _offer(self, items: list[MissionItem], kind: MissionType) -> Talk:
         """Count, then each item that is asked for, until the upload is acknowledged or nothing more comes."""
         news, link = self._news, self._link
         news.requested = news.mission_result = None
-        link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), MissionType.MISSION))
+        link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
         last, answered = None, self._since()
         while news.mission_result is None and not answered.longer_than(ANSWERS):
             if news.requested is not None and (news.requested != last or answered.longer_than(_AGAIN)):

@@ -154,6 +154,8 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
         endless=-1,
         takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
         landing_ground=route.landing_ground if last == route.legs else math.nan,
+        return_from=max(0, route.return_from - first) if 0 <= route.return_from < last else -1,
+        return_to=route.return_to if route.return_from < last else None,
     )
 
 

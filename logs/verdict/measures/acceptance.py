@@ -40,7 +40,7 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
     """What counts as having reached waypoint i: the mission's own radius, else that of whoever flies.
 
     ArduPlane turns to the next leg at WP_RADIUS from a right angle or a sharper corner and at a share of it from a
-    gentler one, and at the mission's end at all of it.
+    gentler one, and at the mission's end, and where a return to launch begins, at all of it.
     """
     setup, own = requirements.setup, float(requirements.fly_by_offset[i]) + PASS
     stated = float(setup.route.acceptance[i])
@@ -48,7 +48,8 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
     if stated > 0.0:
         return Reach(stated, "mission", tolerance)
     if not setup.autopilot.follows_path:
-        turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
+        inside = 0 < i < requirements.legs and i != setup.route.return_from
+        turn = abs(float(requirements.turns[i])) if inside else math.pi
         return Reach(setup.autopilot.turn_distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance)
     return Reach(own, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
+from flight.simulation.tick import NEAR
 from flight.simulation.track import Track
 from logs.verdict.measures.acceptance import reach
 from logs.verdict.measures.path_sweeps import path_clearance
@@ -96,6 +97,10 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         max(float(offset) + ARRIVED, reach(requirements, i).radius)
         for i, offset in enumerate(requirements.fly_by_offset)
     ]
+    first = requirements.setup.route.return_from
+    if first >= 0:
+        # A return ends where its autopilot circles, which is not where its circle is drawn.
+        arrived[first + 1 :] = [max(NEAR, radius) for radius in arrived[first + 1 :]]
     passed = (rows < last) | (off <= arrived)
     passed = np.logical_and.accumulate(passed)
     step = np.diff(clean.position[:, :2], axis=0)

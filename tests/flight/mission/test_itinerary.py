@@ -72,10 +72,12 @@ def test_jumps_to_nowhere_or_too_often_are_refused() -> None:
 
 def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     home = route(wp(0, 500, 150), wp(0, 1500, 200), "0 20 0 0 0 0 0 0 0", wp(5, 5))
-    assert home.waypoints[-1] == pytest.approx([0.0, 0.0, 500.0], abs=0.01)
+    # Home is at 300 m, and 100 m over it is where planfly's guidance comes home.
+    assert (home.return_from, home.return_to) == (1, pytest.approx((0.0, 0.0, 400.0, 80.0, 0.0), abs=0.01))
     assert home.notes == (
-        "item 3: NAV_RETURN_TO_LAUNCH: flown as a leg to home at the last height",
         "item 4: never reached",
+        "item 3: NAV_RETURN_TO_LAUNCH: to home, 1.5 km away, sinking 100 m on a straight slope to 400 m AMSL;"
+        " circles for 60 s; the mission ends there",
     )
     landed = route(
         wp(0, 500, 150), "3 189 0 0 0 0 36.5 -84.2 0", wp(0, 1500, 60), wp(900, 1500, 0, command=21), wp(0, 0)

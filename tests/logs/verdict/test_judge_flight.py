@@ -30,7 +30,7 @@ def test_a_clean_flight_is_flyable_and_every_rule_speaks(setup: FlightSetup, tra
     assert verdict.flyable
     assert verdict.complete
     assert verdict.lines[:2] == ("flyable", f"Start: {setup.route.started}")
-    silent = {"mission", "loiter", "takeoff", "landing", "height", "fence"}
+    silent = {"mission", "loiter", "takeoff", "landing", "return", "height", "fence"}
     assert {item.rule for item in verdict.findings} == set(RULES) - silent
     assert all(item.ok for item in verdict.findings)
     assert len([item for item in verdict.findings if item.rule == "turn"]) == 3

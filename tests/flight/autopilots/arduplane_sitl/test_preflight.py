@@ -88,10 +88,15 @@ def test_what_cannot_be_in_the_air_is_a_waypoint_where_the_route_has_it() -> Non
     assert flown(setup) == [(1, 16, 500, 80), (2, 16, 1500, 100), (3, 16, 2500, 100), (4, 16, 3500, 100)]
 
 
-def test_a_return_to_launch_is_a_leg_home_at_the_last_height_and_nothing_follows() -> None:
+def test_a_return_to_launch_goes_as_it_is_with_home_and_the_rally_points_and_nothing_follows() -> None:
     items = (place(1, 1500.0), place(2, 2500.0), order(3, C.NAV_RETURN_TO_LAUNCH), place(4, 9000.0))
     setup = setup_of(*items)
-    assert flown(setup) == [(1, 16, 1500, 100), (2, 16, 2500, 100), (3, 16, 0, 100), (4, 16, -1000, 100)]
+    rally = (place(0, 2000.0, 60.0, C.NAV_RALLY_POINT),)
+    given = uploaded_mission(replace(setup, mission=replace(setup.mission, rally=rally)))
+    assert [(item.seq, item.command) for item in given.items] == [(1, 16), (2, 16), (3, 20)]
+    # A home 15 m below the start is left where it is: the return's height counts from it.
+    assert (given.home, given.rally) == (HOME, rally)
+    assert uploaded_mission(setup_of(place(1, 1500.0), place(2, 2500.0))).rally == ()
 
 
 def test_a_jump_leads_to_the_item_that_it_named() -> None:
@@ -235,6 +240,20 @@ def test_it_is_given_the_mission_home_and_auto_in_order(autopilot: Autopilot, cl
     assert (home.x, home.y, home.z, home.frame) == (365000000, -842000000, 300.0, 0)
     assert (arm.param1, arm.param2) == (1.0, 21196.0)
     assert mode.param2 == 10.0
+
+
+def test_rally_points_are_handed_over_after_the_mission(autopilot: Autopilot, clock: Clock) -> None:
+    point = MissionItem(7, int(C.NAV_RALLY_POINT), 3, (0.0,) * 4, 36.51, -84.2, 90.0)
+    autopilot.results *= 2
+    clock.go_through(preflight(autopilot, clock).prepare(replace(MISSION, rally=(point,))))
+    counts = [message for message in autopilot.sent if message.get_type() == "MISSION_COUNT"]
+    assert [(count.count, count.mission_type) for count in counts] == [(4, 0), (1, 2)]
+    assert [(item.seq, item.command, item.mission_type, item.frame, item.z) for item in autopilot.received] == [
+        (0, 5100, 2, 3, 90.0)
+    ]
+    autopilot.results = [mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_ERROR]
+    with pytest.raises(FlightError, match=r"refused the rally points at item 0 \(NAV_RALLY_POINT\): MAV_MISSION_ERROR"):
+        clock.go_through(preflight(autopilot, clock).prepare(replace(MISSION, rally=(point,))))
 
 
 def test_an_upload_before_there_is_space_is_offered_again(autopilot: Autopilot, clock: Clock) -> None:

@@ -1,0 +1,178 @@
+"""ArduPlane's law flies home as ArduPlane did: 38 kept flights, and what each rule of a return is by itself."""
+
+import math
+
+import numpy as np
+import pytest
+
+from aircraft.envelope import GRAVITY
+from flight.autopilots.arduplane.law import demand_height, navigate_legs
+from tests.flight.autopilots.arduplane.kept_flights import KEPT, flown_return, kept_track, return_setup
+from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, waypoints
+from world.kernels import Record
+
+# Law less flight, where the least clearance before the circle is compared, m.
+CLEARANCE = {"default": (-5.0, 5.0), "climbs": (-13.0, 8.0), "rally": (-10.0, 10.0)}
+# On the way: aside and height, m; the time of arrival, s.  A turn at 5 degrees of bank is the farthest aside.
+ASIDE, HEIGHT, ARRIVAL = 80.0, 20.0, 4.0
+
+
+def kind(flight: str) -> str:
+    """Which of them a flight belongs to."""
+    if KEPT[flight]["rally_set"]:
+        return "rally"
+    return "default" if KEPT[flight]["rtl_altitude_m"] == "100" else "climbs"
+
+
+@pytest.mark.parametrize("flight", KEPT)
+def test_a_return_is_flown_as_arduplane_flew_it(flight: str) -> None:
+    real, flown = KEPT[flight], flown_return(flight)
+    assert f"NAV_RETURN_TO_LAUNCH: to {real['target']}, " in flown.route.notes[0]
+    assert flown.hit == (real["hit"] == "1")
+    assert (flown.outside < 0.0) == (float(real["outside_spheres_m"]) < 0.0)
+    low, high = CLEARANCE[kind(flight)]
+    assert low <= flown.low - float(real["least_clearance_m"]) <= high
+    if flown.hit:
+        assert abs(flown.time[-1] - kept_track(flight)[-1, 0]) < 20.0 + ARRIVAL
+    else:
+        assert flown.ended == "completed"
+        assert abs(flown.arrived - float(real["to_circle_s"])) < ARRIVAL
+
+
+@pytest.mark.parametrize("flight", KEPT)
+def test_on_the_way_it_is_where_arduplane_was(flight: str) -> None:
+    flown = flown_return(flight)
+    for time, east, north, up in kept_track(flight):
+        if time > flown.time[-1]:
+            continue
+        here = np.array([np.interp(time, flown.time, flown.position[:, k]) for k in range(3)])
+        assert math.hypot(here[0] - east, here[1] - north) < ASIDE
+        assert abs(here[2] - up) < HEIGHT
+
+
+# ----------------------------------------------------------------------
+# Each rule by itself.
+
+# A target 4 km north and 1 km east of the aircraft, which flies north at 500 m.
+EAST, NORTH = 1000.0, 4000.0
+
+
+def back(up: float, radius: float = 60.0, base: float = 0.0) -> np.ndarray:
+    """The waypoints of a return from the origin: its second is of the way back."""
+    made = waypoints((0.0, -1000.0, 500.0), (0.0, 100.0, 500.0), returns=True)
+    for name, value in (("centre_east", EAST), ("centre_north", NORTH), ("up", up), ("circle", radius)):
+        made[name] = value
+    made["slope_base"] = base
+    return made
+
+
+def navigated(own: Record, here: Record, way: np.ndarray, **values: float) -> Record:
+    """The memory after a navigation at sea level, with these parameters."""
+    navigate_legs(here, way, parameters(**values), own, 1.0, 0.1)
+    return own
+
+
+def asked(own: Record, here: Record, way: np.ndarray, **values: float) -> float:
+    """Height that is asked for after that."""
+    demand_height(here, way[own.leg + 1], parameters(**values), own, 0.1)
+    return float(own.height_asked)
+
+
+def test_it_turns_to_the_middle_of_its_circle_at_once() -> None:
+    # L1 asks for 4 d^2 V^2 / L sin(angle), with L = d T V / pi; the target is atan(1/4) right of the course.
+    own, speed = navigated(memory(), flying(), back(600.0)), 25.0
+    length = 17.0 * 0.75 * speed / math.pi
+    wanted = 4.0 * 0.75**2 * speed**2 / length * math.sin(math.atan2(EAST, NORTH))
+    assert own.side_acceleration == pytest.approx(wanted)
+    # Behind it, as much as for a right angle, to the short side.
+    west = navigated(memory(), flying(course=math.radians(-120.0)), back(600.0))
+    assert west.side_acceleration == pytest.approx(4.0 * 0.75**2 * speed**2 / length)
+    assert navigated(memory(), flying(course=math.radians(150.0)), back(600.0)).side_acceleration < 0.0
+
+
+def test_it_sinks_on_a_straight_slope_in_distance_and_climbs_at_once() -> None:
+    way = back(100.0)
+    own = navigated(memory(height_asked=500.0), flying(), way)
+    # A quarter of the way, 100 m aside of the line, which counts for nothing.
+    run = math.hypot(EAST, NORTH)
+    ue, un = EAST / run, NORTH / run
+    here = flying(0.25 * EAST + 100.0 * un, 0.25 * NORTH - 100.0 * ue, 450.0)
+    assert asked(navigated(own, here, way), here, way) == pytest.approx(500.0 - 0.25 * 400.0)
+    assert asked(navigated(memory(), flying(), back(700.0)), flying(), back(700.0)) == 700.0
+    # A fall of less than GLIDE_SLOPE_MIN, 15 m, is a step.
+    assert asked(navigated(memory(), flying(), back(486.0)), flying(), back(486.0)) == 486.0
+
+
+def test_to_a_rally_point_it_holds_its_height_first() -> None:
+    # 300 m over a home at 200 m: the slope is drawn from 500 m to 300 m AMSL, 200 m too high, and no higher than 500 m.
+    # Down to 350 m it begins after 200 of the 350 m: where (1 - p) (150 + 200) = 150.
+    way = back(350.0, base=200.0)
+    own = navigated(memory(), flying(), way)
+    for share, height in ((0.3, 500.0), (0.571, 500.0), (0.7, 350.0 + 0.3 * 350.0)):
+        here = flying(share * EAST, share * NORTH)
+        assert asked(navigated(own, here, way), here, way) == pytest.approx(height, abs=0.5)
+
+
+def test_the_circle_is_flown_at_the_targets_height_and_grows_with_height() -> None:
+    way = back(100.0, radius=-200.0)
+    own = memory(returning=True, climbed=True, from_up=500.0)
+    # On the circle, the left way round: what the speed takes, V^2 / R.
+    here = flying(EAST + 200.0, NORTH, 300.0, course=0.0)
+    assert asked(navigated(own, here, way), here, way) == 100.0
+    assert own.side_acceleration == pytest.approx(-(25.0**2) / 200.0)
+    # At 1.05 of true by equivalent airspeed the circle is 1.1025 times as wide.
+    there = flying(EAST + 200.0 * 1.05**2, NORTH, 300.0, course=0.0)
+    navigate_legs(there, way, parameters(), own, 1.05, 0.1)
+    assert own.side_acceleration == pytest.approx(-(25.0**2) / (200.0 * 1.05**2))
+
+
+def test_it_banks_little_before_it_has_climbed_what_it_has_to() -> None:
+    most = GRAVITY * math.tan(math.radians(5.0))
+    way = back(700.0)
+    own = navigated(memory(), flying(), way, RTL_CLIMB_MIN=50.0)
+    assert own.side_acceleration == pytest.approx(most)
+    assert navigated(own, flying(up=549.9), way, RTL_CLIMB_MIN=50.0).side_acceleration == pytest.approx(most)
+    assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).climbed
+    assert navigated(own, flying(up=550.1), way, RTL_CLIMB_MIN=50.0).side_acceleration > most
+    # Above its target it does so too, and then it never has.
+    low = navigated(memory(), flying(up=500.0), back(100.0), RTL_CLIMB_MIN=50.0)
+    assert low.side_acceleration == pytest.approx(most)
+    # Bit 4 of FLIGHT_OPTIONS: up to the target's height, whatever RTL_CLIMB_MIN says.
+    bit4 = {"FLIGHT_OPTIONS": 16.0, "RTL_CLIMB_MIN": 50.0}
+    own = navigated(memory(), flying(up=699.0), way, **bit4)
+    assert own.side_acceleration == pytest.approx(most)
+    assert navigated(own, flying(up=700.5), way, **bit4).side_acceleration > most
+    assert navigated(memory(), flying(up=710.0), way, FLIGHT_OPTIONS=8.0 + 32.0).side_acceleration > most
+
+
+def test_the_slope_begins_where_the_climb_has_ended() -> None:
+    way = back(300.0)
+    own = navigated(memory(), flying(up=500.0), way, RTL_CLIMB_MIN=10.0)
+    here = flying(0.5 * EAST, 0.5 * NORTH, 511.0)
+    assert asked(navigated(own, here, way, RTL_CLIMB_MIN=10.0), here, way) == pytest.approx(511.0)
+
+
+def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
+    setup = return_setup("rtl-def-00")
+    assert setup.route.return_from == 1
+    assert (setup.route.airspeed[1:] == setup.airspeed).all()
+    own = memory(leg=0)
+    assert navigated(own, flying(EAST, NORTH), back(100.0)).leg == 0
+
+
+def test_the_parameters_decide_where_it_goes_and_how_high() -> None:
+    to = return_setup("rtl-rally5-04", RALLY_LIMIT_KM=2.0).route.return_to
+    assert to is not None
+    assert (round(to.east), round(to.north), round(to.up)) == (9500, -5000, 435)
+    near = return_setup("rtl-def-00", RALLY_INCL_HOME=1.0, RTL_ALTITUDE=-1.0, RTL_RADIUS=-120.0).route.return_to
+    assert near is not None
+    # Where it began: 570.9 m, and the lead of its slope.
+    assert (round(near.east), near.radius, near.up) == (9500, -120.0, pytest.approx(580.3, abs=0.1))
+    assert (near.slope_base, rally_base("rtl-rally5-04")) == (0.0, pytest.approx(335.055))
+
+
+def rally_base(flight: str) -> float:
+    """By how much the slope to its rally point is drawn too low, m."""
+    to = return_setup(flight).route.return_to
+    assert to is not None
+    return to.slope_base

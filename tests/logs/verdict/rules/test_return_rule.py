@@ -1,0 +1,85 @@
+"""A return to launch in the verdict: where it goes, and what holds it and what does not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import load_parameters
+from flight.mission.route import make_route
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import simulate
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from tests.logs.verdict.judging import of
+from tests.mission_lines import setup_of, wp
+from world.terrain import Peak, peaks_terrain
+
+HOME = "36.5 -84.2 100"
+RTL = "0 20 0 0 0 0 0 0 0"
+# East, and back: home is behind, and the ground is flat at 100 m.
+WAY = (wp(500, 1000, 300), wp(2500, 1000, 300), RTL)
+
+
+def by_arduplane(setup: FlightSetup, **parameters: float) -> FlightSetup:
+    """A setup with ArduPlane's law, its mission laid out by its rules."""
+    law = ArduPlane(load_parameters(load_aircraft("aerosonde"))).with_parameters(**parameters)
+    scenario = setup.scenario
+    laid = (setup.mission, scenario.origin, scenario.terrain, 25.0, False, setup.limits)
+    route = make_route(*laid, law.return_rules)
+    return replace(setup, autopilot=law, route=route)
+
+
+def flown(setup: FlightSetup) -> tuple[Verdict, str]:
+    done = simulate(setup, load_aircraft("aerosonde"))
+    return judge_flight(setup, done.track, done.ended), done.ended
+
+
+def test_a_return_is_flyable_on_every_level_though_it_turns_about() -> None:
+    for setup in (setup_of(*WAY, home=HOME), by_arduplane(setup_of(*WAY, home=HOME))):
+        predicted = judge_geometry(setup)
+        assert predicted.flyable, predicted.lines
+        verdict, ended = flown(setup)
+        assert (ended, verdict.flyable) == ("completed", True), verdict.lines
+        found = of(verdict, "return")
+        assert (found.ok, found.place.index, found.place.item) == (True, 2, 3)
+        assert "to home, 2.7 km away, sinking 200 m on a straight slope to 200 m AMSL" in found.reason
+
+
+def test_nothing_holds_the_way_back_to_its_drawing_but_ground_and_energy_do() -> None:
+    setup = by_arduplane(setup_of(*WAY, home=HOME))
+    verdict, _ = flown(setup)
+    legs = {item.place.index for item in verdict.findings if item.rule == "corridor"}
+    assert legs == {0}
+    assert {item.place.index for item in verdict.findings if item.rule == "waypoint"} == {0, 1}
+    assert not [item for item in verdict.findings if item.rule in ("turn", "loiter")]
+    low = [item for item in verdict.findings if item.rule == "clearance" and item.place.index != 0]
+    assert low
+    assert all(item.ok for item in low)
+    assert of(verdict, "energy").ok
+
+
+@pytest.mark.parametrize("parameters", [{}, {"RTL_ALTITUDE": 20.0}])
+def test_a_return_too_low_over_ground_fails_by_the_clearance(parameters: dict[str, float]) -> None:
+    # 100 m over home keep the 30 m that a mission without limits has to; 20 m do not.
+    setup = by_arduplane(setup_of(*WAY, home=HOME), **parameters)
+    verdict, _ = flown(setup)
+    failed = {item.rule for item in verdict.findings if item.ok is False}
+    assert failed == ({"clearance"} if parameters else set())
+    assert {item.rule for item in judge_geometry(setup).findings if item.ok is False} == failed
+    # No change of its legs could be made: none is suggested.
+    assert not [item for item in verdict.findings if item.suggestions]
+
+
+def test_a_return_that_meets_a_ridge_has_not_got_to_its_end() -> None:
+    setup = by_arduplane(setup_of(*WAY, home=HOME))
+    # A hill of 400 m in the middle of the way, which is flown at some 300 m there.
+    hill = peaks_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), [Peak(1250.0, 500.0, 400.0, 300.0)], 1000.0)
+    walled = setup.in_scenario(replace(setup.scenario, terrain=hill))
+    verdict, ended = flown(walled)
+    assert ended == "ground contact"
+    assert of(verdict, "return").ok is None
+    assert "did not get to its end" in of(verdict, "return").reason
+    assert not verdict.flyable
