@@ -10,13 +10,13 @@ class Range(NamedTuple):
     """The values of a number.
 
     low, high: both allowed, unless `above` excludes low or `below` excludes high.
-    expected: what the error says.  whole: whether only whole numbers are allowed.
+    expected: what the error says.  integer: whether only whole numbers are allowed.
     """
 
     low: float
     high: float
     expected: str
-    whole: bool = False
+    integer: bool = False
     above: bool = False
     below: bool = False
 
@@ -27,10 +27,10 @@ class Range(NamedTuple):
         (True, False)
         """
         try:
-            number = int(value) if self.whole else float(value)
+            number = int(value) if self.integer else float(value)
         except (TypeError, ValueError, OverflowError):
             return False
-        if isinstance(value, bool) or (self.whole and number != value):
+        if isinstance(value, bool) or (self.integer and number != value):
             return False
         inside = self.low <= number <= self.high
         return inside and not (self.above and number == self.low) and not (self.below and number == self.high)
@@ -38,16 +38,16 @@ class Range(NamedTuple):
 
 _SECONDS = Range(0.0, 1e7, "seconds, from 0 to 10,000,000, are expected")
 _POSITIVE = Range(0.0, 1e6, "a number above 0, up to 1,000,000, is expected", above=True)
-_COUNT = Range(1, 1000, "a whole number from 1 to 1,000 is expected", whole=True)
+_COUNT = Range(1, 1000, "a whole number from 1 to 1,000 is expected", integer=True)
 _SHARE = Range(0.5, 1.0, "at least 0.5 and below 1 is expected", below=True)
 
 # By keyword.  What a scenario file bounds, too (wind, turbulence, airspeed, laws), is refused as there.
 RANGES: Mapping[str, Range] = {
-    "seed": Range(0, 2**63 - 1, "a whole number from 0 to 2^63 - 1 is expected", whole=True),
-    "refine": Range(0, 20, "a whole number from 0 to 20 is expected", whole=True),
-    "budget": Range(4, 10**10, "a whole number of evaluations, 4..10^10, is expected", whole=True),
+    "seed": Range(0, 2**63 - 1, "a whole number from 0 to 2^63 - 1 is expected", integer=True),
+    "refine": Range(0, 20, "a whole number from 0 to 20 is expected", integer=True),
+    "budget": Range(4, 10**10, "a whole number of evaluations, 4..10^10, is expected", integer=True),
     "seconds": Range(0.0, 1e6, "a number of seconds above 0, up to 1,000,000, is expected", above=True),
-    "at_leg": Range(0, 10_000, "a leg's number is expected, from 0", whole=True),
+    "at_leg": Range(0, 10_000, "a leg's number is expected, from 0", integer=True),
     "airspeed": _POSITIVE,
     "max_hours": _POSITIVE,
     "max_log": _POSITIVE,
@@ -56,7 +56,7 @@ RANGES: Mapping[str, Range] = {
     "wait": _POSITIVE,
     "start": _SECONDS,
     "end": _SECONDS,
-    "port": Range(0, 65535, "a port, 0..65535, is expected", whole=True),
+    "port": Range(0, 65535, "a port, 0..65535, is expected", integer=True),
     "flight": _COUNT,
     "runs": _COUNT,
     "jobs": _COUNT,
@@ -64,9 +64,9 @@ RANGES: Mapping[str, Range] = {
     "prove": _SHARE,
     "at_least": _SHARE,
     "confidence": _SHARE,
-    "flights": Range(1, 10_000_000, "a whole number from 1 to 10,000,000 is expected", whole=True),
-    "index": Range(0, 10**9 - 1, "a flight's index is expected, from 0", whole=True),
-    "directions": Range(4, 72, "4 to 72 is expected", whole=True),
+    "flights": Range(1, 10_000_000, "a whole number from 1 to 10,000,000 is expected", integer=True),
+    "index": Range(0, 10**9 - 1, "a flight's index is expected, from 0", integer=True),
+    "directions": Range(4, 72, "4 to 72 is expected", integer=True),
     "most": Range(1.0, 40.0, "m/s from 1 to 40 are expected"),
 }
 CHOICES: Mapping[str, tuple[Any, ...]] = {

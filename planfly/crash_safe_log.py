@@ -164,7 +164,7 @@ class CrashSafeLog:
 
     @contextlib.contextmanager
     def _named_errors(self) -> Iterator[None]:
-        """A full disk is told with the file that it is about."""
+        """The error of a full disk names the file."""
         try:
             yield
         except OSError as error:

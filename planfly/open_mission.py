@@ -160,7 +160,9 @@ CUT_SHORT = "the log ends before the flight does"
 
 def judge_log(log: FlightLog) -> Verdict:
     """The verdict on a log's flight, of the rows it holds."""
-    return judge_flight(log.setup, log.track, log.ended or CUT_SHORT, whole=log.complete, reference=log.reference)
+    return judge_flight(
+        log.setup, log.track, log.ended or CUT_SHORT, log_complete=log.complete, reference=log.reference
+    )
 
 
 def loss_text(log: FlightLog) -> str:

@@ -132,25 +132,25 @@ class ServedFlights:
             rows, _ = Flight(setup, self.aircraft).block(30)
             judge_flight(setup, as_track(rows), "warm")
 
-    def prepare(self, order: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
+    def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge a mission on its geometry, and see that it can be started."""
         served = self._served
         try:
-            setup = make_setup(served.scenario, served.airframe, order.mission, served.seed)
+            setup = make_setup(served.scenario, served.airframe, request.mission, served.seed)
             # Its first tick says whether it can start, and has the loop compiled.
             flight = Flight(setup, self.aircraft)
             flight.block(1)
         except PlanflyError as error:
             text = StatusText(f"mission cannot be flown: {error}", CRITICAL)
-            return None, MissionJudged(order.number, False, False, (text,))
+            return None, MissionJudged(request.number, False, False, (text,))
         verdict = judge_geometry(setup)
-        home = order.mission.home
+        home = request.mission.home
         start = SnapshotMaker(setup, flight.map).before_start(setup)
         if home is None:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
         texts = mission_texts(setup, verdict)
-        judged = MissionJudged(order.number, True, verdict.flyable, texts, home, items, start)
+        judged = MissionJudged(request.number, True, verdict.flyable, texts, home, items, start)
         return PreparedFlight(setup, flight.map), judged
 
     def open_log(self, setup: FlightSetup) -> "ServedLog":

@@ -1,9 +1,9 @@
 """The process that flies: JSBSim holds the interpreter's lock while it steps, so the link lives in another one.
 
-Orders come in over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends are
-ours; nothing that a station sends is ever unpickled.
+Requests come in over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends
+are ours; nothing that a station sends is ever unpickled.
 
-| order | what it asks for |
+| request | what it asks for |
 |---|---|
 | `JudgeMission` | a verdict on a mission, without a flight |
 | `StartFlight` | the flight of the mission that was judged last |
@@ -11,7 +11,7 @@ ours; nothing that a station sends is ever unpickled.
 
 | event | when it is sent |
 |---|---|
-| `ProcessReady` | once, before the first order is read |
+| `ProcessReady` | once, before the first request is read |
 | `MissionJudged` | for each `JudgeMission` |
 | `flight.live.telemetry.Snapshot` | in flight, `SNAPSHOT_RATE` times a second |
 | `FlightEnded` | when the aircraft stops |
@@ -47,7 +47,7 @@ STOPPED, SHUT_DOWN = "stopped by the ground station", "stopped: the vehicle was 
 
 @dataclass(frozen=True, slots=True)
 class JudgeMission:
-    """Order: judge a mission in the vehicle's scenario.  number: comes back with the event."""
+    """Request: judge a mission in the vehicle's scenario.  number: comes back with the event."""
 
     mission: Mission
     number: int
@@ -55,12 +55,12 @@ class JudgeMission:
 
 @dataclass(frozen=True, slots=True)
 class StartFlight:
-    """Order: fly the mission that was judged last."""
+    """Request: fly the mission that was judged last."""
 
 
 @dataclass(frozen=True, slots=True)
 class EndFlight:
-    """Order: end the flight; with ``quit`` the process too."""
+    """Request: end the flight; with ``quit`` the process too."""
 
     quit: bool = False
 
@@ -74,7 +74,7 @@ class ProcessReady:
 class MissionJudged:
     """Event: a mission has been judged.
 
-    number: of the order.
+    number: of the request.
     possible: whether the mission can be started at all.
     flyable: the verdict on its geometry.
     texts: what stations are sent about it.
@@ -107,7 +107,7 @@ class FlightJudged:
     texts: tuple[StatusText, ...]
 
 
-Order = JudgeMission | StartFlight | EndFlight
+FlightRequest = JudgeMission | StartFlight | EndFlight
 Event = ProcessReady | MissionJudged | FlightEnded | FlightJudged
 
 
@@ -138,7 +138,7 @@ class FlightFactory(Protocol):
     aircraft: Aircraft
     speed: float
 
-    def prepare(self, order: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
+    def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge a mission; None in place of the flight where it cannot be flown."""
 
     def open_log(self, setup: FlightSetup) -> LogSink:
@@ -146,28 +146,28 @@ class FlightFactory(Protocol):
 
 
 def serve_flights(connection: Connection, factory: FlightFactory) -> None:
-    """Judge and fly as ordered, until the other end closes or orders the process to end.
+    """Judge and fly as asked, until the other end closes or asks the process to end.
 
-    connection: the flying end of a `multiprocessing.Pipe`; orders are pickled into the other end, and `read_event`
+    connection: the flying end of a `multiprocessing.Pipe`; requests are pickled into the other end, and `read_event`
     reads what comes out of it.
 
     >>> from multiprocessing import Pipe
     >>> link_end, flying_end = Pipe()
     >>> link_end.send(EndFlight(quit=True))
-    >>> serve_flights(flying_end, factory=None)  # an order to quit asks nothing of the factory
+    >>> serve_flights(flying_end, factory=None)  # a request to quit asks nothing of the factory
     """
     prepared: PreparedFlight | None = None
-    orders = _Orders(connection)
+    requests = _Requests(connection)
     try:
         while True:
-            order = orders.next()
-            if isinstance(order, JudgeMission):
-                prepared, judged = factory.prepare(order)
+            request = requests.next()
+            if isinstance(request, JudgeMission):
+                prepared, judged = factory.prepare(request)
                 send_event(connection, judged)
-            elif isinstance(order, StartFlight) and prepared is not None:
-                if not _fly(connection, orders, prepared, factory):
+            elif isinstance(request, StartFlight) and prepared is not None:
+                if not _fly(connection, requests, prepared, factory):
                     return
-            elif isinstance(order, EndFlight) and order.quit:
+            elif isinstance(request, EndFlight) and request.quit:
                 return
     except (EOFError, BrokenPipeError, ConnectionResetError):
         # The link is gone, and with it all who watched; the log is closed on the way here.
@@ -194,19 +194,19 @@ def read_event(data: bytes) -> Snapshot | Event:
     return found
 
 
-class _Orders:
-    """Orders in the order in which they came."""
+class _Requests:
+    """Requests in the order in which they came."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._early: deque[object] = deque()
 
     def next(self) -> object:
-        """The next order, waited for.  Raises EOFError where the link is gone."""
+        """The next request, waited for.  Raises EOFError where the link is gone."""
         return self._early.popleft() if self._early else self._connection.recv()
 
     def waiting(self) -> object:
-        """The next order if one is there; None where none is."""
+        """The next request if one is there; None where none is."""
         if not self._early and not self._connection.poll():
             return None
         try:
@@ -215,16 +215,16 @@ class _Orders:
             return EndFlight(quit=True)
 
     def ending(self) -> bool:
-        """Whether the process is to end, by an order that has come or because the link is gone; none is taken out."""
+        """Whether the process is to end, by a request that has come or because the link is gone; none is taken out."""
         try:
             while self._connection.poll():
                 self._early.append(self._connection.recv())
         except (EOFError, BrokenPipeError, ConnectionResetError):
             return True
-        return any(isinstance(order, EndFlight) and order.quit for order in self._early)
+        return any(isinstance(request, EndFlight) and request.quit for request in self._early)
 
 
-def _fly(connection: Connection, orders: _Orders, prepared: PreparedFlight, factory: FlightFactory) -> bool:
+def _fly(connection: Connection, requests: _Requests, prepared: PreparedFlight, factory: FlightFactory) -> bool:
     """Fly in step with the clock; False when the process is to end."""
     try:
         flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map)
@@ -235,10 +235,10 @@ def _fly(connection: Connection, orders: _Orders, prepared: PreparedFlight, fact
         return True
     snapshots = SnapshotMaker(prepared.setup, prepared.local_map)
     try:
-        ended, go_on = _in_step(connection, orders, flight, snapshots, log, factory.speed)
+        ended, go_on = _in_step(connection, requests, flight, snapshots, log, factory.speed)
         if go_on:
             send_event(connection, FlightEnded(ended))
-        judged = log.finish(ended, orders.ending)
+        judged = log.finish(ended, requests.ending)
     except OSError as error:
         log.abandon()
         # A pipe that broke ends the process; a full disk ends the flight.
@@ -253,7 +253,7 @@ def _fly(connection: Connection, orders: _Orders, prepared: PreparedFlight, fact
 
 
 def _in_step(
-    connection: Connection, orders: _Orders, flight: Flight, snapshots: SnapshotMaker, log: LogSink, speed: float
+    connection: Connection, requests: _Requests, flight: Flight, snapshots: SnapshotMaker, log: LogSink, speed: float
 ) -> tuple[str, bool]:
     """Step the flight by the clock: how it ended, and whether the process goes on."""
     clock = time.monotonic
@@ -274,10 +274,10 @@ def _in_step(
             if len(rows):
                 pending.append(rows)
                 connection.send_bytes(_PACKED + snapshots.snapshot(rows[-1]).pack())
-        order = orders.waiting()
-        if isinstance(order, EndFlight):
-            ended = ended or (SHUT_DOWN if order.quit else STOPPED)
-            go_on = not order.quit
+        request = requests.waiting()
+        if isinstance(request, EndFlight):
+            ended = ended or (SHUT_DOWN if request.quit else STOPPED)
+            go_on = not request.quit
         if pending and (ended or now - flushed >= FLUSH_PERIOD):
             log.write(as_track(join_rows(pending)))
             pending.clear()

@@ -15,9 +15,9 @@ from flight.live.flight_process import (
     Event,
     FlightEnded,
     FlightJudged,
+    FlightRequest,
     JudgeMission,
     MissionJudged,
-    Order,
     ProcessReady,
     StartFlight,
     read_event,
@@ -338,17 +338,17 @@ class Vehicle:
     def _after_command(self) -> None:
         if self.arming.end_requested:
             self.arming.end_requested = False
-            self._order(EndFlight())
+            self._ask(EndFlight())
         if self.arming.starts:
             self.arming.flight_started()
             self._progress.started()
             self.down.send_text("mission started")
-            self._order(StartFlight())
+            self._ask(StartFlight())
         self._refresh()
 
     def _changes(self) -> None:
         """Have a changed mission judged; a fence or rally points that change belong to it."""
-        # One order at a time: stations that upload faster than missions are judged must not fill the pipe.
+        # One request at a time: stations that upload faster than missions are judged must not fill the pipe.
         if not self.server.changed or self.arming.flying or self._outstanding:
             return
         changed = set(self.server.changed)
@@ -371,7 +371,7 @@ class Vehicle:
         self._brief = MissionType.MISSION not in changed and (self._brief or not self.arming.judging)
         self.arming.mission_uploaded()
         self._outstanding = True
-        self._order(JudgeMission(mission, self._number))
+        self._ask(JudgeMission(mission, self._number))
         self._refresh()
 
     def _start_at(self, seq: int) -> CommandResult:
@@ -389,9 +389,9 @@ class Vehicle:
             self._changes()
         return CommandResult(ACCEPTED)
 
-    def _order(self, order: Order) -> None:
+    def _ask(self, request: FlightRequest) -> None:
         try:
-            self._flight.send(order)
+            self._flight.send(request)
         except (BrokenPipeError, ConnectionResetError):
             self._lost()
 

@@ -336,7 +336,7 @@ def track_html(track: Track) -> str:
         finite = values[np.isfinite(values)]
         smallest, largest = (finite.min(), finite.max()) if finite.size else (np.nan, np.nan)
         rows.append((name, *(f"{value:.6g}" for value in (values[0], values[-1], smallest, largest))))
-    return html_table(track_title(track), rows, ("column", "first", "last", "least", "largest"))
+    return html_table(track_title(track), rows, ("column", "first", "last", "smallest", "largest"))
 
 
 def track_title(track: Track) -> str:

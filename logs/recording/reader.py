@@ -275,7 +275,7 @@ def read_log(path: Path | str) -> FlightLog:
     """Read a flight log; a damaged or unfinished one is given up to its damage, with ``complete`` False.
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
-    holds no whole second of flight.
+    holds no complete second of flight.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log
@@ -301,14 +301,14 @@ def read_log(path: Path | str) -> FlightLog:
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     if not messages.chunks:
-        raise LogError(f"{path}: holds no whole chunk: {found.problem or 'an empty log'}", file=path)
+        raise LogError(f"{path}: holds no complete chunk: {found.problem or 'an empty log'}", file=path)
     if SETUP_FILE not in found.attachments and found.problem:
         raise LogError(f"{path}: holds no setup: {found.problem}", file=path)
     stored = unpack_setup(found.attachments, str(path))
     rows, fault = _good_rows(messages.rows(), len(stored.setup.route.waypoints))
     if not len(rows):
         raise LogError(
-            f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}", file=path
+            f"{path}: holds no complete second of flight: {fault or found.problem or 'an empty log'}", file=path
         )
     ended, wrong = _result(found.attachments, len(rows))
     verdict, garbled = _verdict(found.attachments)

@@ -33,7 +33,7 @@ def judge_flight(
     track: Track,
     ended: str,
     *,
-    whole: bool = True,
+    log_complete: bool = True,
     envelope: bool = True,
     reference: ReferenceFlights | None = None,
 ) -> Verdict:
@@ -42,7 +42,7 @@ def judge_flight(
     Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
     flight that never began: its route is judged, level "geometric".  An imported one is judged as far as its log goes.
 
-    ended: how the flight ended, "completed" or what stopped it.  whole: the record has its end.
+    ended: how the flight ended, "completed" or what stopped it.  log_complete: the record has its end.
     envelope: whether the aircraft's envelope counts beside what the flight showed, and not that alone.
     reference: the answers of reference flights of this one.
 
@@ -63,12 +63,12 @@ def judge_flight(
     'flyable'
     """
     if setup.source is not None:
-        return judge_imported_flight(setup, track, whole=whole)
+        return judge_imported_flight(setup, track, log_complete=log_complete)
     requirements = route_requirements(setup, envelope=envelope)
     if not len(track):
-        return judge_unflown(requirements, ended, whole=whole)
+        return judge_unflown(requirements, ended, log_complete=log_complete)
     aligned = align_track(requirements, track)
-    findings = flown_findings(requirements, aligned, ended, whole)
+    findings = flown_findings(requirements, aligned, ended, log_complete)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
     findings = with_suggestions(requirements, aligned, findings)

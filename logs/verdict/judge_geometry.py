@@ -38,14 +38,14 @@ def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None
 
 
 def flown_findings(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, whole: bool
+    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> tuple[Finding, ...]:
     """Findings of a flight: of its track, and of how it ended.
 
-    ended: "completed" or what stopped it.  whole: the record has its end.
+    ended: "completed" or what stopped it.  log_complete: the record has its end.
     """
     ends = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
-    at_end = (item for judge in ends for item in judge(requirements, aligned, ended, whole))
+    at_end = (item for judge in ends for item in judge(requirements, aligned, ended, log_complete))
     return (*track_findings(requirements, aligned), *at_end)
 
 
@@ -120,10 +120,10 @@ def flown_level(setup: FlightSetup) -> LevelName:
     return setup.autopilot.level
 
 
-def judge_unflown(requirements: RouteRequirements, ended: str, *, whole: bool = True) -> Verdict:
+def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: bool = True) -> Verdict:
     """Judge a flight of which there is no row: its route's geometry, and why nothing was flown; never complete.
 
-    ended: why not.  whole: the record has its end.
+    ended: why not.  log_complete: the record has its end.
 
     >>> from logs.recording.example_log import example_log
     >>> verdict = judge_unflown(route_requirements(example_log().setup), "not started: no way made against the wind")
@@ -131,7 +131,7 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, whole: bool = 
     ('geometric', 'not flyable: completion (not started: no way made against the wind), ...')
     """
     setup = requirements.setup
-    faults = [message(ended), *([] if whole else [message("the log is damaged or unfinished")])]
+    faults = [message(ended), *([] if log_complete else [message("the log is damaged or unfinished")])]
     stopped = make_finding(
         "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
     )

@@ -163,7 +163,7 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
 
 
 def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
-    """The least clearance less the terrain's stated error, where one is stated."""
+    """The lowest clearance less the terrain's stated error, where one is stated."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
     heights = [
         item.planned if item.flown is None else item.flown
@@ -174,7 +174,7 @@ def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
         return []
     low, required = min(heights), setup.scenario.limits.min_clearance_m
     return [
-        f"Terrain's stated error: {error:g} m; the least clearance is {low:.1f} m, {low - error:.1f} m less that error"
+        f"Terrain's stated error: {error:g} m; the lowest clearance is {low:.1f} m, {low - error:.1f} m less that error"
         f" ({required:g} m are required)"
     ]
 

@@ -153,8 +153,8 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
         _frame(axes[0, 0], "angle of attack and surfaces", "airspeed (m/s)", "angle (°)")
         _legend_above(axes[0, 0], "", 2)
         _power(axes[0, 1], aircraft, speeds, trims)
-        _roots(axes[1, 0], modes, whole=True)
-        _roots(axes[1, 1], modes, whole=False)
+        _roots(axes[1, 0], modes, all_modes=True)
+        _roots(axes[1, 1], modes, all_modes=False)
     return figure
 
 
@@ -179,14 +179,14 @@ def _power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRo
     axes.legend(lines, [line.get_label() for line in lines], loc="lower right")
 
 
-def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, whole: bool) -> None:
+def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool) -> None:
     """The upper half of the plane of roots; the slow ones near the origin on their own if not the whole."""
     slow = {"phugoid", "spiral", "roll-spiral"}
     labelled: set[str] = set()
     for speed, found in modes.items():
         fastest = speed == max(modes)
         for mode in found:
-            if not whole and mode.name not in slow:
+            if not all_modes and mode.name not in slow:
                 continue
             # Filled at the fastest speed, so that the way over speed can be followed.
             axes.plot(
@@ -197,7 +197,7 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, whole: bool) -> 
             labelled.add(mode.name)
     axes.axvline(0.0, color=theme.colour("area"), linewidth=0.8)
     slow_or_fast = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""
-    title = f"modes {slow_or_fast}" if whole else "the slow ones, nearer"
+    title = f"modes {slow_or_fast}" if all_modes else "the slow ones, nearer"
     _frame(axes, title, "real part (1/s): right of 0 is unstable", "imaginary part (rad/s)")
     low, high = axes.get_xlim()
     axes.set_xlim(low - 0.05 * (high - low), high + 0.05 * (high - low))

@@ -15,7 +15,7 @@ _MARGIN, _FAR = 0.12, 4.0
 PLACE_PANELS = (
     ("turn", "waypoint", "turn", "°"),
     ("slope", "leg", "slope", "°"),
-    ("clearance", "leg", "least height above ground", "m"),
+    ("clearance", "leg", "lowest height above ground", "m"),
     ("waypoint", "waypoint", "passed at", "m"),
     ("corridor", "leg", "farthest from the legs", "m"),
 )

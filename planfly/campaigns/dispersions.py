@@ -38,7 +38,7 @@ class Quantity(NamedTuple):
     combine: "added" to what the scenario has, or "factor" on it.
     unit: of what is added; "" for a factor.
     low, high: the least and the largest that may be drawn; a draw beyond them is none of this aircraft or world.
-    whole: whether it counts steps, so that its distribution is a discrete one.
+    integer: whether it counts steps, so that its distribution is a discrete one.
     title: for a person.
     """
 
@@ -48,7 +48,7 @@ class Quantity(NamedTuple):
     low: float
     high: float
     title: str
-    whole: bool = False
+    integer: bool = False
 
     @property
     def nominal(self) -> float:
@@ -61,7 +61,7 @@ QUANTITIES = (
     Quantity("wind_speed", "added", "m/s", -40.0, 40.0, "wind speed"),
     Quantity("wind_from", "added", "deg", -180.0, 180.0, "wind direction"),
     Quantity("wind_gradient", "added", "1/s", -0.05, 0.05, "wind gradient"),
-    Quantity("turbulence", "added", "levels", -2.0, 2.0, "turbulence", whole=True),
+    Quantity("turbulence", "added", "levels", -2.0, 2.0, "turbulence", integer=True),
     Quantity("mass", "factor", "", 0.5, 2.0, "mass"),
     Quantity("drag", "factor", "", 0.3, 3.0, "drag"),
     Quantity("control_power", "factor", "", 0.25, 2.0, "control power"),
@@ -108,7 +108,7 @@ class Varying:
     @cached_property
     def _inside(self) -> tuple[float, float]:
         """The distribution function below the range, and at its end."""
-        low = self.quantity.low - (0.5 if self.quantity.whole else 0.0)
+        low = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
         return float(self._frozen.cdf(low)), float(self._frozen.cdf(self.quantity.high))
 
     @property
@@ -220,13 +220,13 @@ def _varying(quantity: Quantity, table: Any, name: str) -> Varying:
 def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> None:
     from scipy import stats
 
-    kind = stats.rv_discrete if quantity.whole else stats.rv_continuous
+    kind = stats.rv_discrete if quantity.integer else stats.rv_continuous
     field = f"{quantity.name}.distribution"
     if not isinstance(distribution, str):
         allowed = "missing; the name of one of scipy.stats' distributions is expected"
         raise SpreadError.at(name, field, distribution, allowed, shown="")
     if not isinstance(getattr(stats, distribution, None), kind):
-        sort = "a discrete one, such as randint" if quantity.whole else "a continuous one, such as norm"
+        sort = "a discrete one, such as randint" if quantity.integer else "a continuous one, such as norm"
         allowed = f"no distribution of scipy.stats; {sort}, is expected"
         raise SpreadError.at(name, field, distribution, allowed, shown=repr(distribution))
 

@@ -73,7 +73,9 @@ class WindsFound:
 
     def __repr__(self) -> str:
         least = min(one.estimate for one in self.boundaries)
-        return f"<WindsFound {len(self.boundaries)} directions, {least:.1f} m/s the least; {len(self.flights)} flights>"
+        return (
+            f"<WindsFound {len(self.boundaries)} directions, {least:.1f} m/s the lowest; {len(self.flights)} flights>"
+        )
 
 
 def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
@@ -153,11 +155,11 @@ class _Search:
         flyable = flown.outcome == "flyable"
         ways: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
         failed = frozenset() if flyable else frozenset(ways)
-        room: dict[Hashable, float] | None = {_way(rule, place): share for rule, place, share in flown.narrow}
+        margin: dict[Hashable, float] | None = {_way(rule, place): share for rule, place, share in flown.narrow}
         if flown.outcome == "lost" or any(rule == "completion" for rule, _ in flown.failed):
             # What it would have passed, had it gone on, is not known.
-            room = None
-        self.directions[asked.direction].add(asked.speed, asked.draw, failed, room)
+            margin = None
+        self.directions[asked.direction].add(asked.speed, asked.draw, failed, margin)
         self.flown.append((asked.direction, asked.speed, flyable))
         if flown.outcome == "lost":
             self.lost.append(asked.number)
@@ -223,7 +225,7 @@ def _fly_round(pool: WorkerPool, search: _Search, missing: list[AskedFlight], kn
 
 
 class _Pace:
-    """Progress, told now and then; known: flights that were there before."""
+    """Progress, reported now and then; known: flights that were there before."""
 
     def __init__(self, search: _Search, known: int, advance: Advance | None) -> None:
         self._search, self._advance, self._rate = search, advance, FlightRate(known)
@@ -232,14 +234,14 @@ class _Pace:
         """How far it is: directions settled, flights, flights a minute, and time left while flights are known to come.
 
         last: whether or not it is due.
-        How many a direction takes beyond the fewest shows only when it has them: no time is told then.
+        How many a direction takes beyond the fewest shows only when it has them: no time is given then.
         """
         if self._advance is None or not (self._rate.due() or last):
             return
         search, rate = self._search, self._rate.a_second(flights)
         to_come = len(search.flown) + search.at_least() - flights
-        settled, whole = search.goal.directions - len(search.open), search.goal.directions
-        remark = f"{settled} of {whole} directions settled, {flights} flights, {60.0 * rate:.0f} a minute"
+        settled, total = search.goal.directions - len(search.open), search.goal.directions
+        remark = f"{settled} of {total} directions settled, {flights} flights, {60.0 * rate:.0f} a minute"
         if to_come > 0 and rate > 0.0:
             remark += f", {to_come / rate:.0f} s left at least"
         self._advance(float(flights), float(flights + max(to_come, 1)), remark)

@@ -38,16 +38,16 @@ Singles = NDArray[np.float32]
 # Of a missile's sphere, by the distance outside it, m.
 SPHERE_SCALE = 10.0
 
-# Rule, place, and room as a share of the rule's scale, 0 to 1.
+# Rule, place, and margin as a share of the rule's scale, 0 to 1.
 NarrowPass = tuple[str, Place, float]
 
 
 def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[NarrowPass, ...]:
-    """Rule, place and room of each narrow pass of a flight, the verdict's order, then missiles.
+    """Rule, place and margin of each narrow pass of a flight, the verdict's order, then missiles.
 
-    Where a rule passes what lies beyond its limit, for reasons of its own, the room is 0.
+    Where a rule passes what lies beyond its limit, for reasons of its own, the margin is 0.
     """
-    room: dict[tuple[str, Place], float] = {}
+    shares: dict[tuple[str, Place], float] = {}
     failed = {(item.rule, item.place) for item in findings if item.ok is False}
     for item in findings:
         at = item.rule, item.place
@@ -56,11 +56,11 @@ def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track)
             continue
         share = max(0.0, item.margin + (item.tolerance or 0.0)) / scale
         if share < 1.0:
-            room[at] = min(share, room.get(at, share))
+            shares[at] = min(share, shares.get(at, share))
     for place, distance in _outside_spheres(scenario, track):
         if ("threat", place) not in failed and distance < SPHERE_SCALE:
-            room["threat", place] = max(0.0, distance) / SPHERE_SCALE
-    return tuple((rule, place, share) for (rule, place), share in room.items())
+            shares["threat", place] = max(0.0, distance) / SPHERE_SCALE
+    return tuple((rule, place, share) for (rule, place), share in shares.items())
 
 
 def _outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
@@ -190,7 +190,7 @@ class FlightRow:
     clearance, crossings: bytes of the arrays of `clearance_profile` and `waypoint_crossings`; empty where nothing was
     flown.
     seconds: that it took.  worker: who flew it.
-    narrow: where it passed narrowly, and with how much room; the table of a campaign does not keep it.
+    narrow: where it passed narrowly, and with how much margin; the table of a campaign does not keep it.
     """
 
     draw: Draw

@@ -1,4 +1,4 @@
-"""A campaign from its first flight to its answer: flown in parallel, written down by index, told from the table."""
+"""A campaign from its first flight to its answer: flown in parallel, stored by index, summarised from the table."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -120,7 +120,7 @@ def _take(row: FlightRow, book: _Book, store: Store) -> None:
 
 
 class _Pace:
-    """Progress, told now and then; known: the flights that were there before."""
+    """Progress, reported now and then; known: the flights that were there before."""
 
     def __init__(self, goal: Goal, estimator: Estimator, known: Tally, advance: Advance | None) -> None:
         self._goal, self._estimator, self._advance = goal, estimator, advance
@@ -132,10 +132,10 @@ class _Pace:
             return
         found = self._estimator.estimate(tally)
         rate = self._rate.a_second(tally.flown)
-        whole = max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
-        left = (whole - tally.flown) / rate if rate > 0.0 else 0.0
+        total = max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
+        left = (total - tally.flown) / rate if rate > 0.0 else 0.0
         remark = (
             f"{tally.flown} flights, P {tally.share:.4f} ({found.lower:.4f} to {found.upper:.4f}),"
             f" {60.0 * rate:.0f} a minute, {left:.0f} s left"
         )
-        self._advance(float(tally.flown), float(whole), remark)
+        self._advance(float(tally.flown), float(total), remark)

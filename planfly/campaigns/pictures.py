@@ -102,8 +102,8 @@ def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.
     bins = []
     for number in np.unique(group):
         mine = flyable[group == number]
-        whole, good = int(mine.size), int(mine.sum())
-        bins.append(SpeedBin(number * width, (number + 1) * width, whole, good, wilson(good, whole, confidence)))
+        total, good = int(mine.size), int(mine.sum())
+        bins.append(SpeedBin(number * width, (number + 1) * width, total, good, wilson(good, total, confidence)))
     return bins
 
 

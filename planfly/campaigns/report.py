@@ -399,7 +399,7 @@ def wind_lines(found: WindsFound) -> list[str]:
     most, percent = found.goal.most, f"{100 * found.goal.confidence:g} %"
     return [
         f"flies with P >= {found.goal.target:g}, by best estimate, in wind up to {_speed_text(least.boundary, most)}"
-        f" from {least.from_deg:g}° (the least; {_interval_text(least.low, least.high, most)} m/s at {percent}),"
+        f" from {least.from_deg:g}° (the lowest; {_interval_text(least.low, least.high, most)} m/s at {percent}),"
         f" {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
         *_none_failed_lines(found),
         *_open_lines(found),

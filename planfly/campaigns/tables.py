@@ -410,7 +410,7 @@ class WindsStore(LockedTable):
         """Write a flight, for good.  Raises OSError for a full disk; what was written before stays."""
         asked_for = {
             "flight": asked.number, "direction": asked.direction, "asked_speed": asked.speed, "draw": asked.draw,
-            "narrow": json.dumps([{"rule": rule, "room": room, **asdict(place)} for rule, place, room in row.narrow]),
+            "narrow": json.dumps([{"rule": rule, "margin": left, **asdict(place)} for rule, place, left in row.narrow]),
         }  # fmt: skip
         self.insert({**asked_for, **row_values(replace(row, made_of=self.made_of))})
 
@@ -428,14 +428,14 @@ class WindsStore(LockedTable):
 def narrow_passes_of(text: str) -> tuple[NarrowPass, ...]:
     """Narrow passes of the column's text.
 
-    >>> narrow_passes_of('[{"rule": "slope", "room": 0.25, "kind": "leg", "index": 3}]')[0][2]
+    >>> narrow_passes_of('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
     0.25
     """
     return tuple(_narrow_pass(**entry) for entry in json.loads(text))
 
 
-def _narrow_pass(rule: str, room: float, **place: Any) -> NarrowPass:
-    return rule, Place(**place), room
+def _narrow_pass(rule: str, margin: float, **place: Any) -> NarrowPass:
+    return rule, Place(**place), margin
 
 
 # ----------------------------------------------------------------------

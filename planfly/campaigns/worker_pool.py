@@ -243,7 +243,7 @@ Made = TypeVar("Made")
 def in_own_process(work: Callable[..., Made], *args: Any, advance: Advance | None = None, **options: Any) -> Made:
     """What work(*args, advance=..., **options) returns there; all of it goes between processes by pickle.
 
-    advance: told as work tells it.
+    advance: called as work calls its own.
     Raises what work raised, and OSError where the process was lost.
     """
     # Before anything else does, so that it says nothing of what the workers leave later.
@@ -255,14 +255,14 @@ def in_own_process(work: Callable[..., Made], *args: Any, advance: Advance | Non
     there.close()
     try:
         while True:
-            kind, told = here.recv()
+            kind, sent = here.recv()
             if kind == "done":
-                made: Made = told
+                made: Made = sent
                 return made
             if kind == "failed":
-                raise told
+                raise sent
             if advance is not None:
-                advance(*told)
+                advance(*sent)
     except EOFError:
         raise OSError(0, "a process of the campaign was lost: killed, or out of memory", work.__name__) from None
     finally:
@@ -273,7 +273,7 @@ def in_own_process(work: Callable[..., Made], *args: Any, advance: Advance | Non
 def _work(tell: Connection, work: Callable[..., Any], args: tuple[Any, ...], options: dict[str, Any]) -> None:
     end_with_parent()
     try:
-        tell.send(("done", work(*args, advance=lambda *told: tell.send(("told", told)), **options)))
+        tell.send(("done", work(*args, advance=lambda *done: tell.send(("advance", done)), **options)))
     except Exception as error:
         tell.send(("failed", error))
 
@@ -283,7 +283,7 @@ def _work(tell: Connection, work: Callable[..., Any], args: tuple[Any, ...], opt
 
 # Packages whose version may move a bit of a flight.
 _PACKAGES = ("jsbsim", "numba", "numpy", "scipy")
-_ROOMS = ("aircraft", "flight", "logs", "planfly", "planner", "world")
+_OURS = ("aircraft", "flight", "logs", "planfly", "planner", "world")
 
 
 class WorkerError(PlanflyError):
@@ -294,8 +294,8 @@ class WorkerError(PlanflyError):
 def code_hash() -> str:
     """Hash of planfly's own sources, as installed here."""
     digest = hashlib.sha256()
-    for room in _ROOMS:
-        root = Path(str(resources.files(room)))
+    for package in _OURS:
+        root = Path(str(resources.files(package)))
         for file in sorted(root.rglob("*.py")):
             digest.update(str(file.relative_to(root)).encode())
             digest.update(file.read_bytes())
@@ -340,7 +340,7 @@ def refuse_different(mine: dict[str, str], theirs: dict[str, str], worker: str) 
 # How fast flights come in, and when to tell of it again.
 
 # Seconds between two lines of progress.
-TOLD_EVERY = 0.5
+REPORTED_EVERY = 0.5
 
 
 class FlightRate:
@@ -348,14 +348,14 @@ class FlightRate:
 
     def __init__(self, known: int) -> None:
         self._known = known
-        self._started = self._told = time.monotonic()
+        self._started = self._reported = time.monotonic()
 
     def due(self) -> bool:
-        """Whether it is time to tell again; asked for by what then tells."""
+        """Whether it is time to report again; asked by what then reports."""
         now = time.monotonic()
-        if now - self._told < TOLD_EVERY:
+        if now - self._reported < REPORTED_EVERY:
             return False
-        self._told = now
+        self._reported = now
         return True
 
     def a_second(self, flights: int) -> float:

@@ -16,7 +16,7 @@ def recover_options(line: LineParser) -> None:
     parser = line.command(
         "recover",
         "write what can be read of an unfinished or damaged log as a new, complete one",
-        "planfly recover flight.mcap --out whole.mcap",
+        "planfly recover flight.mcap --out recovered.mcap",
     )
     log_argument(parser)
     result_options(parser, "the new log (default: <log>-recovered.mcap beside it)", "FILE")

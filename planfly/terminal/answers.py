@@ -513,7 +513,7 @@ class RecoverAnswer:
     schema: Literal["planfly.recover/1"] = "planfly.recover/1"
     exit_code: int
     log: str | None
-    """The new log, null where the old one is whole."""
+    """The new log, null where the old one is complete."""
     rows: int | None
     end_s: float | None
 

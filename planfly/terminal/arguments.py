@@ -24,7 +24,7 @@ def number(keyword: str) -> Callable[[str], Any]:
 
     def parse(text: str) -> float:
         value: float = math.nan
-        if not allowed.whole:
+        if not allowed.integer:
             with contextlib.suppress(ValueError):
                 value = float(text)
         elif text.isascii() and text.isdigit():

@@ -222,10 +222,6 @@ def test_notes_tell_what_a_person_should_know(tmp_path: Path) -> None:
     )
 
 
-# ----------------------------------------------------------------------
-# Model flight.
-
-
 def silent(_done: float, _whole: float, _remark: str) -> None:
     """Report nothing."""
 

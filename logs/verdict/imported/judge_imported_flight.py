@@ -208,10 +208,10 @@ _DATUMS = {
 _UNNAMED = "the aircraft is not named (--aircraft)"
 
 
-def judge_imported_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verdict:
+def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
     """Judge the stretches of a flight that followed its mission: level "flown".
 
-    setup: with the source of the flight.  whole: planfly's own log of it has its end.
+    setup: with the source of the flight.  log_complete: planfly's own log of it has its end.
     """
     source = setup.source
     if source is None:
@@ -219,7 +219,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, whole: bool) -> V
     flown = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     findings = _merged([_of_stretch(setup, legs) for legs in flown])
     ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
-    findings = (*findings, *(judge(setup, flown, whole) for judge in ends))
+    findings = (*findings, *(judge(setup, flown, log_complete) for judge in ends))
     failed = any(item.ok is False for item in findings)
     unjudged = "" if source.missing is None else missing_text(source.missing)
     flyable = bool(flown) and not failed and not unjudged

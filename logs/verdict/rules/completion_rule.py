@@ -17,7 +17,7 @@ from logs.verdict.wording import shortened
 
 
 def completion_findings(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, whole: bool
+    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> list[Finding]:
     """One finding: planned feasibly, flown to the last waypoint, recorded whole and without contradiction."""
     plan = requirements.setup.plan
@@ -26,7 +26,7 @@ def completion_findings(
         faults.append(message("the plan is not feasible"))
     if ended != "completed":
         faults.append(message(f"the flight ended early: {ended}"))
-    if not whole:
+    if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     legs = 0
     if aligned is None:
@@ -79,12 +79,12 @@ def _record_faults(aligned: AlignedTrack) -> list[Message]:
 _RETURN = "RTL"
 
 
-def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], whole: bool) -> Finding:
+def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_complete: bool) -> Finding:
     """How much of the mission the log shows; a log that ends on the way says nothing of what came after."""
     legs, faults, unknown, known = setup.route.legs, [], [], []
     done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
     missing = None if setup.source is None else setup.source.missing
-    if not whole:
+    if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     if not flown:
         stretches = () if setup.source is None else setup.source.stretches

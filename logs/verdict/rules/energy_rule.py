@@ -71,12 +71,14 @@ def _never_ends(requirements: RouteRequirements, usable: float) -> Message:
 
 def _used_text(requirements: RouteRequirements, used: float, current: float) -> str:
     """Energy used (Wh) and the peak current (A), or what an aircraft without a battery has instead."""
-    whole = requirements.setup.battery
+    capacity = requirements.setup.battery
     if requirements.setup.envelope.power_level.size and not requirements.setup.envelope.volts:
-        share = used / whole
-        return f"{used:.0f} Wh of {whole:.0f} Wh of fuel heat used, {share:.1%} of the fuel; no battery, so no current"
+        share = used / capacity
+        return (
+            f"{used:.0f} Wh of {capacity:.0f} Wh of fuel heat used, {share:.1%} of the fuel; no battery, so no current"
+        )
     peak = f", peak current {current:.1f} A" if math.isfinite(current) else ""
-    return f"{used:.1f} Wh of {whole:.0f} Wh used{peak}"
+    return f"{used:.1f} Wh of {capacity:.0f} Wh used{peak}"
 
 
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """The fence rule: how far planned path and flight go into zones to keep out of, or out of zones to stay in.
 
 The zones are the scenario's and the mission's own fence.  The path's line is judged, its arcs, circles and jumps
-included; that the corridor about it reaches further is told beside.
+included; that the corridor about it reaches further is reported beside it.
 """
 
 import math

@@ -63,7 +63,7 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
         weak = _too_weak(requirements, leg, measure)
         shown = _shown(requirements, leg, measure, limit, weak)
         # Where the aircraft's limits count they judge, and what it showed that it cannot; how closely it kept to the
-        # leg is told beside.
+        # leg is reported beside it.
         facts += [one.brief for one in shown] if requirements.envelope else []
         faults += weak if requirements.envelope else [*shown, *weak]
         fit = measure.slope

@@ -58,7 +58,7 @@ def _judge(requirements: RouteRequirements, i: int, measure: TurnMeasure | None)
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE
         facts += _flown_facts(requirements, i, measure)
         shown = _shown(requirements, i, measure, limit)
-        # Where the aircraft's limits count they judge; what the flight showed of them is told beside.
+        # Where the aircraft's limits count they judge; what the flight showed of them is reported beside it.
         facts += [one.brief for one in shown] if requirements.envelope else []
         faults += [] if requirements.envelope else shown
         method = "least-squares courses of both legs" if measure.fitted else "course change over the turn"

@@ -139,7 +139,7 @@ def _frames(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
     """Messages in order: when (s of the flight), from whom, and what."""
     for message in _upload(log):
         yield 0.0, _STATION, message
-    for time, message in _told(log):
+    for time, message in _messages_of(log):
         yield time, _VEHICLE, message
 
 
@@ -151,7 +151,7 @@ def _upload(log: FlightLog) -> Iterator[Any]:
         yield to_message(item)
 
 
-def _told(log: FlightLog) -> Iterator[tuple[float, Any]]:
+def _messages_of(log: FlightLog) -> Iterator[tuple[float, Any]]:
     setup, track = log.setup, log.track
     snapshots = SnapshotMaker(setup, LocalMap.around(setup))
     start = snapshots.before_start(setup)
@@ -366,13 +366,14 @@ def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     """navigator_mission_item: each item when it becomes the one that is flown to, and first the one at the start."""
     track, items = log.track, {item.seq: item for item in log.setup.mission.items}
     legs, firsts = np.unique(track.leg[rows], return_index=True)
-    told = [(0.0, int(log.setup.route.items[0]))]
-    told += [
+    targets = [(0.0, int(log.setup.route.items[0]))]
+    targets += [
         (float(track.time[rows[first]]), int(log.setup.route.items[leg + 1]))
         for leg, first in zip(legs.tolist(), firsts.tolist(), strict=True)
         if 0 <= leg < len(log.setup.route.items) - 1
     ]
-    flown = [(time, items[seq]) for time, seq in told if seq in items and items[seq].has_position] if len(rows) else []
+    aims = targets if len(rows) else []
+    flown = [(time, items[seq]) for time, seq in aims if seq in items and items[seq].has_position]
     radii = [item.params[1] for _, item in flown]
     kinds = {
         "sequence_current": "<u2", "nav_cmd": "<u2", "acceptance_radius": "<f4", "latitude": "<f8", "longitude": "<f8",

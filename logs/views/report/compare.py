@@ -94,7 +94,7 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
 
 def _judge(log: FlightLog) -> Verdict:
     ended = log.ended or "the log ends before the flight does"
-    return judge_flight(log.setup, log.track, ended, whole=log.complete, reference=log.reference)
+    return judge_flight(log.setup, log.track, ended, log_complete=log.complete, reference=log.reference)
 
 
 def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
@@ -115,7 +115,7 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
         ("largest height error", "m"): _reduced(np.max, np.abs(track.height_error)),
     }
     if setup.scenario.terrain is not None and len(position) > 1:
-        found["least height above ground", "m"] = _reduced(
+        found["lowest height above ground", "m"] = _reduced(
             np.min, segment_clearances(setup.scenario.terrain, position)[0]
         )
     threats = setup.scenario.threats
@@ -142,14 +142,14 @@ def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]])
 
 
 def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
-    """How many findings fail, and each rule's tightest margin."""
+    """How many findings fail, and each rule's smallest margin."""
     found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
     for rule in RULES:
         mine = [
             item for item in verdict.findings if item.rule == rule and item.ok is not None and item.margin is not None
         ]
         if mine:
-            found[f"tightest margin: {rule}", mine[0].unit] = min(float(item.margin or 0.0) for item in mine)
+            found[f"smallest margin: {rule}", mine[0].unit] = min(float(item.margin or 0.0) for item in mine)
     return found
 
 

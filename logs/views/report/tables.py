@@ -47,7 +47,7 @@ LEG_COLUMNS = (
     "peak bank (°)",
     "peak cross-track (m)",
     "peak height error (m)",
-    "least height above ground (m)",
+    "lowest height above ground (m)",
     "energy (Wh)",
 )
 

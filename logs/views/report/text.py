@@ -108,7 +108,7 @@ class FindingRow:
 
 @dataclass(frozen=True, slots=True)
 class RuleRow:
-    """One rule over the whole flight: how many findings stand how, and the tightest of those judged."""
+    """One rule over the whole flight: how many findings stand how, and the one closest to its limit of those judged."""
 
     state: str
     sign: str
@@ -317,16 +317,16 @@ def _rule_row(rule: str, group: list[Finding]) -> RuleRow:
     parts: list[str] = [f"{failed} of {judged} fail" if failed else f"{judged} ok"] if judged else []
     if judged < len(group):
         parts.append(f"{len(group) - judged} not judged")
-    tightest = min(
+    closest = min(
         (finding for finding in group if finding.ok is not None and finding.margin is not None),
         key=lambda finding: (finding.ok is True, finding.margin),
         default=None,
     )
     sign = f"{_SIGNS[state]} {_WORDS[state]}"
-    if tightest is None:
+    if closest is None:
         why = "" if judged else group[0].reason
         return RuleRow(state, sign, rule, ", ".join(parts), why, NOTHING, NOTHING, NOTHING, NOTHING, "")
-    row = _row(tightest)
+    row = _row(closest)
     numbers = (row.planned, row.flown, row.limit, row.margin, row.unit)
     return RuleRow(state, sign, rule, ", ".join(parts), row.where, *numbers)
 

@@ -3,13 +3,13 @@
 The probability to fail is a link's function of a + b * wind + c . draws.  Three likelihoods are had of it:
 
 - of who failed alone, a binary regression;
-- of who failed and with how little room others passed, by one law: the share of flights that pass by less than some
-  room is the same function with k * room added, k of it to a scale's length, so that the room has the link's law and
-  1/k is its scale.  Of a failed flight only that it failed counts, of one that passed by a scale or more only that, so
-  that no law is asked to hold far from failing: a regression censored on both sides (Tobin, "Estimation of
-  relationships for limited dependent variables", Econometrica 26, 1958; Rosett and Nelson, "Estimation of the
-  two-limit probit regression model", Econometrica 43, 1975);
-- of the room alone, given that a flight passed: the same regression truncated at no room.
+- of who failed and by how little others passed, by one law: the share of flights that pass by less than some margin is
+  the same function with k * margin added, k of it to a scale's length, so that the margin has the link's law and 1/k is
+  its scale.  Of a failed flight only that it failed counts, of one that passed by a scale or more only that, so that no
+  law is asked to hold far from failing: a regression censored on both sides (Tobin, "Estimation of relationships for
+  limited dependent variables", Econometrica 26, 1958; Rosett and Nelson, "Estimation of the two-limit probit regression
+  model", Econometrica 43, 1975);
+- of the margin alone, given that a flight passed: the same regression truncated at no margin.
 
 Priors are weak and normal, of b's logarithm and of the others themselves.  Which flight tells most, and the evidence
 for a link and for how wide a prior the draws' coefficients have, follow from the posterior as normal about its mode
@@ -242,12 +242,12 @@ def _t_points(size: int, count: int) -> tuple[Floats, Floats]:
 # above 0, and its logarithm normal; it changes a probit by one within 0.3 to 14 m/s at 95 %.
 _CONSTANT, _WIND, _WIND_FACTOR = 20.0, 0.5, 1.0
 # Of the draws' coefficients, a draw being in units of its own standard deviation: of these the one that flights are
-# most evidence for.  Where draws decide little, much room for them would have chance look like knowledge.
+# most evidence for.  Where draws decide little, a wide prior for them would have chance look like knowledge.
 _DRAWS = (0.1, 0.4, 1.5)
-# Of the room's coefficient, 1/scale, of which only what is above 0 is meant.
-_ROOM = 10.0
-# Where Newton's method begins: few fail, and more in more wind; and of the room's coefficient.
-_START, _ROOM_START = (-3.0, np.log(0.3)), 1.0
+# Of the margin's coefficient, 1/scale, of which only what is above 0 is meant.
+_MARGIN = 10.0
+# Where Newton's method begins: few fail, and more in more wind; and of the margin's coefficient.
+_START, _MARGIN_START = (-3.0, np.log(0.3)), 1.0
 _STEPS, _CONVERGED, _MIN_SHARE, _MIN_CURVATURE, _MAX_LOGARITHM = 100, 1e-8, 1e-9, 1e-9, 5.0
 _OF_THE_WAY = 0.9
 # Of a flight that passed, on either link's scale.
@@ -262,28 +262,28 @@ class Outcomes:
 
     terms: (n, 2 + d) of each flight: one, the wind from some origin, and what was drawn.
     failed: (n,).
-    room: (n,) by what share of a scale each passed: 1 for a scale or more, 0 for not known or failed.
+    margin: (n,) by what share of a scale each passed: 1 for a scale or more, 0 for not known or failed.
     given_passed: whether that a flight passed is given, and only by how much counts.
     """
 
     terms: Floats
     failed: Bools
-    room: Floats
+    margin: Floats
     given_passed: bool = False
 
     @property
-    def told(self) -> Bools:
+    def narrow(self) -> Bools:
         """(n,) which passed by less than a scale, and by how much."""
-        return (self.room > 0.0) & (self.room < 1.0)
+        return (self.margin > 0.0) & (self.margin < 1.0)
 
-    def without_room(self) -> "Outcomes":
+    def without_margin(self) -> "Outcomes":
         """Who failed alone."""
-        return Outcomes(self.terms, self.failed, np.zeros_like(self.room))
+        return Outcomes(self.terms, self.failed, np.zeros_like(self.margin))
 
-    def only_room(self) -> "Outcomes":
-        """Of those that passed with a room that is known, by how much alone."""
-        known = self.room > 0.0
-        return Outcomes(self.terms[known], self.failed[known], self.room[known], given_passed=True)
+    def only_margin(self) -> "Outcomes":
+        """Of those that passed with a margin that is known, by how much alone."""
+        known = self.margin > 0.0
+        return Outcomes(self.terms[known], self.failed[known], self.margin[known], given_passed=True)
 
 
 @dataclass(frozen=True)
@@ -292,13 +292,13 @@ class RegressionFit:
 
     mean, covariance: (2 + d,) and (2 + d, 2 + d) of the coefficients of the terms, as of a normal law about the mode.
     log_evidence: of what came out.
-    by_room: by how much the predictor falls over a scale of room; 0 where no flight told of its room.
+    by_margin: by how much the predictor falls for a scale of margin; 0 where no margin is known.
     """
 
     mean: Floats
     covariance: Floats
     log_evidence: float
-    by_room: float
+    by_margin: float
     _posterior: "_Posterior"
     _mode: Floats
 
@@ -310,12 +310,12 @@ class RegressionFit:
 def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | None = None) -> RegressionFit:
     """The regression by the prior of the draws' coefficients that has the most evidence.
 
-    near: another, of the same coefficients, whose mode is a place to look from, too; that of room alone may have two.
+    near: another, of the same coefficients, whose mode is a place to look from, too; that of margin alone may have two.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
-    >>> room = 2.0 - wind
-    >>> outcomes = Outcomes(np.column_stack((np.ones(200), wind)), room < 0.0, room.clip(0.0, 1.0))
+    >>> margin = 2.0 - wind
+    >>> outcomes = Outcomes(np.column_stack((np.ones(200), wind)), margin < 0.0, margin.clip(0.0, 1.0))
     >>> fit = fit_regression(outcomes, PROBIT)
     >>> round(float(-fit.mean[0] / fit.mean[1]), 1)
     2.0
@@ -332,20 +332,20 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | N
 
 
 class _Posterior:
-    """Of coefficients, but that the wind's is its logarithm; the room's is the last where some flight told of it.
+    """Of coefficients, but that the wind's is its logarithm; the margin's is the last where some margin is known.
 
     deviation: of the prior of the draws' coefficients.
     """
 
     def __init__(self, outcomes: Outcomes, link: BinaryLink, deviation: float) -> None:
-        self._outcomes, self._link, self._told = outcomes, link, outcomes.told
-        self.by_room = bool(self._told.any())
+        self._outcomes, self._link, self._narrow = outcomes, link, outcomes.narrow
+        self.by_margin = bool(self._narrow.any())
         self.size = outcomes.terms.shape[1]
         deviations = np.full(self.size, deviation)
         deviations[:2] = _CONSTANT, _WIND_FACTOR
-        # The room is a regressor of what passed: F(terms . beta + k * room) is the share that passes by less.
-        self._terms = np.column_stack((outcomes.terms, outcomes.room)) if self.by_room else outcomes.terms
-        self.deviations = np.append(deviations, _ROOM) if self.by_room else deviations
+        # The margin is a regressor of what passed: F(terms . beta + k * margin) is the share that passes by less.
+        self._terms = np.column_stack((outcomes.terms, outcomes.margin)) if self.by_margin else outcomes.terms
+        self.deviations = np.append(deviations, _MARGIN) if self.by_margin else deviations
         self._precision = self.deviations**-2
         self._middle = np.zeros(self.deviations.size)
         self._middle[1] = np.log(_WIND)
@@ -354,8 +354,8 @@ class _Posterior:
         """Where to look first."""
         at = np.zeros(self.deviations.size)
         at[:2] = _START
-        if self.by_room:
-            at[-1] = _ROOM_START
+        if self.by_margin:
+            at[-1] = _MARGIN_START
         return at
 
     def coefficients(self, points: Floats) -> Floats:
@@ -373,11 +373,11 @@ class _Posterior:
         x, bare = np.where(possible, x, 0.0), np.where(possible, bare, 0.0)
         logs: Floats = -0.5 * (off * off) @ self._precision
         logs += self._link.log_cdf(x[failed]).sum(axis=0)
-        logs += self._link.log_survival(x[~failed & ~self._told]).sum(axis=0)
-        if self.by_room:
+        logs += self._link.log_survival(x[~failed & ~self._narrow]).sum(axis=0)
+        if self.by_margin:
             possible &= beta[:, -1] > 0.0
-            logs += self._link.log_density(x[self._told]).sum(axis=0)
-            logs += self._told.sum() * np.log(np.where(possible, beta[:, -1], 1.0))
+            logs += self._link.log_density(x[self._narrow]).sum(axis=0)
+            logs += self._narrow.sum() * np.log(np.where(possible, beta[:, -1], 1.0))
         if self._outcomes.given_passed:
             logs -= self._link.log_survival(bare).sum(axis=0)
         return np.where(possible, logs, -np.inf)
@@ -412,33 +412,33 @@ class _Posterior:
         beta, scale = self.coefficients(at), np.ones(at.size)
         x, terms = self._terms @ beta, self._terms
         first, second = self._link.derivatives(x, self._outcomes.failed)
-        if self.by_room:
+        if self.by_margin:
             of_first, of_second = self._link.density_derivatives(x)
-            first, second = np.where(self._told, of_first, first), np.where(self._told, of_second, second)
+            first, second = np.where(self._narrow, of_first, first), np.where(self._narrow, of_second, second)
         slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
         if self._outcomes.given_passed:
             bare = self._outcomes.terms
-            first, second = self._link.derivatives(self._at_no_room(beta), self._outcomes.failed)
+            first, second = self._link.derivatives(self._at_no_margin(beta), self._outcomes.failed)
             slope[: self.size] += bare.T @ first
             curvature[: self.size, : self.size] += (bare * second[:, None]).T @ bare
-        if self.by_room:
-            told = int(self._told.sum())
-            slope[-1] -= told / beta[-1]
-            curvature[-1, -1] += told / beta[-1] ** 2
+        if self.by_margin:
+            count = int(self._narrow.sum())
+            slope[-1] -= count / beta[-1]
+            curvature[-1, -1] += count / beta[-1] ** 2
         # By the logarithm of the wind's coefficient.
         scale[1] = beta[1]
         slope, curvature = scale * slope, scale[:, None] * curvature * scale
         curvature[1, 1] += slope[1]
         return slope + self._precision * (at - self._middle), curvature + np.diag(self._precision)
 
-    def _at_no_room(self, beta: Floats) -> Floats:
+    def _at_no_margin(self, beta: Floats) -> Floats:
         return self._outcomes.terms @ beta[: self.size]
 
 
 def _fit(posterior: _Posterior, at: Floats) -> RegressionFit:
     """The posterior's mode, looked for from a point, and the inverse of its curvature there.
 
-    By Newton's method with halved steps; where the loss is not convex, which that of room alone need not be, by the
+    By Newton's method with halved steps; where the loss is not convex, which that of margin alone need not be, by the
     curvature's absolute eigenvalues (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and
     19.2).
     """
@@ -452,8 +452,8 @@ def _fit(posterior: _Posterior, at: Floats) -> RegressionFit:
         slope, curvature = posterior.slope_and_curvature(at)
         eigenvalues, axes = np.linalg.eigh(curvature)
         step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE))
-        # The room's coefficient is above 0: towards it only so much of the way, where halves would end at it.
-        towards = step[-1] if posterior.by_room else 0.0
+        # The margin's coefficient is above 0: towards it only so much of the way, where halves would end at it.
+        towards = step[-1] if posterior.by_margin else 0.0
         share = min(1.0, _OF_THE_WAY * at[-1] / towards) if towards > 0.0 else 1.0
         while not (tried := loss(at - share * step)) <= value and share > _MIN_SHARE:
             share *= 0.5
@@ -465,5 +465,5 @@ def _fit(posterior: _Posterior, at: Floats) -> RegressionFit:
     covariance: Floats = np.linalg.inv(curvature)[:size, :size].astype(np.float64)
     covariance[1] *= beta[1]
     covariance[:, 1] *= beta[1]
-    by_room = float(beta[-1]) if posterior.by_room else 0.0
-    return RegressionFit(beta[:size], covariance, float(evidence), by_room, posterior, at)
+    by_margin = float(beta[-1]) if posterior.by_margin else 0.0
+    return RegressionFit(beta[:size], covariance, float(evidence), by_margin, posterior, at)

@@ -211,7 +211,7 @@ USUAL_CONFIDENCE = 0.95
 class Goal:
     """What is asked of a campaign.
 
-    target: the probability to reach; None where it is only to be told.
+    target: the probability to reach; None where it is only to be estimated.
     stops: whether flying stops as soon as the answer is known (`--prove`); otherwise the number of flights is fixed.
     flights: fixed number, or the most where it stops.
     changed: whether another number was to be fixed first, and some of its flights were flown.

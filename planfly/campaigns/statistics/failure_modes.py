@@ -108,11 +108,9 @@ def _counted(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[in
 #
 # By how little flights passed tells of failing only where both are of one kind: an aircraft that is too fast down a leg
 # fails by degrees, whatever the gusts took of the slope of those that were not.  So of two hypotheses the one with more
-# evidence is taken: one law for failing and for the room of those that passed (Tobin's), or one for each, where the
-# room
-# tells nothing of failing (Cragg, "Some statistical models for limited dependent variables with application to the
-# demand
-# for durable goods", Econometrica 39, 1971, of which the first is a special case).
+# evidence is taken: one law for failing and for the margin of those that passed (Tobin's), or one for each, where the
+# margin says nothing of failing (Cragg, "Some statistical models for limited dependent variables with application to
+# the demand for durable goods", Econometrica 39, 1971, of which the first is a special case).
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +120,7 @@ class FailureMode:
     mean, covariance: (2 + d,) and (2 + d, 2 + d) of its coefficients, as those of the terms it was fitted to.
     sample: (s, 2 + d) of what the coefficients may be, each as likely as the other.
     log_evidence: of what came out, by this link.
-    by_room: by how much the predictor falls over a scale of room; 0 where room tells nothing of failing.
+    by_margin: by how much the predictor falls for a scale of margin; 0 where margins say nothing of failing.
     """
 
     link: BinaryLink
@@ -130,29 +128,29 @@ class FailureMode:
     covariance: Floats
     sample: Floats
     log_evidence: float
-    by_room: float = 0.0
+    by_margin: float = 0.0
 
 
-def fit_mode(terms: Floats, failed: Bools, room: Floats, link: BinaryLink) -> FailureMode:
-    """One way of failing of n flights, by one law with their room or by its own, whichever has more evidence.
+def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> FailureMode:
+    """One way of failing of n flights, by one law with their margin or by its own, whichever has more evidence.
 
     terms: (n, 2 + d) of each flight: one, the wind from some origin, and what was drawn.
-    failed: (n,).  room: (n,) by what share of a scale each passed that did: 1 for a scale or more, 0 for not known.
+    failed: (n,).  margin: (n,) by what share of a scale each passed that did: 1 for a scale or more, 0 for not known.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
     >>> terms, failed, chance = np.column_stack((np.ones(200), wind)), wind > 2.0, np.random.default_rng(1).random(200)
-    >>> fit_mode(terms, failed, (2.0 - wind).clip(0.0, 1.0), PROBIT).by_room > 0.0
+    >>> fit_mode(terms, failed, (2.0 - wind).clip(0.0, 1.0), PROBIT).by_margin > 0.0
     True
-    >>> fit_mode(terms, failed, chance, PROBIT).by_room
+    >>> fit_mode(terms, failed, chance, PROBIT).by_margin
     0.0
     """
-    outcomes = Outcomes(terms, failed, np.where(failed, 0.0, room))
+    outcomes = Outcomes(terms, failed, np.where(failed, 0.0, margin))
     one_law = fit_regression(outcomes, link)
-    if not outcomes.told.any():
+    if not outcomes.narrow.any():
         return _mode(link, one_law, one_law.log_evidence)
-    alone, passes = fit_regression(outcomes.without_room(), link), outcomes.only_room()
-    # The room's own law, of whichever link, says nothing of failing's.
+    alone, passes = fit_regression(outcomes.without_margin(), link), outcomes.only_margin()
+    # The margin's own law, of whichever link, says nothing of failing's.
     two_laws = alone.log_evidence + max(fit_regression(passes, any_link, one_law).log_evidence for any_link in LINKS)
     if two_laws > one_law.log_evidence:
         return _mode(link, alone, two_laws)
@@ -160,7 +158,7 @@ def fit_mode(terms: Floats, failed: Bools, room: Floats, link: BinaryLink) -> Fa
 
 
 def _mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
-    return FailureMode(link, fit.mean, fit.covariance, fit.sample(), log_evidence, fit.by_room)
+    return FailureMode(link, fit.mean, fit.covariance, fit.sample(), log_evidence, fit.by_margin)
 
 
 # Winds are counted from here, m/s, where the constant's prior is meant.
@@ -183,13 +181,13 @@ def fit_modes(
     terms: Floats,
     failed: Sequence[frozenset[Hashable]],
     link: BinaryLink,
-    room: Sequence[Mapping[Hashable, float] | None] = (),
+    margin: Sequence[Mapping[Hashable, float] | None] = (),
 ) -> tuple[FailureMode, ...]:
     """The ways of failing of n flights, in order: the one in which most failed, then in which most of the others did.
 
     terms: (n, 2 + d), of `regressors`.
     failed: the ways in which each failed; none where it was flyable.
-    room: the ways that each passed narrowly, and by what share of a scale, 0 to 1, or 0 where it passed all the same;
+    margin: the ways that each passed narrowly, and by what share of a scale, 0 to 1, or 0 where it passed all the same;
     others were passed by a scale or more.  None of a flight of which that is not known.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
@@ -200,13 +198,13 @@ def fit_modes(
     12.0
     """
     found: list[FailureMode] = []
-    rooms = room or [None] * len(failed)
+    margins = margin or [None] * len(failed)
     left = np.ones(len(failed), dtype=bool)
     while counts := Counter(way for here, ways in zip(left, failed, strict=True) if here for way in ways):
         # By name where as many failed, as the order of a set is not the same in every process.
         common = min(counts, key=lambda way: (-counts[way], repr(way)))
         so = np.array([common in ways for ways in failed])
-        passed_by = np.array([0.0 if some is None else some.get(common, 1.0) for some in rooms])
+        passed_by = np.array([0.0 if some is None else some.get(common, 1.0) for some in margins])
         found.append(fit_mode(terms[left], so[left], passed_by[left], link))
         left &= ~so
     return tuple(found)

@@ -38,12 +38,12 @@ Floats = NDArray[np.float64]
 # Each sample's boundary is first found over so few of what may be drawn, to so many m/s; the logarithm of the share
 # that fails, over all of it, is then nearly straight in the wind: so many steps of the secant method follow.
 _FEW, _NEAR, _SECANTS = 256, 0.1, 2
-# Of a share, what is told from none.
+# The smallest share that is told from none.
 _MIN_PROBABILITY = 1e-12
 
 
 @dataclass(frozen=True)
-class WeighedModes:
+class WeightedModes:
     """The modes by one link, and its weight among all."""
 
     modes: tuple[FailureMode, ...]
@@ -51,7 +51,7 @@ class WeighedModes:
 
 
 def boundary_quantiles(
-    fits: Sequence[WeighedModes], draws: Floats, share: float, most: float, probabilities: Sequence[float]
+    fits: Sequence[WeightedModes], draws: Floats, share: float, most: float, probabilities: Sequence[float]
 ) -> list[float]:
     """The wind, from 0 to most, m/s, that the boundary lies below with each of these probabilities, 0 to 1.
 
@@ -61,7 +61,8 @@ def boundary_quantiles(
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> sample = np.column_stack((np.linspace(-0.1, 0.1, 101), np.full(101, 0.5)))
     >>> mode = FailureMode(PROBIT, sample.mean(axis=0), np.cov(sample.T), sample, 0.0)
-    >>> [round(one, 1) for one in boundary_quantiles([WeighedModes((mode,), 1.0)], np.zeros((1, 0)), 0.5, 20.0, (0.5,))]
+    >>> modes = [WeightedModes((mode,), 1.0)]
+    >>> [round(one, 1) for one in boundary_quantiles(modes, np.zeros((1, 0)), 0.5, 20.0, (0.5,))]
     [10.0]
     """
     speeds = [_boundaries(fit.modes, draws, share, most) for fit in fits]
@@ -155,7 +156,7 @@ class WindBoundary:
 
 
 @dataclass(frozen=True)
-class FailureFit(WeighedModes):
+class FailureFit(WeightedModes):
     """What the flights of a direction tell of its boundary by one link.
 
     speed: of the boundary, m/s, up to the largest wind that is looked at.
@@ -171,7 +172,7 @@ class Direction:
 
     most: wind up to which is looked, m/s.  target, confidence: above 0 and below 1.
     speeds: m/s, in which they were flown.  draws: index of each one's draw.  failed: the ways in which each failed.
-    room: the ways that each passed narrowly, and by what share of a scale, 0 to 1; None where that is not known.
+    margin: the ways that each passed narrowly, and by what share of a scale, 0 to 1; None where that is not known.
     """
 
     def __init__(self, most: float, target: float, numbers: DrawnNumbers, confidence: float = 0.95) -> None:
@@ -179,22 +180,22 @@ class Direction:
         self.speeds: list[float] = []
         self.draws: list[int] = []
         self.failed: list[frozenset[Hashable]] = []
-        self.room: list[Mapping[Hashable, float] | None] = []
+        self.margin: list[Mapping[Hashable, float] | None] = []
         self._fits: tuple[int, tuple[FailureFit, ...]] | None = None
 
     def add(
-        self, speed: float, draw: int, failed: frozenset[Hashable], room: Mapping[Hashable, float] | None = None
+        self, speed: float, draw: int, failed: frozenset[Hashable], margin: Mapping[Hashable, float] | None = None
     ) -> None:
         """Take a flight in, of a wind from 0 to `most`, m/s; failed: none for one that was flyable.
 
-        room: None where nothing is known of how narrowly it passed.  Raises ValueError for another wind.
+        margin: None where nothing is known of how narrowly it passed.  Raises ValueError for another wind.
         """
         if not 0.0 <= speed <= self.most:
             raise ValueError(f"speed: {speed}: 0 to {self.most:g} m/s is expected")
         self.speeds.append(speed)
         self.draws.append(draw)
         self.failed.append(failed)
-        self.room.append(room)
+        self.margin.append(margin)
 
     @property
     def all_flew(self) -> bool:
@@ -210,7 +211,7 @@ class Direction:
         """The ways of failing by each link; for a direction in which some flew and some did not."""
         if self._fits is None or self._fits[0] != len(self.speeds):
             terms = regressors(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
-            every = [fit_modes(terms, self.failed, link, self.room) for link in LINKS]
+            every = [fit_modes(terms, self.failed, link, self.margin) for link in LINKS]
             evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in every])
             weights = np.exp(evidence - evidence.max())
             weights /= weights.sum()
@@ -370,23 +371,23 @@ class _Belief:
     def gains(self, terms: Floats) -> Floats:
         """(n,) by how much each of these flights (n, 2 + d) is expected to lessen the boundary's variance, m2/s2."""
         out: Floats = np.zeros(len(terms))
-        for k, told in enumerate(self._informations(terms)):
+        for k, info in enumerate(self._informations(terms)):
             known, slope = terms @ self._covariances[k], self._fit.slopes[k]
-            out += (known @ slope) ** 2 * told / (1.0 + told * (known * terms).sum(axis=1))
+            out += (known @ slope) ** 2 * info / (1.0 + info * (known * terms).sum(axis=1))
         return self._fit.weight * out
 
     def expect(self, row: Floats) -> None:
         """Count a flight (2 + d,) as flown, whatever comes of it."""
-        for k, told in enumerate(self._informations(row[None])):
+        for k, info in enumerate(self._informations(row[None])):
             known = self._covariances[k] @ row
-            self._covariances[k] = self._covariances[k] - told * np.outer(known, known) / (1.0 + told * (row @ known))
+            self._covariances[k] = self._covariances[k] - info * np.outer(known, known) / (1.0 + info * (row @ known))
 
     def _informations(self, terms: Floats) -> Iterator[Floats]:
         """(n,) of each mode: a flight tells of one if it does not fail by those before."""
         reaches: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
             x = terms @ mode.mean
-            yield reaches * mode.link.information(x, mode.by_room)
+            yield reaches * mode.link.information(x, mode.by_margin)
             reaches = reaches * mode.link.survival(x)
 
 

@@ -18,10 +18,6 @@ def test_two_records_of_one_program_are_one() -> None:
     assert first != AutopilotProgram("ArduPlane V4.6.0", "ab" * 32, {"WP_RADIUS": 60.0}, {})
 
 
-# ----------------------------------------------------------------------
-# Field source.
-
-
 def test_a_cut_end_is_no_loss() -> None:
     """Every log that ends with the power ends within a message."""
     assert not Damage(cut=True).lossy

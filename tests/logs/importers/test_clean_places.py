@@ -43,10 +43,6 @@ def test_two_restarts_are_two_jumps() -> None:
     assert found.jumps == (24.0, 44.0)
 
 
-# ----------------------------------------------------------------------
-# Clean places.
-
-
 def north(time: np.ndarray, speed: float = 25.0, lon: float = 8.0) -> LogSeries:
     """A flight to the north."""
     return LogSeries("POS", time, np.column_stack([46.0 + speed * time / DEGREE, np.full(time.size, lon), time * 0.0]))

@@ -23,9 +23,6 @@ def test_each_piece_is_let_go_of() -> None:
     assert len(calls) == 3
 
 
-# ----------------------------------------------------------------------
-# Dataflash frames.
-
 NAMES = ("POS", "ATT", "MSG")
 
 

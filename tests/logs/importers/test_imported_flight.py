@@ -149,10 +149,6 @@ def test_a_flight_is_taken_by_its_number() -> None:
         make_flight(example_raw_log(), 2)
 
 
-# ----------------------------------------------------------------------
-# Flown heights.
-
-
 def test_across_the_180th_meridian_the_near_row_counts() -> None:
     task = Mission(None, (MissionItem(1, 16, 0, (0.0,) * 4, -17.0, -179.999, 0.0),))
     lon = np.array([179.9, 179.9995, -179.9])
@@ -164,10 +160,6 @@ def test_rows_without_a_height_do_not_count() -> None:
     task = Mission(None, (MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 0.0),))
     flown = with_flown_heights(task, np.array([46.0, 46.1]), np.full(2, 8.0), np.array([np.nan, 300.0]))
     assert flown.items[0].alt == 300.0
-
-
-# ----------------------------------------------------------------------
-# Mean wind.
 
 
 def blown(east: float, north: float):

@@ -31,10 +31,6 @@ def test_of_px4_the_mission_state_alone_follows_it() -> None:
     assert px4_mode(5 << 24 | 4 << 16) == ("RTL", False)
 
 
-# ----------------------------------------------------------------------
-# Px4 log.
-
-
 def test_rows_are_what_pyulog_reads(tmp_path: Path) -> None:
     path = px4(tmp_path / "a.ulg")
     raw, log = read_px4(path), ULog(str(path))

@@ -10,10 +10,6 @@ def test_each_series_has_a_column_for_each_name() -> None:
         assert series.values.shape == (len(series.time), len(COLUMNS[name]))
 
 
-# ----------------------------------------------------------------------
-# Example raw log.
-
-
 @pytest.mark.parametrize("lon", [8.0, 179.995])
 def test_it_flies_at_its_speed(lon: float) -> None:
     lat, east, _ = example_raw_log(-33.0, lon).series["position"].values.T

@@ -46,9 +46,6 @@ def test_a_cut_is_told(tmp_path: Path) -> None:
     assert reader.damage().cut
 
 
-# ----------------------------------------------------------------------
-# Telemetry rows.
-
 link = dialect.MAVLink(None)
 
 
@@ -73,10 +70,6 @@ def test_a_message_without_a_time_of_its_own_comes_as_much_later_as_it_was_recei
     clock = found.boot_times()
     assert clock.offset == 999.5
     assert clock.time.tolist() == [0.5, 0.75]
-
-
-# ----------------------------------------------------------------------
-# Telemetry log.
 
 
 def test_rows_are_what_mavutil_reads(tmp_path: Path) -> None:

@@ -134,9 +134,9 @@ def test_many_small_bombs_are_refused(tmp_path: Path) -> None:
     [
         (b"", "empty"),
         (b"QGC WPL 110\n", "not an MCAP file"),
-        (MAGIC, "no whole chunk"),
+        (MAGIC, "no complete chunk"),
         (MAGIC + b"\x06" + b"\xff" * 8, "at most 67,108,864 are read"),
-        (MAGIC + b"\x00" * 100, "no whole chunk"),
+        (MAGIC + b"\x00" * 100, "no complete chunk"),
         (MAGIC + mcap_record(9, b"\xff" * 30), "cannot be read"),
         (MAGIC + mcap_record(6, b"\xff" * 30), "cannot be read"),
         (bytes(range(256)) * 50, "not an MCAP file"),

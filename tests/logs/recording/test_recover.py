@@ -36,7 +36,7 @@ def test_a_cut_log_becomes_whole_for_any_reader(log_file: Path, tmp_path: Path, 
     assert after.problem == f"recovered: {before.problem}"
     assert after.ended is None
     assert after.recorded_verdict is None
-    assert not judge_flight(after.setup, after.track, "completed", whole=after.complete).flyable
+    assert not judge_flight(after.setup, after.track, "completed", log_complete=after.complete).flyable
     # mcap's own reader needs the summary, which is there again; its index leads to every message.
     with whole.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)

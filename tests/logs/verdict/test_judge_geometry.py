@@ -22,10 +22,6 @@ def test_a_plan_that_is_not_feasible(setup: FlightSetup) -> None:
     assert "leg 2: slope 16.6 deg" in verdict.summary
 
 
-# ----------------------------------------------------------------------
-# Flown findings.
-
-
 def test_rules_come_in_the_verdicts_order() -> None:
     log = example_log()
     requirements = route_requirements(log.setup)

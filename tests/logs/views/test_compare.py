@@ -89,9 +89,6 @@ def test_a_small_cross_track_fills_its_panel() -> None:
     assert cross.get_ylim() == pytest.approx((-0.07 - 0.0112, 0.07 + 0.0112), abs=1e-6)
 
 
-# ----------------------------------------------------------------------
-# Refly.
-
 LOG = example_log()
 FLOWN = flown_legs(LOG.setup, LOG.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
 assert FLOWN is not None

@@ -83,25 +83,25 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
         assert set(range(len(draws) // 3)) <= set(draws)
 
 
-def flight_that_tells_its_room(base: CampaignBase, index: int, wind: GivenWind) -> FlightRow:
+def flight_that_states_its_margin(base: CampaignBase, index: int, wind: GivenWind) -> FlightRow:
     """A made flight that also tells by how much it passed, where that is less than a metre a second of wind."""
     row = made_flight(base, index, wind)
-    room = (12.0 if wind.from_deg == 270.0 else 8.0) + row.draw.seed % 1000 / 1000.0 - 0.5 - wind.speed
-    return replace(row, narrow=(("clearance", Place("leg", 1), room),)) if 0.0 < room < 1.0 else row
+    margin = (12.0 if wind.from_deg == 270.0 else 8.0) + row.draw.seed % 1000 / 1000.0 - 0.5 - wind.speed
+    return replace(row, narrow=(("clearance", Place("leg", 1), margin),)) if 0.0 < margin < 1.0 else row
 
 
 @pytest.mark.usefixtures("here")
 def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: CampaignBase, tmp_path: Path) -> None:
     """As many flights; and what is told is still there when the search goes on."""
     goal = replace(GOAL, flights=120)
-    told = searched(wind_base, tmp_path / "told", goal, fly=flight_that_tells_its_room)
+    told = searched(wind_base, tmp_path / "told", goal, fly=flight_that_states_its_margin)
     bare = searched(wind_base, tmp_path / "bare", goal)
     for some, none in zip(told.boundaries, bare.boundaries, strict=True):
         assert some.width < 0.8 * none.width
-    assert searched(wind_base, tmp_path / "told", goal, fly=flight_that_tells_its_room) == told
+    assert searched(wind_base, tmp_path / "told", goal, fly=flight_that_states_its_margin) == told
     # And where a part of it is there alone.
     keep_part(wind_base, tmp_path / "told", tmp_path / "part", {*range(70), 72}, goal)
-    again = searched(wind_base, tmp_path / "part", goal, fly=flight_that_tells_its_room)
+    again = searched(wind_base, tmp_path / "part", goal, fly=flight_that_states_its_margin)
     assert same((told, tmp_path / "told"), (again, tmp_path / "part"))
 
 
@@ -139,7 +139,7 @@ def test_more_flights_or_fewer_go_on_as_if_asked_at_once(wind_base: CampaignBase
 
 
 @pytest.mark.parametrize(
-    ("flown", "room"),
+    ("flown", "margin"),
     [
         (FlownFlight("flyable", (), (("slope", LEG, 0.25),)), {("slope", "leg", 3): 0.25}),
         (FlownFlight("flyable", ()), {}),
@@ -149,12 +149,12 @@ def test_more_flights_or_fewer_go_on_as_if_asked_at_once(wind_base: CampaignBase
         (FlownFlight("lost", ()), None),
     ],
 )
-def test_a_flight_that_did_not_go_on_to_its_end_tells_of_no_room(
-    wind_base: CampaignBase, flown: FlownFlight, room: dict[Any, float] | None
+def test_a_flight_that_did_not_go_on_to_its_end_states_no_margin(
+    wind_base: CampaignBase, flown: FlownFlight, margin: dict[Any, float] | None
 ) -> None:
     search = _Search(GOAL, wind_base)
     search.take(AskedFlight(0, 2, 8.0, 0), flown)
-    assert search.directions[2].room == [room]
+    assert search.directions[2].margin == [margin]
     assert search.directions[2].speeds == [8.0]
 
 
@@ -185,7 +185,7 @@ def surer_but_in_the_west(base: CampaignBase, index: int, wind: GivenWind | None
 
 @pytest.mark.usefixtures("here")
 def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planfly.campaigns.worker_pool.TOLD_EVERY", 0.0)
+    monkeypatch.setattr("planfly.campaigns.worker_pool.REPORTED_EVERY", 0.0)
     monkeypatch.setattr(find_winds_module, "FEWEST", 30)
     monkeypatch.setattr(find_winds_module, "ACCURACY", 0.8)
     goal = replace(GOAL, flights=600)

@@ -32,7 +32,7 @@ from tests.synthetic import fly_path, make_setup
 from world.scenario import with_wind
 
 # ----------------------------------------------------------------------
-# Narrow passes, by plain sums: a missile beside a straight track, and findings with little room.
+# Narrow passes, by plain sums: a missile beside a straight track, and findings with little margin.
 
 MISSILE = {"name": "Alfa", "north_m": 1000.0, "amsl_m": 300.0, "kill_radius_m": 500.0, "kill_scale_m": 200.0}
 LEG = Place("leg", 1)
@@ -44,11 +44,11 @@ def passed_beside(away: float, *findings: Finding) -> tuple[NarrowPass, ...]:
     return narrow_passes(findings, setup.scenario, fly_path(setup))
 
 
-@pytest.mark.parametrize(("away", "room"), [(2.5, 0.25), (9.9, 0.99)])
-def test_a_missile_passed_within_ten_metres(away: float, room: float) -> None:
+@pytest.mark.parametrize(("away", "left"), [(2.5, 0.25), (9.9, 0.99)])
+def test_a_missile_passed_within_ten_metres(away: float, left: float) -> None:
     ((rule, place, share),) = passed_beside(away)
     assert (rule, place) == ("threat", Place("missile", 0, name="Alfa"))
-    assert share == pytest.approx(room, abs=1e-4)
+    assert share == pytest.approx(left, abs=1e-4)
 
 
 def test_a_missile_further_off_or_entered_is_none() -> None:
@@ -62,23 +62,23 @@ def finding(rule: str, margin: float | None, *, ok: bool | None = True, **other:
 
 
 @pytest.mark.parametrize(
-    ("rule", "margin", "tolerance", "room"),
+    ("rule", "margin", "tolerance", "left"),
     [
         # A degree of slope, ten metres of clearance.
         ("slope", 0.25, 0.0, 0.25),
         ("slope", 0.99, None, 0.99),
         ("clearance", 2.5, None, 0.25),
-        # The tolerance is room, too.
+        # The tolerance counts as margin, too.
         ("slope", -0.25, 0.5, 0.25),
         # What passes beyond its limit.
         ("slope", -2.0, 0.5, 0.0),
     ],
 )
-def test_room_is_that_to_the_limit_with_its_tolerance(
-    rule: str, margin: float, tolerance: float | None, room: float
+def test_the_margin_is_that_to_the_limit_with_its_tolerance(
+    rule: str, margin: float, tolerance: float | None, left: float
 ) -> None:
     ((found, place, share),) = passed_beside(99.0, finding(rule, margin, tolerance=tolerance))
-    assert (found, place, share) == (rule, LEG, pytest.approx(room))
+    assert (found, place, share) == (rule, LEG, pytest.approx(left))
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_room_is_that_to_the_limit_with_its_tolerance(
         finding("turn", 0.2),
     ],
 )
-def test_what_has_more_room_or_no_number_is_none(wide: Finding) -> None:
+def test_what_has_more_margin_or_no_number_is_none(wide: Finding) -> None:
     assert passed_beside(99.0, wide) == ()
 
 

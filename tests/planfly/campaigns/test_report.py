@@ -121,7 +121,7 @@ def test_flights_are_counted_by_wind() -> None:
     first = spokes(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
     assert wind_lines(FOUND)[0] == (
-        "flies with P >= 0.9, by best estimate, in wind up to 7.0 m/s from 0° (the least; 6.5 to 7.5 m/s at 95 %),"
+        "flies with P >= 0.9, by best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"
         " over 20 m/s from 270°"
     )
 

@@ -197,7 +197,7 @@ def test_a_full_disk_is_told_and_keeps_what_was_written(
         add(path, many, resume=False, pages=12)
     assert told.value.filename == str(path)
     kept = [flight for flight, *_ in table(path)]
-    # All before the one that found no room.
+    # All before the one that found no margin.
     assert kept == list(range(len(kept)))
     assert 0 < len(kept) < 100
     add(path, many[len(kept) :], resume=True)

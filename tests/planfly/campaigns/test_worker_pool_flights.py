@@ -12,7 +12,7 @@ from planfly.campaigns.flight_row import FlightRow, lost_row
 from planfly.campaigns.tables import same_flight
 from planfly.campaigns.worker_pool import (
     LOST,
-    TOLD_EVERY,
+    REPORTED_EVERY,
     CampaignPlugin,
     FlightRate,
     FlightRequest,
@@ -56,7 +56,7 @@ def test_flights_that_were_there_before_are_not_counted(monkeypatch: pytest.Monk
     assert rate.a_second(60) == 5.0
     assert rate.due()
     assert not rate.due()
-    now += TOLD_EVERY
+    now += REPORTED_EVERY
     assert rate.due()
 
 

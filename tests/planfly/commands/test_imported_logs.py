@@ -273,10 +273,6 @@ def test_the_other_commands_take_an_imported_flight(tmp_path: Path, capsys: Outp
         assert ">nan" not in page
 
 
-# ----------------------------------------------------------------------
-# Refly.
-
-
 def test_tables_pictures_and_a_log_of_the_models_flight(tmp_path: Path, capsys: Output) -> None:
     flight = tmp_path / "a.mcap"
     assert main(["import", str(dataflash(tmp_path / "a.BIN")), str(flight), "--aircraft", "aerosonde"]) == 0

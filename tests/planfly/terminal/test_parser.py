@@ -26,10 +26,6 @@ def test_a_log_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
     assert "LOG.mcap" in capsys.readouterr().err
 
 
-# ----------------------------------------------------------------------
-# Field parser.
-
-
 def test_import_takes_a_log_and_a_target() -> None:
     args = build_parser().parse_args(["import", "a.tlog", "a.mcap", "--terrain", "dem.tif"])
     assert (args.command, args.log, args.target, args.terrain) == ("import", "a.tlog", "a.mcap", "dem.tif")

@@ -238,10 +238,6 @@ def test_a_speed_that_is_not_taken_leaves_the_one_before() -> None:
     assert speeds_flown(commanded, 25.0, PARAMETERS).tolist() == [25.0, 25.0, 20.0, 20.0, 31.0]
 
 
-# ----------------------------------------------------------------------
-# Logged parameters.
-
-
 def parameters(**values: float) -> tuple[ArduPilotParameters, tuple[str, ...]]:
     return logged_parameters(values, "a.BIN")
 

@@ -58,9 +58,6 @@ def test_a_flight_that_ends_in_its_first_lap_has_flown_none_of_the_second() -> N
     assert (found.first, found.last, found.partial) == (0, 3, True)
 
 
-# ----------------------------------------------------------------------
-# Wrong plan.
-
 SETUP = replace(LOG.setup, source=ImportedLog("a", "", "", stretches=(MissionStretch(0.0, 36.5, "AUTO", "log"),)))
 
 

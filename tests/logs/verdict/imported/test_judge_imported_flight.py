@@ -160,7 +160,7 @@ def test_two_stretches_are_judged_together(tmp_path: Path) -> None:
 def test_a_log_that_is_not_whole_is_not_complete(tmp_path: Path) -> None:
     flight = judged(tmp_path, options=AEROSONDE)
     assert judge_flight(flight.setup, flight.track, "").flyable
-    assert not judge_flight(flight.setup, flight.track, "", whole=False).flyable
+    assert not judge_flight(flight.setup, flight.track, "", log_complete=False).flyable
 
 
 @pytest.mark.parametrize(("mode", "complete"), [("RTL", True), ("FBWA", False)])
@@ -172,10 +172,6 @@ def test_a_return_that_the_mission_ends_with_completes_it(tmp_path: Path, mode: 
     mission = replace(logged.mission, items=(*logged.mission.items, back))
     flight = judged(tmp_path, replace(raw, missions=(replace(logged, mission=mission),)), AEROSONDE)
     assert outcome(flight, "completion") == [complete]
-
-
-# ----------------------------------------------------------------------
-# Field summary.
 
 
 def test_each_fault_of_rows_is_counted_by_name() -> None:

@@ -29,7 +29,7 @@ def test_an_unfinished_flight_is_never_flyable(setup: FlightSetup) -> None:
     assert of(verdict, "completion").flown == 1.0
     # The same track is not complete even if its recorder says so, nor is a whole one in a damaged log.
     assert not judge(setup, fly_path(setup, stop=3000.0)).complete
-    assert not judge(setup, fly_path(setup), whole=False).complete
+    assert not judge(setup, fly_path(setup), log_complete=False).complete
 
 
 def test_a_hole_in_the_record(setup: FlightSetup, track: Track) -> None:

@@ -32,7 +32,7 @@ def test_legs_add_up_to_the_flight() -> None:
     assert [row["peak bank (°)"] for row in rows] == ["0.0", "28.6", "0.0"]
     assert [row["peak cross-track (m)"] for row in rows] == ["3.25", "0.00", "0.00"]
     # 200 m of ground under 300 m at the start, 340 m after the first leg, 360 m at the end
-    assert [row["least height above ground (m)"] for row in rows] == ["100.0", "140.0", "160.0"]
+    assert [row["lowest height above ground (m)"] for row in rows] == ["100.0", "140.0", "160.0"]
     assert [row.failing for row in leg_rows(make_setup(), None, frozenset({1}))] == [False, True, False]
 
 

@@ -148,9 +148,6 @@ def test_rules_show_their_worst_finding(kinds: list[tuple[bool | None, float]]) 
     assert states == sorted(states, key=["fail", "pass", "unjudged"].index)
 
 
-# ----------------------------------------------------------------------
-# Refly lines.
-
 LOG = example_log()
 FLOWN = flown_legs(LOG.setup, LOG.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
 assert FLOWN is not None

@@ -59,7 +59,7 @@ def test_derivatives_of_the_density_are_the_laws(link: BinaryLink, law: Any) -> 
 @pytest.mark.parametrize(("link", "law"), CASES)
 @pytest.mark.parametrize("width", [0.5, 3.0])
 def test_information_is_the_mean_square_of_the_score(link: BinaryLink, law: Any, width: float) -> None:
-    """Of one that fails, one whose room is told, and one that passes by more: by quadrature."""
+    """Of one that fails, one whose margin is told, and one that passes by more: by quadrature."""
     h = 1e-5
 
     def score(logs: Any, z: float) -> float:
@@ -142,7 +142,7 @@ def test_the_same_comes_again_and_in_no_order() -> None:
 
 # Of the constant, of the wind from 10 m/s on, and of two draws.
 TRUTH = np.array([-1.0, 0.6, 1.5, 0.0])
-# Of a flight's room, in scales: one over the room's coefficient.
+# Of a flight's margin, in scales: one over the margin's coefficient.
 SPREAD = 0.8
 
 
@@ -150,50 +150,50 @@ def made(count: int, seed: int, law: Any = norm) -> Outcomes:
     """Flights that pass by SPREAD * (e - TRUTH . terms), e of a law: they fail where that is below 0."""
     random = np.random.default_rng(seed)
     terms = np.column_stack((np.ones(count), random.uniform(-8.0, 4.0, count), random.normal(size=(count, 2))))
-    room = SPREAD * (law.rvs(size=count, random_state=random) - terms @ TRUTH)
-    return Outcomes(terms, room < 0.0, room.clip(0.0, 1.0))
+    margin = SPREAD * (law.rvs(size=count, random_state=random) - terms @ TRUTH)
+    return Outcomes(terms, margin < 0.0, margin.clip(0.0, 1.0))
 
 
 @pytest.mark.parametrize(("link", "law"), [(PROBIT, norm), (CLOGLOG, gumbel_l)])
 @pytest.mark.parametrize("known", [True, False])
 def test_coefficients_are_found(link: BinaryLink, law: Any, known: bool) -> None:
     flights = made(20_000, 2, law)
-    fit = fit_regression(flights if known else flights.without_room(), link)
+    fit = fit_regression(flights if known else flights.without_margin(), link)
     deviations = np.sqrt(np.diag(fit.covariance))
     assert fit.mean == pytest.approx(TRUTH, abs=0.1)
     assert (np.abs(fit.mean - TRUTH) < 4.0 * deviations).all()
     assert deviations.max() < 0.06
-    assert fit.by_room == (pytest.approx(1.0 / SPREAD, rel=0.03) if known else 0.0)
+    assert fit.by_margin == (pytest.approx(1.0 / SPREAD, rel=0.03) if known else 0.0)
 
 
 @pytest.mark.parametrize("known", [True, False])
 def test_the_covariance_is_that_of_repeated_flights(known: bool) -> None:
-    sets = [made(500, seed) if known else made(500, seed).without_room() for seed in range(60)]
+    sets = [made(500, seed) if known else made(500, seed).without_margin() for seed in range(60)]
     means = np.array([fit_regression(flights, PROBIT).mean for flights in sets])
     told = np.sqrt(np.diag(fit_regression(sets[1], PROBIT).covariance))
     assert means.std(axis=0) == pytest.approx(told, rel=0.4)
 
 
-def test_room_makes_each_coefficient_surer() -> None:
+def test_margins_make_each_coefficient_surer() -> None:
     some, none = (
-        np.diag(fit_regression(flights, PROBIT).covariance) for flights in (made(300, 1), made(300, 1).without_room())
+        np.diag(fit_regression(flights, PROBIT).covariance) for flights in (made(300, 1), made(300, 1).without_margin())
     )
     assert (some < 0.8 * none).all()
 
 
 def test_where_all_pass_by_a_scale_who_failed_is_all_there_is() -> None:
     flights = made(300, 4)
-    far = replace(flights, room=np.where(flights.failed, 0.0, 1.0))
-    assert fit_regression(far, PROBIT).mean == pytest.approx(fit_regression(flights.without_room(), PROBIT).mean)
+    far = replace(flights, margin=np.where(flights.failed, 0.0, 1.0))
+    assert fit_regression(far, PROBIT).mean == pytest.approx(fit_regression(flights.without_margin(), PROBIT).mean)
 
 
 @pytest.mark.parametrize(("link", "law"), [(PROBIT, norm), (CLOGLOG, gumbel_l)])
-def test_room_alone_gives_the_coefficients_of_the_law_it_has(link: BinaryLink, law: Any) -> None:
-    """Whoever failed is left out, and what is left is no longer the law itself but the law cut off at no room."""
-    fit = fit_regression(made(20_000, 8, law).only_room(), link)
+def test_margins_alone_give_the_coefficients_of_the_law_it_has(link: BinaryLink, law: Any) -> None:
+    """Whoever failed is left out, and what is left is no longer the law itself but the law cut off at no margin."""
+    fit = fit_regression(made(20_000, 8, law).only_margin(), link)
     assert (np.abs(fit.mean - TRUTH) < 4.0 * np.sqrt(np.diag(fit.covariance))).all()
     assert np.sqrt(np.diag(fit.covariance)).max() < 0.1
-    assert fit.by_room == pytest.approx(1.0 / SPREAD, rel=0.1)
+    assert fit.by_margin == pytest.approx(1.0 / SPREAD, rel=0.1)
 
 
 def battery_flights(seed: int) -> Outcomes:
@@ -202,17 +202,17 @@ def battery_flights(seed: int) -> Outcomes:
     wind = np.concatenate((np.repeat([0.0, 5.0, 7.5, 8.8, 9.4, 9.7], 3), np.full(120, 10.0)))
     terms = np.column_stack((np.ones(wind.size), wind, random.normal(size=(wind.size, 2))))
     x = terms @ np.array([-76.0, 6.7, 5.0, 2.0])
-    room = (gumbel_l.rvs(size=wind.size, random_state=random) - x) / 3.5
-    return Outcomes(terms, room < 0.0, room.clip(0.0, 1.0))
+    margin = (gumbel_l.rvs(size=wind.size, random_state=random) - x) / 3.5
+    return Outcomes(terms, margin < 0.0, margin.clip(0.0, 1.0))
 
 
-def test_room_alone_is_looked_for_from_where_the_one_law_is_too() -> None:
-    """Its posterior may have a second mode, of exponential room whatever the wind: from afar that may be found."""
+def test_the_law_of_margins_alone_is_looked_for_from_where_the_one_law_is_too() -> None:
+    """Its posterior may have a second mode, of exponential margin whatever the wind: from afar that may be found."""
     found = []
     for seed in range(6):
         flights = battery_flights(seed)
         one_law = fit_regression(flights, CLOGLOG)
-        near, afar = (fit_regression(flights.only_room(), CLOGLOG, start) for start in (one_law, None))
+        near, afar = (fit_regression(flights.only_margin(), CLOGLOG, start) for start in (one_law, None))
         found.append(near.log_evidence - afar.log_evidence)
         # Whichever: it is no less than what any simplex finds that starts from the one law.
         highest = minimize(
@@ -225,7 +225,7 @@ def test_room_alone_is_looked_for_from_where_the_one_law_is_too() -> None:
 
 def test_what_could_as_good_as_never_have_flown_is_impossible_not_certain() -> None:
     """Where a rate is beyond all numbers, its differences with others are none."""
-    posterior = _Posterior(battery_flights(1).only_room(), CLOGLOG, 1.5)
+    posterior = _Posterior(battery_flights(1).only_margin(), CLOGLOG, 1.5)
     points = np.array([[800.0, 0.0, 0.0, 0.0, 1.0], [40.0, -3.0, 0.0, 0.0, 1.0], [-10.0, -1.0, 0.0, 0.0, 1.0]])
     found = posterior.log_density(points)
     assert (found[:2] == -np.inf).all()
@@ -265,7 +265,7 @@ def test_the_evidence_is_for_the_link_that_flights_follow(known: bool) -> None:
     for law, right, wrong in ((norm, PROBIT, CLOGLOG), (gumbel_l, CLOGLOG, PROBIT)):
         flights = made(6000, 3, law)
         by_right, by_wrong = (
-            fit_regression(flights if known else flights.without_room(), link).log_evidence for link in (right, wrong)
+            fit_regression(flights if known else flights.without_margin(), link).log_evidence for link in (right, wrong)
         )
         assert by_right > by_wrong + 3.0
 
@@ -283,24 +283,24 @@ def test_the_evidence_is_the_integral_over_the_prior() -> None:
     assert fit.log_evidence == pytest.approx(logs_sum(logs, 0.01 * 0.005), abs=0.1)
 
 
-def test_the_evidence_of_room_is_the_integral_over_the_prior() -> None:
-    """Of the constant and the room's coefficient (normal, 10 in 1/scale), the wind having none; and of room alone."""
+def test_the_evidence_of_margins_is_the_integral_over_the_prior() -> None:
+    """Of the constant and the margin's coefficient (normal, 10 in 1/scale), the wind having none; of margins alone."""
     random = np.random.default_rng(7)
-    room = 0.5 * (random.normal(size=200) + 1.0)
-    failed = room < 0.0
+    margin = 0.5 * (random.normal(size=200) + 1.0)
+    failed = margin < 0.0
     terms = np.column_stack((np.ones(200), np.zeros(200)))
-    outcomes = Outcomes(terms, failed, room.clip(0.0, 1.0))
+    outcomes = Outcomes(terms, failed, margin.clip(0.0, 1.0))
     a, k = np.meshgrid(np.arange(-2.0, 0.0, 0.005), np.arange(1.0, 3.5, 0.005), indexing="ij")
     # The wind's coefficient integrates to 1 over its prior.
     fails, passes = (norm.logpdf(a, scale=20.0) + norm.logpdf(k, scale=10.0) for _ in range(2))
-    for one in room:
+    for one in margin:
         by_so_much = norm.logsf(a + k) if one >= 1.0 else norm.logpdf(a + k * one) + np.log(k)
         fails += norm.logcdf(a) if one < 0.0 else by_so_much
         passes += 0.0 if one < 0.0 else by_so_much - norm.logsf(a)
     fit = fit_regression(outcomes, PROBIT)
-    assert fit.by_room == pytest.approx(2.0, rel=0.15)
+    assert fit.by_margin == pytest.approx(2.0, rel=0.15)
     assert fit.log_evidence == pytest.approx(logs_sum(fails, 0.005 * 0.005), abs=0.1)
-    alone = fit_regression(outcomes.only_room(), PROBIT)
+    alone = fit_regression(outcomes.only_margin(), PROBIT)
     assert alone.log_evidence == pytest.approx(logs_sum(passes, 0.005 * 0.005), abs=0.3)
 
 

@@ -65,54 +65,54 @@ def test_the_more_flew_the_further_the_boundary() -> None:
 def made(count: int, seed: int, *, one_law: bool) -> tuple[Floats, NDArray[np.bool_], Floats]:
     """Terms, who failed and by how much the others passed.
 
-    One law: a flight fails where its room is below 0.  Two: it fails by its first draw, in a wind that suffices, and
-    the others' room is what gusts leave of it, which no failing follows from.
+    One law: a flight fails where its margin is below 0.  Two: it fails by its first draw, in a wind that suffices, and
+    the others' margin is what gusts leave of it, which no failing follows from.
     """
     random = np.random.default_rng(seed)
     terms = np.column_stack((np.ones(count), random.uniform(-4.0, 4.0, count), random.normal(size=(count, 2))))
     wind, first, gust = terms[:, 1], terms[:, 2], random.normal(size=count)
     if one_law:
-        room = 0.6 * (2.0 - 0.4 * wind - 0.8 * first + gust)
-        return terms, room < 0.0, room.clip(0.0, 1.0)
-    room = np.abs(0.8 + 0.2 * gust)
-    return terms, first + 0.2 * gust > 2.0 - 0.2 * wind, room.clip(0.0, 1.0)
+        margin = 0.6 * (2.0 - 0.4 * wind - 0.8 * first + gust)
+        return terms, margin < 0.0, margin.clip(0.0, 1.0)
+    margin = np.abs(0.8 + 0.2 * gust)
+    return terms, first + 0.2 * gust > 2.0 - 0.2 * wind, margin.clip(0.0, 1.0)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_room_counts_where_failing_is_of_its_law(seed: int) -> None:
-    """By a normal law as the flights were made: 1/0.6 of the room, and 0.4 and 0.8 of the wind and the first draw."""
+def test_margins_count_where_failing_is_of_its_law(seed: int) -> None:
+    """By a normal law as the flights were made: 1/0.6 of the margin, and 0.4 and 0.8 of the wind and the first draw."""
     mode = fit_mode(*made(400, seed, one_law=True), PROBIT)
-    assert mode.by_room == pytest.approx(1.0 / 0.6, rel=0.25)
+    assert mode.by_margin == pytest.approx(1.0 / 0.6, rel=0.25)
     assert mode.mean == pytest.approx([-2.0, 0.4, 0.8, 0.0], abs=0.4)
 
 
 @pytest.mark.parametrize("link", LINKS)
 @pytest.mark.parametrize("seed", range(5))
-def test_room_counts_for_nothing_where_failing_is_of_another(link: BinaryLink, seed: int) -> None:
-    """One law would have the first draw, which alone decides, as of little account: it leaves the room as it is."""
-    terms, failed, room = made(400, seed, one_law=False)
-    mode, bare = fit_mode(terms, failed, room, link), fit_mode(terms, failed, np.zeros(400), link)
-    assert mode.by_room == 0.0
+def test_margins_count_for_nothing_where_failing_is_of_another(link: BinaryLink, seed: int) -> None:
+    """One law would have the first draw, which alone decides, as of little account: it leaves the margin as it is."""
+    terms, failed, margin = made(400, seed, one_law=False)
+    mode, bare = fit_mode(terms, failed, margin, link), fit_mode(terms, failed, np.zeros(400), link)
+    assert mode.by_margin == 0.0
     assert mode.mean == pytest.approx(bare.mean)
     assert mode.mean[2] > 2.0
 
 
-def test_the_rooms_own_law_says_nothing_for_a_link() -> None:
-    """The links differ in evidence by as much as without the room: to each comes that of the room's own law."""
-    terms, failed, room = made(400, 1, one_law=False)
+def test_the_margins_own_law_says_nothing_for_a_link() -> None:
+    """The links differ in evidence by as much as without the margin: to each comes that of the margin's own law."""
+    terms, failed, margin = made(400, 1, one_law=False)
     told, bare = (
-        [fit_mode(terms, failed, some, link).log_evidence for link in LINKS] for some in (room, np.zeros(400))
+        [fit_mode(terms, failed, some, link).log_evidence for link in LINKS] for some in (margin, np.zeros(400))
     )
     assert told[0] - told[1] == pytest.approx(bare[0] - bare[1])
-    passes = Outcomes(terms, failed, np.where(failed, 0.0, room)).only_room()
+    passes = Outcomes(terms, failed, np.where(failed, 0.0, margin)).only_margin()
     by_itself = max(fit_regression(passes, link).log_evidence for link in LINKS)
     assert told[0] == pytest.approx(bare[0] + by_itself)
 
 
 def test_the_depth_of_failing_counts_for_nothing() -> None:
-    terms, failed, room = made(400, 1, one_law=True)
-    deep = np.where(failed, 0.5, room)
-    assert fit_mode(terms, failed, deep, PROBIT).mean == pytest.approx(fit_mode(terms, failed, room, PROBIT).mean)
+    terms, failed, margin = made(400, 1, one_law=True)
+    deep = np.where(failed, 0.5, margin)
+    assert fit_mode(terms, failed, deep, PROBIT).mean == pytest.approx(fit_mode(terms, failed, margin, PROBIT).mean)
 
 
 # ----------------------------------------------------------------------
@@ -145,18 +145,18 @@ def test_coefficients_are_found(link: BinaryLink) -> None:
         assert deviations.max() < 0.1
 
 
-def test_each_way_has_the_room_that_flights_had_of_it() -> None:
+def test_each_way_has_the_margin_that_flights_had_of_it() -> None:
     """Room of the slope, of the slope's law, sharpens the slope's fit and leaves the threat's; another's, neither."""
     random = np.random.default_rng(2)
     terms = regressors(random.uniform(2.0, 18.0, 600), random.normal(size=(600, 2)))
     slope, threat = (random.normal(size=600) - terms @ beta for beta in (FIRST, SECOND))
     ways: list[frozenset[Hashable]] = [
-        frozenset(name for name, room in (("slope", one), ("threat", other)) if room < 0.0)
+        frozenset(name for name, margin in (("slope", one), ("threat", other)) if margin < 0.0)
         for one, other in zip(slope, threat, strict=True)
     ]
-    shares: list[dict[Hashable, float]] = [{} if room < 0.0 else {"slope": min(1.0, room)} for room in slope]
+    shares: list[dict[Hashable, float]] = [{} if margin < 0.0 else {"slope": min(1.0, margin)} for margin in slope]
     bare, known = fit_modes(terms, ways, PROBIT), fit_modes(terms, ways, PROBIT, shares)
-    assert [mode.by_room > 0.0 for mode in known] == [True, False]
+    assert [mode.by_margin > 0.0 for mode in known] == [True, False]
     assert np.diag(known[0].covariance).sum() < 0.8 * np.diag(bare[0].covariance).sum()
     assert known[1].mean == pytest.approx(bare[1].mean)
     other: list[dict[Hashable, float]] = [{"bounds": 0.5}] * len(ways)
@@ -164,17 +164,17 @@ def test_each_way_has_the_room_that_flights_had_of_it() -> None:
         assert one.mean == pytest.approx(same.mean)
 
 
-def test_room_that_is_not_known_is_not_taken_for_much() -> None:
+def test_a_margin_that_is_not_known_is_not_taken_for_much() -> None:
     """A flight that passed by a scale or more tells that; one of which it is not known, that it passed."""
     random = np.random.default_rng(4)
     terms = regressors(random.uniform(2.0, 18.0, 1500), random.normal(size=(1500, 2)))
     slope = 0.5 * (random.normal(size=1500) - terms @ FIRST)
-    ways: list[frozenset[Hashable]] = [frozenset({"slope"} if room < 0.0 else ()) for room in slope]
-    shares: list[dict[Hashable, float] | None] = [{"slope": room} if 0.0 <= room < 1.0 else {} for room in slope]
+    ways: list[frozenset[Hashable]] = [frozenset({"slope"} if margin < 0.0 else ()) for margin in slope]
+    shares: list[dict[Hashable, float] | None] = [{"slope": margin} if 0.0 <= margin < 1.0 else {} for margin in slope]
     half: list[dict[Hashable, float] | None] = [some if k % 2 else None for k, some in enumerate(shares)]
     for known in (shares, half):
         (mode,) = fit_modes(terms, ways, PROBIT, known)
-        assert mode.by_room == pytest.approx(2.0, rel=0.15)
+        assert mode.by_margin == pytest.approx(2.0, rel=0.15)
         assert mode.mean == pytest.approx(FIRST, abs=0.2)
 
 

@@ -13,7 +13,7 @@ from planfly.campaigns.statistics.failure_modes import FailureMode
 from planfly.campaigns.statistics.wind_boundary import (
     Direction,
     DrawnNumbers,
-    WeighedModes,
+    WeightedModes,
     WindBoundary,
     boundary_quantiles,
     needs_more,
@@ -32,8 +32,8 @@ def one_mode(mean: list[float], deviations: list[float], link: BinaryLink = PROB
     return FailureMode(link, np.array(mean), np.diag(deviations) ** 2, sample, 0.0)
 
 
-def alone(mode: FailureMode) -> list[WeighedModes]:
-    return [WeighedModes((mode,), 1.0)]
+def alone(mode: FailureMode) -> list[WeightedModes]:
+    return [WeightedModes((mode,), 1.0)]
 
 
 @pytest.mark.parametrize("link", LINKS)
@@ -51,7 +51,7 @@ def test_links_weigh_as_they_do() -> None:
     sure, other = one_mode([-4.0, 1.0], [1e-3, 1e-3]), one_mode([-2.0, 1.0], [1e-3, 1e-3], CLOGLOG, 64)
     first, second = 14.0 + norm.ppf(0.01), 12.0 + np.log(-np.log(0.99))
     for weight, expected in ((0.6, first), (0.4, second)):
-        mixed = [WeighedModes((sure,), weight), WeighedModes((other,), 1.0 - weight)]
+        mixed = [WeightedModes((sure,), weight), WeightedModes((other,), 1.0 - weight)]
         assert boundary_quantiles(mixed, NOTHING, 0.01, 20.0, (0.5,)) == pytest.approx([expected], abs=0.01)
 
 
@@ -72,7 +72,7 @@ def test_modes_are_known_apart_from_each_other() -> None:
     Samples that went together would have both ways' luck at once, and the interval wider by a fifth.
     """
     mode = one_mode([-4.0, 0.6], [0.4, 1e-6])
-    two = [WeighedModes((mode, mode), 1.0)]
+    two = [WeightedModes((mode, mode), 1.0)]
     random = np.random.default_rng(3)
     one, other = random.normal(-4.0, 0.4, (2, 4096))
     winds = np.arange(4.0, 20.0, 0.02)[:, None]
@@ -154,7 +154,7 @@ def _quantile_of_two() -> float:
 
 
 def test_narrow_passes_that_no_failing_follows_from_do_not_move_it() -> None:
-    """Flights fail by the first quantity in a wind that suffices; with what room others pass is up to gusts alone.
+    """Flights fail by the first quantity in a wind that suffices; with what margin others pass is up to gusts alone.
 
     One in a hundred fails at 2 (the quantity's law is normal): 10 + 4 * (2 - 2.33) m/s, but for a little chance.
     """
@@ -166,9 +166,9 @@ def test_narrow_passes_that_no_failing_follows_from_do_not_move_it() -> None:
             for speed, draw in next_flights(direction, 6):
                 drawn = direction.numbers.first(draw + 1)[draw]
                 failed = drawn[0] + 0.1 * random.normal() > 2.0 - 0.25 * (speed - 10.0)
-                room = abs(random.normal(0.8, 0.2))
+                margin = abs(random.normal(0.8, 0.2))
                 direction.add(
-                    speed, draw, frozenset({"slope"} if failed else ()), {} if failed else {"slope": min(1.0, room)}
+                    speed, draw, frozenset({"slope"} if failed else ()), {} if failed else {"slope": min(1.0, margin)}
                 )
         found.append(direction.boundary())
     assert np.median([abs(one.estimate - truth) for one in found]) < 0.4
@@ -232,8 +232,8 @@ def test_any_flights_have_an_answer(seed: int) -> None:
         by_a_draw = bool(quantities and draws[k, 0] > 1.0)
         failed = (random.random() < 0.5, speed > 10.0, speed < 10.0, by_a_draw, k == 0)[seed % 5]
         ways = random.choice(["a", "b", "c"], size=random.integers(1, 3)).tolist() if failed else ()
-        room = {way: float(random.choice([0.0, 1e-9, 0.5, random.random()])) for way in "ab" if random.random() < 0.5}
-        direction.add(speed, k, frozenset(ways), None if random.random() < 0.2 else room)
+        margin = {way: float(random.choice([0.0, 1e-9, 0.5, random.random()])) for way in "ab" if random.random() < 0.5}
+        direction.add(speed, k, frozenset(ways), None if random.random() < 0.2 else margin)
     found = direction.boundary()
     assert 0.0 <= found.low <= found.estimate <= found.high <= 20.0
     assert all(0.0 <= speed <= 20.0 for speed, _ in next_flights(direction, 3))

@@ -9,35 +9,35 @@ function layerTraces(given, axes, template, theme, scale = 1, flights = []) {
   const layer = { ...given, x, y, name: plainName(given.name), legend: plainName(given.legend || given.name) };
   const look = LOOKS[layer.role], shown = layer.name !== "";
   const common = { type: "scatter", x, y, ...axes, name: layer.name, legendgroup: layer.legend, showlegend: shown, connectgaps: false };
-  const told = readOut(layer, flight, template, shown);
+  const hover = readOut(layer, flight, template, shown);
   const unseen = { showlegend: false, opacity: 0, mode: "markers", marker: { color: theme.colour(layer.role), size: 8 } };
   switch (layer.kind) {
     case "band": {
       const [outX, outY] = bandOutline(layer);
       return [
         { ...common, x: outX, y: outY, ...areaLook(layer, theme), hoverinfo: "skip" },
-        ...(layer.quiet ? [] : [{ ...common, ...unseen, mode: "lines", line: { color: theme.colour(layer.role) }, ...told }]),
+        ...(layer.quiet ? [] : [{ ...common, ...unseen, mode: "lines", line: { color: theme.colour(layer.role) }, ...hover }]),
       ];
     }
     case "area":
-      return [{ ...common, ...areaLook(layer, theme), ...told, hoveron: "points+fills" }];
+      return [{ ...common, ...areaLook(layer, theme), ...hover, hoveron: "points+fills" }];
     case "bars":
-      return [{ ...common, ...told, type: "bar", width: 0.62, marker: { color: theme.colour(layer.role) } }];
+      return [{ ...common, ...hover, type: "bar", width: 0.62, marker: { color: theme.colour(layer.role) } }];
     case "dots":
-      return [{ ...common, ...told, mode: "markers", marker: dotLook(look, layer.role, theme) }];
+      return [{ ...common, ...hover, mode: "markers", marker: dotLook(look, layer.role, theme) }];
     case "rings": {
       const ring = { color: theme.colour(layer.role), size: look.size, symbol: "circle-open", line: { width: look.width } };
-      return [{ ...common, ...told, mode: "markers", marker: ring }];
+      return [{ ...common, ...hover, mode: "markers", marker: ring }];
     }
     case "dashes": {
       const endsX = x.flatMap((value) => [value - 0.42, value + 0.42, null]), endsY = y.flatMap((value) => [value, value, null]);
       return [
         { ...common, x: endsX, y: endsY, mode: "lines", line: { color: theme.colour(layer.role), width: 2.5 }, hoverinfo: "skip" },
-        { ...common, ...told, ...unseen },
+        { ...common, ...hover, ...unseen },
       ];
     }
     default:
-      return [{ ...common, ...told, mode: "lines", line: theme.line(layer.role, layer.dashed) }];
+      return [{ ...common, ...hover, mode: "lines", line: theme.line(layer.role, layer.dashed) }];
   }
 }
 
