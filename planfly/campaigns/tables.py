@@ -1,7 +1,7 @@
 """The tables of flights, SQLite files written as flights come in, and read back as rows or as columns.
 
 A campaign's table has a row a flight, by the index of its draw; a search for winds has one a flight, in the order in
-which it asked.  One process at a time holds a table.
+which it asked.  One process at a time holds a table, and opening it leaves only rows whose checksum holds.
 """
 
 import errno
@@ -24,7 +24,9 @@ from logs.verdict.places import Place
 from logs.verdict.rules.registry import RULES
 from planfly.campaigns.dispersions import NAMES, Draw
 from planfly.campaigns.flight_row import FIELDS, FlightRow, LeastMargin, NarrowPass, Outcome, failed_of
+from planfly.campaigns.mended_table import HELD, checksum, copy_whole, examine, stored
 from planfly.campaigns.statistics.decision import Tally
+from planfly.stages import say
 from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------
@@ -90,8 +92,8 @@ def same_flight(one: FlightRow, other: FlightRow) -> bool:
 # ----------------------------------------------------------------------
 # The file: made or opened to go on, locked by one process, and refused where it holds something else.
 
-# What SQLite says of a file that another process holds.
-_HELD = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+# Flights of a table whose settings do not say how many it may have.
+_MOST = 100_000
 
 
 class StoreError(PlanflyError):
@@ -103,7 +105,8 @@ class TableKind:
     """What a file of this kind holds.
 
     name: of the schema.
-    columns: of the table of flights, name and kind of each; the first is the key, a flight's number.
+    columns: of the table of flights, name and kind of each; the first is the key, a flight's number.  A checksum of
+    them follows.
     fixed: what of the settings may not be otherwise where it is gone on with.
     """
 
@@ -118,7 +121,7 @@ class TableKind:
         >>> TableKind("t", {"a": "REAL"}).schema == TableKind("t", {"a": "REAL", "b": "REAL"}).schema
         False
         """
-        columns = json.dumps(list(self.columns.items()))
+        columns = json.dumps([*self.columns.items(), "checksum"])
         return f"{self.name}/{hashlib.sha256(columns.encode()).hexdigest()[:8]}"
 
 
@@ -148,30 +151,49 @@ class LockedTable:
             raise
 
     def _prepare(self, settings: dict[str, Any]) -> None:
+        self._hold()
         run = self._connection.execute
-        run("PRAGMA locking_mode = EXCLUSIVE")
-        run("PRAGMA journal_mode = WAL")
-        run("PRAGMA synchronous = NORMAL")
-        run("BEGIN EXCLUSIVE")
-        columns = ", ".join(f"{name} {kind}" for name, kind in self._kind.columns.items())
-        run(f"CREATE TABLE IF NOT EXISTS flights ({columns})")
-        run("CREATE TABLE IF NOT EXISTS campaign (key TEXT PRIMARY KEY, value TEXT NOT NULL)")
-        known = dict(run("SELECT key, value FROM campaign").fetchall())
-        if known:
+        tables = {name for (name,) in run("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        if tables:
+            known = _kept(self._connection) if "campaign" in tables else {}
             self._refuse_other(known, settings)
+            self._mend(known)
+        run = self._connection.execute
+        for statement in self._create():
+            run(statement)
         values = {
             "schema": self._kind.schema,
             "made_of": self.made_of,
             "settings": json.dumps(settings, sort_keys=True),
         }
         run("DELETE FROM campaign")
-        self._connection.executemany("INSERT INTO campaign VALUES (?, ?)", values.items())
+        self._connection.executemany(
+            "INSERT INTO campaign VALUES (?, ?)", {**values, "checksum": checksum(values.values())}.items()
+        )
         run("COMMIT")
+
+    def _hold(self) -> None:
+        """Take the file for this process alone, and begin to write."""
+        run = self._connection.execute
+        run("PRAGMA locking_mode = EXCLUSIVE")
+        run("PRAGMA journal_mode = WAL")
+        run("PRAGMA synchronous = NORMAL")
+        run("BEGIN EXCLUSIVE")
+
+    def _create(self) -> list[str]:
+        columns = ", ".join(f"{name} {kind}" for name, kind in self._kind.columns.items())
+        return [
+            f"CREATE TABLE IF NOT EXISTS flights ({columns}, checksum TEXT NOT NULL)",
+            "CREATE TABLE IF NOT EXISTS campaign (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
+        ]
 
     def _refuse_other(self, known: dict[str, str], settings: dict[str, Any]) -> None:
         schema = self._kind.schema
+        if "schema" not in known:
+            _refuse_damaged(known, self.path)
         if known.get("schema") != schema:
             raise StoreError(f"{self.path}: schema {known.get('schema')!r}: {schema} is expected", file=self.path)
+        _refuse_damaged(known, self.path)
         if known.get("made_of") != self.made_of:
             raise StoreError(
                 f"{self.path}: is of another campaign: its code, mission, aircraft, scenario, dispersions or seed"
@@ -185,6 +207,22 @@ class LockedTable:
                     f"{self.path}: {name} {settings[name]}: the flights there were asked for with {before[name]}",
                     file=self.path,
                 )
+
+    def _mend(self, known: dict[str, str]) -> None:
+        """Keep the flights that are whole, and say which are not; the file is made anew then."""
+        most = json.loads(known["settings"]).get("flights", _MOST)
+        examined = examine(self._connection, tuple(self._kind.columns), most)
+        if examined.sound and not examined.damaged:
+            return
+        mended = self.path.with_name(f".{self.path.name}.mended")
+        copy_whole(self._connection, mended, self._create(), examined.whole, known)
+        self._connection.close()
+        mended.replace(self.path)
+        for ending in ("-wal", "-shm"):
+            Path(f"{self.path}{ending}").unlink(missing_ok=True)
+        self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
+        self._hold()
+        say(f"{self.path}: {examined.text()}")
 
     def __enter__(self) -> Self:
         """Hold it."""
@@ -204,10 +242,9 @@ class LockedTable:
         """
         self._refuse_removed()
         with translated_errors(self.path):
-            marks = ", ".join("?" * len(self._kind.columns))
-            self._connection.execute(
-                f"INSERT INTO flights VALUES ({marks})", [values[name] for name in self._kind.columns]
-            )
+            row = [stored(values[name], kind) for name, kind in self._kind.columns.items()]
+            marks = ", ".join("?" * (len(row) + 1))
+            self._connection.execute(f"INSERT INTO flights VALUES ({marks})", [*row, checksum(row)])
 
     def drop_from(self, flight: int) -> None:
         """Take out the flights from this number on: those that were flown while an earlier one decided.
@@ -242,9 +279,24 @@ def kept_settings(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     with translated_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
-        found = connection.execute("SELECT value FROM campaign WHERE key = 'settings'").fetchone()
-    settings: dict[str, Any] = json.loads(found[0]) if found else {}
+        known = _kept(connection)
+    if known:
+        _refuse_damaged(known, path)
+    settings: dict[str, Any] = json.loads(known["settings"]) if known else {}
     return settings
+
+
+def _kept(connection: sqlite3.Connection) -> dict[str, str]:
+    """What a file says of itself, by key."""
+    connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
+    return dict(connection.execute("SELECT key, value FROM campaign").fetchall())
+
+
+def _refuse_damaged(known: Mapping[str, str], path: Path) -> None:
+    """Refuse a file that says of itself what nobody has written.  Raises StoreError."""
+    if known.get("checksum") != checksum(known.get(name) for name in ("schema", "made_of", "settings")):
+        words = "its settings are damaged, or another version's: it cannot be resumed, and --overwrite begins anew"
+        raise StoreError(f"{path}: {words}", file=path, field="settings")
 
 
 def refuse_held(path: Path) -> None:
@@ -255,7 +307,7 @@ def refuse_held(path: Path) -> None:
     try:
         connection.execute("BEGIN EXCLUSIVE")
     except sqlite3.Error as error:
-        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB) & 0xFF in _HELD:
+        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB) & 0xFF in HELD:
             raise StoreError(f"{path}: is held by another process", file=path) from error
     finally:
         connection.close()
@@ -274,12 +326,15 @@ class translated_errors:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Raise planfly's error for SQLite's."""
+        if isinstance(error, UnicodeDecodeError):
+            # SQLite quotes what it does not understand of its own tables' definition.
+            raise StoreError(f"{self._path}: is damaged where it says which tables it has", file=self._path) from error
         if not isinstance(error, sqlite3.Error):
             return
         code = getattr(error, "sqlite_errorcode", None)
         if code is not None and code & 0xFF == sqlite3.SQLITE_FULL:
             raise OSError(errno.ENOSPC, "no space left; the flights before are kept, --resume goes on", str(self._path))
-        if code is not None and code & 0xFF in _HELD:
+        if code is not None and code & 0xFF in HELD:
             raise StoreError(f"{self._path}: is held by another process", file=self._path) from error
         raise StoreError(f"{self._path}: {error}", file=self._path) from error
 
@@ -290,6 +345,7 @@ class translated_errors:
 DATABASE = "campaign.sqlite"
 CAMPAIGN_KIND = TableKind("planfly.campaign", {"flight": "INTEGER PRIMARY KEY", **ROW_COLUMNS})
 COLUMNS = tuple(CAMPAIGN_KIND.columns)
+_SELECT = f"SELECT {', '.join(COLUMNS)} FROM flights"
 
 
 class Store(LockedTable):
@@ -330,17 +386,17 @@ class Store(LockedTable):
     def closest(self, most: int) -> list[FlightRow]:
         """The worst flights first: the lost, those that failed, then the closest calls, each by its least margin."""
         order = "CASE outcome WHEN 'lost' THEN 0 WHEN 'not flyable' THEN 1 ELSE 2 END, closeness IS NULL, closeness"
-        rows = self._connection.execute(f"SELECT * FROM flights ORDER BY {order}, flight LIMIT ?", (most,))
+        rows = self._connection.execute(f"{_SELECT} ORDER BY {order}, flight LIMIT ?", (most,))
         return [_row(values) for values in rows]
 
     def flight(self, index: int) -> FlightRow | None:
         """The flight of an index; None where there is none."""
-        found = self._connection.execute("SELECT * FROM flights WHERE flight = ?", (index,)).fetchone()
+        found = self._connection.execute(f"{_SELECT} WHERE flight = ?", (index,)).fetchone()
         return None if found is None else _row(found)
 
     def rows(self) -> Iterator[FlightRow]:
         """All flights in order."""
-        for values in self._connection.execute("SELECT * FROM flights ORDER BY flight"):
+        for values in self._connection.execute(f"{_SELECT} ORDER BY flight"):
             yield _row(values)
 
 
