@@ -14,6 +14,7 @@ from logs.recording.reader import read_log
 from logs.verdict.rules.registry import RULES
 from planfly.cli import main
 from planfly.targets import RUN_FILES
+from tests.logs.verdict.judging import SILENT_ON_WAYPOINTS
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK, scaled
 
@@ -62,14 +63,7 @@ def test_the_verdict_file_has_findings_of_every_rule(demo: Path) -> None:
     verdict = json.loads((demo / "verdict.json").read_text(encoding="utf-8"))
     assert verdict["flyable"] is True
     assert verdict["complete"] is True
-    assert {finding["rule"] for finding in verdict["findings"]} == set(RULES) - {
-        "mission",
-        "loiter",
-        "height",
-        "fence",
-        "takeoff",
-        "landing",
-    }
+    assert {finding["rule"] for finding in verdict["findings"]} == set(RULES) - SILENT_ON_WAYPOINTS
     numbers = ["planned", "flown", "limit", "tolerance", "margin", "unit"]
     words, data = ["where", "reason", "brief", "suggestion"], ["place", "placed", "suggestions", "check", "facts"]
     keys = ["rule", *numbers, "limit_source", "method", "ok", *words, *data]
