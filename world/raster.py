@@ -1,8 +1,8 @@
 """Elevation files: opened and checked, and read as a window at source resolution.
 
 `world.elevation_formats.FORMATS` lists the formats.  One is chosen by the file's first bytes or by its suffix, and its
-driver is explicit, so that nothing that merely names another file (VRT, a URL, a `/vsi` path) is ever opened.  Heights
-are above mean sea level as the file has them.
+driver is explicit, so that nothing that merely names another file (VRT, a URL, a `/vsi` path) is ever opened.
+`world.height_datum` says what its heights count from; as terrain they count from mean sea level.
 """
 
 import hashlib
@@ -12,7 +12,7 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
 from world.errors import TerrainError
 from world.files import did_you_mean
 from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, to_geo, to_map, transform_points
+from world.height_datum import UNSTATED, HeightDatum, StatedDatum, height_datum
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -31,24 +32,29 @@ ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 # A window with more pixels than this, or a file of more that is read as one array, is refused.
 MAX_PIXELS = 120_000_000
 _OWN_FILES = Path(__file__).parent / "elevation"
-EARTH_DATUM = "mean sea level, as the file's heights are taken"
 
 
 @dataclass(frozen=True, slots=True)
 class RasterFile:
     """An elevation file that was opened and understood, not yet read.
 
-    to_source: longitude, latitude (deg) to fractional (col, row) of pixel centres.  shape: (rows, cols).
+    to_source: longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: the other way.
+    shape: (rows, cols).
     corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
-    read: rows and columns half-open to a float32 block with NaN for nodata.
+    read: rows and columns half-open to a float32 block with NaN for nodata, heights as the file has them.
+    crs: the file's reference system as WKT; None where it has none.
+    datum: what the heights count from.
     """
 
     name: str
     shape: tuple[int, int]
     to_source: ToSource
+    to_place: ToSource
     corners: Floats
     sha256: str
     read: Callable[[int, int, int, int], NDArray[np.float32]]
+    crs: str | None = None
+    datum: HeightDatum = field(default=HeightDatum(UNSTATED))
 
     @property
     def centre(self) -> GeoOrigin:
@@ -123,9 +129,11 @@ def grid_in_degrees(
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         return heights[top:bottom, left:right].astype(np.float32)
 
-    col, row = outline(cols, rows)
-    corners = np.stack([west + (col + 0.5) * pitch_x, north - (row + 0.5) * pitch_y], axis=1)
-    return RasterFile(name, (rows, cols), to_source, corners, file_sha256(file), read)
+    def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
+        return west + (col + 0.5) * pitch_x, north - (row + 0.5) * pitch_y
+
+    corners = np.stack(to_place(*outline(cols, rows)), axis=1)
+    return RasterFile(name, (rows, cols), to_source, to_place, corners, file_sha256(file), read)
 
 
 # ----------------------------------------------------------------------
@@ -221,21 +229,24 @@ def _read_strips(opened: Any, window: tuple[int, int, int, int], scale: float, o
     return heights
 
 
+# What GDAL may do: read the one file, and nothing that lies beside it or is named in it.
+_GUARD: dict[str, Any] = {
+    "GDAL_PAM_ENABLED": "NO",
+    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
+    "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
+    # The vertical part of the reference system too, for its unit and for what heights count from.
+    "GTIFF_REPORT_COMPD_CS": "YES",
+    # Of blocks once unpacked, bytes; the default is a share of the machine's memory.
+    "GDAL_CACHEMAX": 64 * 2**20,
+}
+
+
 def _open_rasterio(file: Path, driver: str) -> RasterFile:
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
 
-    guard: dict[str, Any] = {
-        "GDAL_PAM_ENABLED": "NO",
-        "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
-        "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
-        # The vertical part of the reference system too, for its unit.
-        "GTIFF_REPORT_COMPD_CS": "YES",
-        # Of blocks once unpacked, bytes; the default is a share of the machine's memory.
-        "GDAL_CACHEMAX": 64 * 2**20,
-    }
     try:
-        with warnings.catch_warnings(), rasterio.Env(**guard):
+        with warnings.catch_warnings(), rasterio.Env(**_GUARD):
             # Without georeferencing there is no reference system either, and that is refused in one line.
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(os.fspath(file.resolve()), driver=driver) as source:
@@ -271,15 +282,18 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         try:
-            with rasterio.Env(**guard), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
+            with rasterio.Env(**_GUARD), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
                 return _read_strips(opened, (top, bottom, left, right), scale, offset)
         except (RasterioError, RasterioIOError, OSError) as error:
             raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
 
-    col, row = outline(cols, rows)
-    x, y = _applied(forward, col + 0.5, row + 0.5)
-    lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
-    return RasterFile(str(file), (rows, cols), to_source, np.stack([lon, lat], axis=1), file_sha256(file), read)
+    def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
+        x, y = _applied(forward, col + 0.5, row + 0.5)
+        lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
+        return np.asarray(lon), np.asarray(lat)
+
+    corners = np.stack(to_place(*outline(cols, rows)), axis=1)
+    return RasterFile(str(file), (rows, cols), to_source, to_place, corners, file_sha256(file), read, crs.to_wkt())
 
 
 def open_geotiff(file: Path, _name: str) -> RasterFile:
@@ -296,10 +310,12 @@ def open_hgt(file: Path, _name: str) -> RasterFile:
 # A file of any format.
 
 
-def open_raster(path: str, base: Path | None = None) -> RasterFile:
+def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
     """Open an elevation file or an embedded name.  Relative paths count from ``base``.
 
-    Raises TerrainError for anything that is not a file of one band in one of `world.elevation_formats.FORMATS`.
+    datum: what its heights count from, where that is stated; None takes what the file says.
+    Raises TerrainError for anything that is not a file of one band in one of `world.elevation_formats.FORMATS`, and for
+    heights above an ellipsoid that this machine cannot convert.
 
     >>> open_raster("jacksboro").shape
     (344, 403)
@@ -324,9 +340,27 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     by_suffix = [one for one in FORMATS if not one.begins and one.suffix == file.suffix.lower()]
     for one in (*(one for one in FORMATS if head.startswith(one.begins)), *by_suffix):
         opener: Callable[[Path, str], RasterFile] = globals()[one.opener]
-        return opener(file, path)
+        raster = opener(file, path)
+        return replace(raster, datum=_datum_of(raster, datum))
     expected = _listed([one.name for one in FORMATS])
     raise TerrainError(f"{file}: not an elevation file: {expected} is expected", file=file)
+
+
+def _datum_of(raster: RasterFile, stated: StatedDatum | None) -> HeightDatum:
+    try:
+        return height_datum(raster.crs, stated)
+    except ValueError as error:
+        allowed = (
+            "state the height of mean sea level in the file as [terrain] height_datum (some 47.0 m in the Alps), or"
+            " give PROJ the grid of a geoid (projsync --file us_nga_egm96_15.tif)"
+        )
+        raise TerrainError(
+            f"{raster.name}: heights count from the ellipsoid, and {error}: {allowed}",
+            file=raster.name,
+            field="height datum",
+            value="ellipsoid",
+            allowed=allowed,
+        ) from error
 
 
 def _listed(words: Sequence[str]) -> str:
@@ -341,6 +375,8 @@ UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
 LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
 # Worst error allowed for the polynomial from map to pixels, in pixels.
 PIXEL_TOLERANCE = 1e-3
+# Places along each side of a window at which mean sea level is looked up.
+_SEA_LEVELS = 200
 # Pixels without data that are looked at before the next ones: one inside the area is enough.
 _HOLES_AT_ONCE = 2**16
 
@@ -379,6 +415,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     heights = raster.read(top, bottom, left, right)
     valid = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND) & ~np.isin(heights, UNSTATED_NODATA)
     heights[~valid] = np.nan
+    _count_from_sea_level(heights, raster, top, left)
     to_pixel = fit_polymap(
         lambda e, n: _shifted(raster.to_source, origin, e, n, left, top),
         box + np.array([-buffer, buffer]),
@@ -393,9 +430,35 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     # Columns and rows per metre of the map; the pitch is the length of the shorter pixel side.
     per_metre = np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0
     pitch = float(np.min(np.linalg.norm(np.linalg.inv(per_metre), axis=0)))
-    terrain = Terrain(heights, to_pixel, pitch, raster.name, raster.sha256, EARTH_DATUM)
+    terrain = Terrain(heights, to_pixel, pitch, raster.name, raster.sha256, raster.datum.text)
     _refuse_holes(terrain, box, per_metre)
     return terrain
+
+
+def _count_from_sea_level(heights: NDArray[np.float32], raster: RasterFile, top: int, left: int) -> None:
+    """Convert a window's heights in place; it begins at this row and column of the file.
+
+    Mean sea level is taken at places between which it is as good as a plane.
+    Raises TerrainError where it is not known.
+    """
+    if raster.datum.sea_level is None:
+        return
+    from scipy.interpolate import RectBivariateSpline
+
+    rows, cols = (begin + np.arange(size) for begin, size in zip((top, left), heights.shape, strict=True))
+    row, col = (np.linspace(every[0], every[-1], min(len(every), _SEA_LEVELS)) for every in (rows, cols))
+    across, down = np.meshgrid(col, row)
+    lon, lat = raster.to_place(across.ravel(), down.ravel())
+    level = raster.datum.sea_level(lon, lat)
+    if not np.isfinite(level).all():
+        bad = int(np.argmin(np.isfinite(level)))
+        where = f"longitude {lon[bad]:.4f}, latitude {lat[bad]:.4f}"
+        raise TerrainError(f"{raster.name}: {where}: the geoid's height is not known there", file=raster.name)
+    surface = RectBivariateSpline(row, col, level.reshape(across.shape), kx=1, ky=1)
+    at_once = max(1, _PIXELS_AT_ONCE // cols.size)
+    for first in range(0, rows.size, at_once):
+        part = slice(first, first + at_once)
+        heights[part] -= surface(rows[part], cols).astype(np.float32)
 
 
 def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:

@@ -310,14 +310,14 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
     """Open a scenario's elevation file, and say where it was found and what its hash is."""
     path = str(table.path)
     try:
-        raster = open_raster(path, base)
+        raster = open_raster(path, base, table.height_datum)
     except TerrainError as error:
         raise TerrainError.from_error(error, source, "terrain.path", path) from error
     if table.sha256 not in (None, raster.sha256):
         raise ScenarioError.at(source, "terrain.path", path, "the file has changed since (its SHA-256 differs)")
     if path not in EMBEDDED:
         path = whole_path(Path(base or "", path))
-    return raster, TerrainTable(kind="dem", path=path, vertical_error_m=table.vertical_error_m, sha256=raster.sha256)
+    return raster, table.model_copy(update={"path": path, "sha256": raster.sha256})
 
 
 def _assemble(

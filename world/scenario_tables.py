@@ -4,9 +4,11 @@ The models mirror the TOML key for key.  `world.scenario_file` reads a file into
 into a `Scenario`.
 """
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from world.height_datum import MAX_SEA_LEVEL, NamedDatum, StatedDatum
 
 # ----------------------------------------------------------------------
 # The numbers, names and choices that a scenario file holds, with their ranges, and what its tables share.
@@ -155,10 +157,20 @@ class PeakTable(ScenarioTable):
     sigma_m: Annotated[float, within(10.0, 100_000.0)]
 
 
+def _known_datum(datum: StatedDatum) -> StatedDatum:
+    """A name of what heights count from, or a height of mean sea level that the file may have, m."""
+    names = get_args(NamedDatum)
+    if datum in names or (not isinstance(datum, str) and abs(datum) <= MAX_SEA_LEVEL):
+        return datum
+    listed = ", ".join(f'"{name}"' for name in names)
+    raise ValueError(f"allowed {listed} or {-MAX_SEA_LEVEL:g}..{MAX_SEA_LEVEL:g} m")
+
+
 class TerrainTable(ScenarioTable):
     """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file.
 
     vertical_error_m: of the heights, as their source states it; none where it is not stated, for no file says.
+    height_datum: what a file's heights count from, or the height of mean sea level in it, m; none takes what it says.
     """
 
     kind: Literal["dem", "peaks", "flat", "none"]
@@ -166,6 +178,7 @@ class TerrainTable(ScenarioTable):
     peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
     amsl_m: Amsl | None = None
     vertical_error_m: Annotated[float, within(0.0, 1000.0)] | None = None
+    height_datum: Annotated[str | float, AfterValidator(_known_datum)] | None = None
     sha256: str | None = None
 
     @model_validator(mode="after")
@@ -177,6 +190,8 @@ class TerrainTable(ScenarioTable):
                 raise ValueError(f'{key}: missing; kind = "{self.kind}" needs it')
             if key != needs and given:
                 raise ValueError(f'{key}: not a key of kind = "{self.kind}"')
+        if self.height_datum is not None and self.kind != "dem":
+            raise ValueError(f'height_datum: not a key of kind = "{self.kind}"')
         return self
 
 

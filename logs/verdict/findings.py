@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -157,6 +157,21 @@ def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
     'overshoots its arc by 8 m (at most 5 m)'
     """
     return Message(brief + more, brief, placed)
+
+
+def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
+    """Of one rule's findings the failed one that is furthest beyond its limit, else the one closest to it.
+
+    A finding that fails by other evidence than its number has no margin and comes after failed ones that have one.
+    None where nothing was judged by a number.
+
+    >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
+    >>> failed = make_finding("slope", Place("leg", 2), ok=False, reason="too slow", margin=5.0)
+    >>> closest_to_limit([wide, close]) is close, closest_to_limit([wide, failed, close]) is failed
+    (True, True)
+    """
+    judged = (one for one in findings if one.ok is False or (one.ok is True and one.margin is not None))
+    return min(judged, key=lambda one: (one.ok is True, math.inf if one.margin is None else one.margin), default=None)
 
 
 def make_finding(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flight.mission.route import Route
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding, Verdict, closest_to_limit
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
 from logs.verdict.rules.registry import RULES
@@ -272,14 +272,15 @@ def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin
     >>> least_margins((wide, close))[0][1].value
     4.0
     """
-    least: dict[str, Finding] = {}
+    by_rule: dict[str, list[Finding]] = {}
     for item in findings:
-        if item.ok is None or item.margin is None or RULES[item.rule].scale is None:
-            continue
-        known = least.get(item.rule)
-        if known is None or known.margin is None or item.margin < known.margin:
-            least[item.rule] = item
-    return tuple((rule, LeastMargin(item.margin, item.unit, item.place)) for rule, item in least.items())
+        if item.ok is not None and RULES[item.rule].scale is not None:
+            by_rule.setdefault(item.rule, []).append(item)
+    closest = [closest_to_limit(mine) for mine in by_rule.values()]
+    # A rule that fails by other evidence than its number has none.
+    return tuple(
+        (one.rule, LeastMargin(one.margin, one.unit, one.place)) for one in closest if one and one.margin is not None
+    )
 
 
 def lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding, Verdict, closest_to_limit
 from logs.verdict.rule import Rule
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text, quantity_text, suggestions_text
@@ -49,10 +49,9 @@ def _state(rule: Rule, findings: list[Finding]) -> str:
     if not judged:
         return f"not judged: {unknown[0].reason}"
     text = f"{judged - failed} of {judged} ok"
-    with_margin = [(one.margin, one) for one in findings if one.margin is not None and one.ok is not None]
-    if not with_margin or rule.margin is None:
+    closest = closest_to_limit(findings)
+    if closest is None or closest.margin is None or rule.margin is None:
         return text
-    closest = min(with_margin, key=lambda one: one[0])[1]
     value = closest.planned if closest.flown is None else closest.flown
     if value is None or closest.limit is None:
         return text

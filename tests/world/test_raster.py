@@ -118,7 +118,7 @@ SYSTEMS: dict[str, float] = {
     "EPSG:2056": 20.0,
     "EPSG:2222": 60.0,
     "EPSG:32632+5773": 20.0,
-    "EPSG:4979": 1.0 / 3600.0,
+    "EPSG:4326+3855": 1.0 / 3600.0,
     "+proj=laea +lat_0=46 +lon_0=8 +ellps=bessel +units=m": 20.0,
 }
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, held_at_limit
 from logs.recording.reader import FlightLog
-from logs.verdict.findings import Verdict
+from logs.verdict.findings import Verdict, closest_to_limit
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.path_sweeps import path_spheres, segment_clearances
 from logs.verdict.measures.route_requirements import with_fence_zones
@@ -142,14 +142,13 @@ def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]])
 
 
 def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
-    """How many findings fail, and each rule's smallest margin."""
+    """How many findings fail, and each rule's margin closest to its limit; NaN for one that fails without a number."""
     found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
     for rule in RULES:
-        mine = [
-            item for item in verdict.findings if item.rule == rule and item.ok is not None and item.margin is not None
-        ]
-        if mine:
-            found[f"smallest margin: {rule}", mine[0].unit] = min(float(item.margin or 0.0) for item in mine)
+        closest = closest_to_limit(one for one in verdict.findings if one.rule == rule)
+        if closest is not None:
+            margin = math.nan if closest.margin is None else closest.margin
+            found[f"smallest margin: {rule}", closest.unit] = margin
     return found
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import MissionStretch
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding, Verdict, closest_to_limit
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.places import DecidingParameter, Suggestion
 from logs.verdict.rules.registry import RULES
@@ -317,11 +317,7 @@ def _rule_row(rule: str, group: list[Finding]) -> RuleRow:
     parts: list[str] = [f"{failed} of {judged} fail" if failed else f"{judged} ok"] if judged else []
     if judged < len(group):
         parts.append(f"{len(group) - judged} not judged")
-    closest = min(
-        (finding for finding in group if finding.ok is not None and finding.margin is not None),
-        key=lambda finding: (finding.ok is True, finding.margin),
-        default=None,
-    )
+    closest = closest_to_limit(group)
     sign = f"{_SIGNS[state]} {_WORDS[state]}"
     if closest is None:
         why = "" if judged else group[0].reason

@@ -15,7 +15,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import SCHEMA, Finding, Verdict, make_finding, verdict_json
+from logs.verdict.findings import SCHEMA, Finding, Verdict, closest_to_limit, make_finding, verdict_json
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.places import (
     FLIGHT,
@@ -30,6 +30,9 @@ from logs.verdict.places import (
 from logs.verdict.reference_flights import parse_reference_flights, reference_flights_json
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text, suggestions_text
+from logs.views.report.text import rule_rows
+from planfly.campaigns.flight_row import least_margins
+from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import ROUTE, bad_plan, judge, leg, of, suggested, waypoint
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import fly_path, make_setup
@@ -222,3 +225,44 @@ def test_a_rule_that_there_is_not_is_refused() -> None:
     airframe = {"flyable": False, "headline": "", "failed": [["juggling", place]]}
     with pytest.raises(LogError, match="'juggling' is no rule"):
         parse_reference_flights(changed(airframe=airframe), "a.mcap")
+
+
+# ----------------------------------------------------------------------
+# A failed finding is closest to its limit, whatever passes beside it.
+
+
+def slope_finding(leg: int, margin: float | None, *, ok: bool | None) -> Finding:
+    return make_finding("slope", Place("leg", leg), ok=ok, reason="", flown=3.0, limit=7.0, margin=margin, unit="deg")
+
+
+PASSED = [slope_finding(1, 9.0, ok=True), slope_finding(2, 1.5, ok=True), slope_finding(3, 0.1, ok=None)]
+BEYOND = [slope_finding(4, -0.5, ok=False), slope_finding(5, -2.5, ok=False)]
+# It fails by other evidence than its number, which is within the limit.
+OTHERWISE = slope_finding(6, 4.0, ok=False)
+
+
+@pytest.mark.parametrize(
+    ("findings", "leg", "margin"),
+    [
+        (PASSED, 2, 1.5),
+        ([*PASSED, *BEYOND, OTHERWISE], 5, -2.5),
+        ([*PASSED, OTHERWISE], 6, None),
+        (PASSED[2:], None, None),
+    ],
+)
+def test_a_failed_finding_is_closest_to_its_limit_everywhere(
+    findings: list[Finding], leg: int | None, margin: float | None
+) -> None:
+    closest = closest_to_limit(findings)
+    assert (closest and closest.place.index, closest and closest.margin) == (leg, margin)
+    verdict = Verdict(tuple(findings), flyable=False, complete=True, lines=("not flyable",), level="flown")
+    # The terminal names the place only with a number that tells how far it is.
+    (line,) = (line for line in verdict_lines(verdict, []) if line.startswith("  slope"))
+    assert ("closest to its limit at" in line) == (margin is not None)
+    if margin is not None:
+        assert f"at leg {leg}" in line
+    (row,) = rule_rows(findings)
+    assert row.where == ("" if leg is None else f"leg {leg}")
+    assert [(rule, least.value) for rule, least in least_margins(tuple(findings))] == (
+        [] if margin is None else [("slope", margin)]
+    )

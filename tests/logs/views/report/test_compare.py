@@ -11,6 +11,8 @@ import pytest
 
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
+from logs.verdict.findings import Verdict, make_finding
+from logs.verdict.places import Place
 from logs.views.compare import NamedFlight
 from logs.views.report.compare import (
     Comparison,
@@ -33,6 +35,25 @@ def test_a_flight_does_not_differ_from_itself(log_file: Path) -> None:
     assert all(item.first == item.second or math.isnan(item.first) for item in items.values())
     assert found.notes == ("tracks: 0.00 m apart on average, 0.00 m at most",)
     assert compare_logs(log, log, names=("x", "x")).names == ("x (first)", "x (second)")
+
+
+def test_a_rule_that_fails_shows_no_margin_of_what_passes_beside_it(
+    log_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    passed = make_finding("slope", Place("leg", 1), ok=True, reason="", margin=1.47, unit="deg")
+    failed = make_finding("slope", Place("leg", 2), ok=False, reason="too steep", margin=11.6, unit="deg")
+    verdicts = iter([(passed,), (passed, failed)])
+    monkeypatch.setattr(
+        "logs.views.report.compare._judge",
+        lambda _: Verdict(next(verdicts), flyable=False, complete=True, lines=("",), level="flown"),
+    )
+    log = read_log(log_file)
+    found, items = compared(log, log)
+    assert (items["findings that fail"].first, items["findings that fail"].second) == (0.0, 1.0)
+    assert items["smallest margin: slope"].first == 1.47
+    assert math.isnan(items["smallest margin: slope"].second)
+    (line,) = (line for line in difference_lines(found) if "smallest margin: slope" in line)
+    assert "11.6" not in line
 
 
 def test_differences_and_notes_state_what_differs(log_file: Path, other: FlightLog, track: Track) -> None:
