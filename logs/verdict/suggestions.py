@@ -114,7 +114,7 @@ def _least_shift(
 _Sized = tuple[float, Suggestion]
 
 
-def _least_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
+def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
     """Alternatives by the relative size of their changes; of equal ones the one listed first."""
     return tuple(suggestion for _, suggestion in sorted(alternatives, key=lambda sized: sized[0]))
 
@@ -145,7 +145,7 @@ def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
         now = float(requirements.setup.route.airspeed[leg])
         alternatives.append((abs(speed - now) / now, (Change("airspeed", place, now, speed, "m/s"),)))
     alternatives.append((longer / run - 1.0, (Change("length", place, run, float(math.ceil(longer)), "m"),)))
-    return _least_first(alternatives)
+    return _smallest_first(alternatives)
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
@@ -185,7 +185,7 @@ def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, it
     if degrees > 0.0:
         change = Change("turn", place, math.degrees(planned), degrees, "deg")
         alternatives.append((1.0 - allowed / planned, (change,)))
-    return _least_first(alternatives)
+    return _smallest_first(alternatives)
 
 
 def _longer_legs(requirements: RouteRequirements, i: int) -> list[_Sized]:

@@ -169,10 +169,10 @@ def _shown(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit:
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown, most = math.degrees(measure.angle), math.degrees(limit)
         faults.append(message(f"flown course change {flown:.1f}° beyond {most:.1f}°"))
-    most_bank = requirements.limits.max_bank + BANK_TOLERANCE
+    max_bank = requirements.limits.max_bank + BANK_TOLERANCE
     # The roll of a gust, or into a turn, is not the turn's: the mean over a second counts.
-    if measure.held_bank is not None and measure.held_bank > most_bank:
-        held, most = math.degrees(measure.held_bank), math.degrees(most_bank)
+    if measure.held_bank is not None and measure.held_bank > max_bank:
+        held, most = math.degrees(measure.held_bank), math.degrees(max_bank)
         faults.append(message(f"bank {held:.1f}° beyond {most:.1f}°"))
     faults += _too_tight(requirements, i, measure)
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT:
