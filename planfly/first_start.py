@@ -16,6 +16,7 @@ from typing import ParamSpec, TypeVar
 from planfly.kernel_units.unit_kernels import kernels_of
 from planfly.stages import is_received, say, stage
 from world.compile_events import tell_before_compiling
+from world.kernel_cache import VARIABLE, can_write
 
 # ----------------------------------------------------------------------
 # Units of kernels compiled by processes of their own, which leave them in the cache.
@@ -98,6 +99,7 @@ _Taken = ParamSpec("_Taken")
 _Given = TypeVar("_Given")
 
 TITLE = "compiling the numeric kernels, once"
+_WAY_OUT = f"{VARIABLE}=FOLDER names one that can"
 # Units that this process has had compiled, or tried to.
 _shared: set[str] = set()
 
@@ -138,12 +140,14 @@ def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_
 
 def _report_and_compile(units: list[str]) -> None:
     # Whoever compiles has imported it.
-    from world.kernels import cache_folder
+    from world.kernels import TEMPORARY, WANTED, cache_folder
 
     folder = cache_folder()
-    if not _can_write(folder):
-        say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them")
+    if not can_write(folder):
+        say(f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {_WAY_OUT}")
         return
+    if TEMPORARY:
+        say(f"compiling the numeric kernels for this command alone: {WANTED} cannot be written; {_WAY_OUT}")
     if not (units and sys.executable and is_received()):
         say(f"{TITLE} ...")
     if not units or not sys.executable:
@@ -152,11 +156,3 @@ def _report_and_compile(units: list[str]) -> None:
     with stage(TITLE) as advance:
         advance(0, total, f"0 of {total}")
         compile_units(units, folder, lambda done: advance(done, total, f"{done} of {total}"))
-
-
-def _can_write(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(folder, os.W_OK)

@@ -6,9 +6,15 @@ import, directly or not: a constant reaches a kernel only through an import.  Ot
 change without a kernel being compiled anew.
 """
 
+import atexit
+import contextlib
 import hashlib
+import os
 import re
+import tempfile
 from pathlib import Path
+
+from world.interruption import unfinished
 
 PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
 _KERNEL = re.compile(rb"^@(?:compiled|compiled_inline|inner|inlined)$", re.MULTILINE)
@@ -53,3 +59,39 @@ def sources_digest(root: Path) -> str:
     for name, content in sorted(kernel_sources(root).items()):
         digest.update(name.encode() + b"\0" + content)
     return digest.hexdigest()[:16]
+
+
+# Numba's own name for it, which processes that are started here inherit.
+VARIABLE = "NUMBA_CACHE_DIR"
+
+
+def can_write(folder: Path) -> bool:
+    """Whether files can be made in a folder, which is made where it is not there.
+
+    >>> can_write(Path(__file__) / "kernels")
+    False
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def usable_folder(wanted: Path) -> Path | None:
+    """The folder where compiled kernels are kept, if it can be written, or else a temporary one.
+
+    A temporary one serves this process and those that it starts, and goes with it.  None where nothing can be written.
+    """
+    if can_write(wanted):
+        return wanted
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="planfly-kernels-"))
+    except OSError:
+        return None
+    kept = contextlib.ExitStack()
+    kept.enter_context(unfinished(folder))
+    atexit.register(kept.close)
+    os.environ[VARIABLE] = str(folder)
+    return folder

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 from world.compile_events import kernel_is_compiled
-from world.kernel_cache import sources_digest
+from world.kernel_cache import sources_digest, usable_folder
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _Array = TypeVar("_Array", bound=NDArray[Any])
@@ -27,8 +27,12 @@ Records: TypeAlias = NDArray[Any]
 # Numba fills its settings in when it is imported, and states no types for them.  The folder is read when a kernel is
 # decorated; one that the user has set stays.
 _settings: Any = numba.config
-if not _settings.CACHE_DIR:
-    _settings.CACHE_DIR = str(Path(user_cache_dir("planfly")) / f"kernels-{sources_digest(Path(__file__).parents[1])}")
+_OWN = Path(user_cache_dir("planfly"))
+WANTED = Path(_settings.CACHE_DIR or _OWN / f"kernels-{sources_digest(Path(__file__).parents[1])}")
+_usable = usable_folder(WANTED)
+_settings.CACHE_DIR = str(_usable or WANTED)
+# Whether kernels are kept for this process alone.
+TEMPORARY = _usable not in (WANTED, None)
 
 
 class _Compiling(event.Listener):
@@ -46,7 +50,7 @@ cast("Any", event).register("numba:compile", _Compiling())
 
 
 def cache_folder() -> Path:
-    """Where compiled kernels are kept.
+    """Where compiled kernels are kept: in `WANTED`, or in a temporary folder where that cannot be written.
 
     >>> cache_folder().is_absolute() or bool(_settings.CACHE_DIR)
     True
@@ -104,7 +108,7 @@ def inlined(kernel: _Kernel) -> _Kernel:
 def _compiled(kernel: Any, **options: bool) -> Any:
     njit: Any = numba.njit
     # No kernel is handed to another as a value, which the wrapper for C is for.
-    return njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
+    return njit(cache=_usable is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
 
 
 class _InnerKernel:

@@ -1,5 +1,6 @@
 """What compiles is said before it begins, once, and only where something does."""
 
+import math
 import os
 import subprocess
 import sys
@@ -25,6 +26,7 @@ with warm_up():
         steepest_slopes(np.zeros((2, 2), np.float32), 1.0)
 """
 SAID = "compiling the numeric kernels, once"
+WAY_OUT = "NUMBA_CACHE_DIR=FOLDER names one that can"
 
 
 @pytest.fixture
@@ -85,8 +87,57 @@ def test_a_cache_that_cannot_be_written_is_named(
     monkeypatch.setattr("world.kernels.cache_folder", lambda: folder)
     with received_by(ON_STANDARD_ERROR), warm_up("scores"):
         kernel_is_compiled()
-    said = f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them\n"
+    said = f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them; {WAY_OUT}\n"
     assert (capsys.readouterr().err, shared) == (said, [])
+
+
+# Refuses what the system refuses a user who owns nothing: to write anywhere but among temporary files.
+OWNS_NOTHING = """
+import os, sys
+def refuse(event, args):
+    if event == "os.mkdir" or (event == "open" and not isinstance(args[0], int)):
+        writes = event == "os.mkdir" or args[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT)
+        if writes and not os.fsdecode(args[0]).startswith(("/dev/", "/tmp/")):
+            raise PermissionError(13, "Permission denied", args[0])
+sys.addaudithook(refuse)
+"""
+# What the environment of such a user has beside a path: a home that is not there, none, and folders that are none.
+HOMELESS = ({"HOME": "/nonexistent"}, {}, {"HOME": "/dev/null", "TMPDIR": "/none", "XDG_CACHE_HOME": "/proc/none"})
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="temporary files are where Linux has them")
+@pytest.mark.parametrize("given", HOMELESS)
+def test_a_user_who_can_write_no_cache_gets_results_and_the_way_out(given: dict[str, str]) -> None:
+    """Neither the sources nor a cache in a home: kernels are kept in a temporary folder while the command runs."""
+    path = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    environment = {"PATH": os.environ["PATH"], "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"} | given
+    before = set(Path("/tmp").glob("planfly-kernels-*"))
+    done = subprocess.run(
+        [sys.executable, "-c", OWNS_NOTHING + CODE], cwd="/", env=environment, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    (line,) = (one for one in done.stderr.splitlines() if "cannot be written" in one)
+    assert line.startswith("compiling the numeric kernels for this command alone: ")
+    assert line.endswith(WAY_OUT)
+    assert set(Path("/tmp").glob("planfly-kernels-*")) <= before
+
+
+def test_where_nothing_can_be_written_kernels_are_compiled_and_not_kept(tmp_path: Path) -> None:
+    """The work is done all the same."""
+    code = (
+        "import tempfile, sys; from pathlib import Path\n"
+        "from world import kernel_cache\n"
+        "kernel_cache.can_write = lambda folder: False\n"
+        "tempfile.mkdtemp = lambda prefix: (_ for _ in ()).throw(OSError(30, 'read-only'))\n"
+        "from world.geometry import wrap\n"
+        "from world import kernels\n"
+        "print(wrap(4.0), kernels.TEMPORARY)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    number, temporary = done.stdout.split()
+    # 4 rad less a turn.
+    assert (abs(float(number) - (4.0 - 2.0 * math.pi)) < 1e-12, temporary) == (True, "False")
 
 
 def _said(**environment: str) -> str:
