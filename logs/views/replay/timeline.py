@@ -149,7 +149,8 @@ def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
         leg = part.leg
         if len(group) > 1:
             item, radius = int(route.items[leg]), route.arcs[leg]
-            text = f"loiter of item {item}: legs {leg} to {group[-1].leg} around its circle, radius {radius:.0f} m"
+            what = f"return of item {item}" if 0 <= route.return_from <= leg else f"loiter of item {item}"
+            text = f"{what}: legs {leg} to {group[-1].leg} around its circle, radius {radius:.0f} m"
             entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
             continue
         course = round(math.degrees(courses[leg])) % 360

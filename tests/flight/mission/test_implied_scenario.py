@@ -93,6 +93,17 @@ def test_a_log_gives_the_same_scenario() -> None:
         assert np.array_equal(getattr(again, name), getattr(scenario, name))
 
 
+def test_the_area_holds_the_nearest_rally_point_of_a_return() -> None:
+    def box(*more: str) -> list[list[float]]:
+        read = mission(wp(0, 0), wp(0, 900), *more)
+        return implied_scenario(read, None).scenario.bounds.round(-1).tolist()  # type: ignore[no-any-return]  # numpy
+
+    rtl, near, far = "0 20 0 0 0 0 0 0 0", wp(4000, 900, command=5100), wp(-9000, 900, command=5100)
+    around = [[-2000.0, 2000.0], [-2000.0, 2900.0]]
+    assert box() == box(near, far) == box(rtl) == around
+    assert box(rtl, far, near) == [[-2000.0, 6000.0], [-2000.0, 2900.0]]
+
+
 def test_a_mission_off_the_tile_is_refused() -> None:
     # 9 km south of 36.5 degrees, where a degree is 110.96 km.
     words = r"flies to latitude 36\.4189\.\.36\.5000, longitude -84\.2000\.\.-84\.2000; the terrain covers latitude 36"

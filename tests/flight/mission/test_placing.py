@@ -27,6 +27,34 @@ def test_positions_within_a_metre_are_one(apart: float, places: int) -> None:
     assert len(placed(wp(0, 0), wp(0, 900), wp(0, 900 + apart)).stops) == places
 
 
+RTL = "0 20 0 0 0 0 0 0 0"
+
+
+def rally(east: float, north: float, alt: float, frame: int) -> str:
+    return wp(east, north, alt, command=5100, frame=frame)
+
+
+def test_a_return_has_home_and_the_rally_points_at_their_heights() -> None:
+    # Over home at 300 m, above the sea, and above the ground at 250 m.
+    points = (rally(900, 0, 120, 3), rally(0, 1800, 420, 0), rally(900, 900, 70, 10))
+    found = placed(wp(0, 500), wp(0, 900), RTL, *points, terrain=ground(250.0)).return_places
+    flat = [(round(place.east), round(place.north), place.up, place.base) for place in found]
+    assert flat == [(0, 0, 300.0, 0.0), (900, 0, 420.0, 300.0), (0, 1800, 420.0, 0.0), (900, 900, 320.0, 0.0)]
+    assert placed(wp(0, 500), wp(0, 900), *points, terrain=ground(250.0)).return_places == ()
+
+
+def test_a_rally_point_beyond_the_map_or_the_heights_is_named() -> None:
+    with pytest.raises(MissionError, match=r"rally point 2: 9400\.0 m AMSL: allowed -500\.\.9000"):
+        placed(wp(0, 500), wp(0, 900), RTL, rally(900, 0, 120, 3), rally(900, 0, 9100, 3))
+    with pytest.raises(MissionError, match=r"rally point 1: latitude .*more than .* km from the map's origin"):
+        placed(wp(0, 500), wp(0, 900), RTL, "3 5100 0 0 0 0 -36.5 84.2 100")
+
+
+def test_a_return_over_the_last_place_is_not_merged_with_it() -> None:
+    stops = placed(wp(0, 900), wp(0, 0), RTL).stops
+    assert [place.stop.item for place in stops] == [1, 2, 3]
+
+
 @pytest.mark.parametrize(("rise", "places"), [(0.9, 2), (1.1, 3)])
 def test_a_metre_straight_up_is_a_leg_where_such_legs_are_laid(rise: float, places: int) -> None:
     lines = wp(0, 0), wp(0, 900, 100), wp(0, 900, 100 + rise)

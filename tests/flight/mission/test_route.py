@@ -13,6 +13,7 @@ from aircraft.catalog import load_aircraft
 from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.implied_scenario import implied_scenario
+from flight.mission.return_path import ReturnCircle
 from flight.mission.route import END_LEG_LENGTH, Route, arc_misses, make_route, with_end_courses
 from flight.mission_files.formats import mission_text, parse_mission, read_mission
 from flight.simulation.setup import make_limits
@@ -124,6 +125,14 @@ def test_the_route_starts_on_the_course_far_enough_for_the_turn(turn_deg: float)
     assert math.dist(longer.waypoints[0], longer.waypoints[1]) == pytest.approx(length, abs=0.1)
     assert longer.items.tolist() == [-1, *route.items.tolist()]
     assert f"from a lead-in leg of {length:.0f} m" in longer.started
+
+
+def test_a_return_stays_where_it_began_behind_a_lead_in_leg() -> None:
+    route, scenario = ends(start_course=1.0)
+    back = replace(route, return_from=1, return_to=ReturnCircle(0.0, 0.0, 400.0, 80.0))
+    longer = with_end_courses(back, scenario, SETUP.limits)
+    assert (longer.return_from, longer.return_to) == (2, back.return_to)
+    assert with_end_courses(route, scenario, SETUP.limits).return_from == -1
 
 
 def test_the_route_ends_on_the_course() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.guidance.gains import load_gains
+from flight.mission.return_path import ReturnCircle
 from flight.simulation.airborne import PATIENCE, PATIENCE_SECONDS, Airborne
 from tests.setups import setup_maker
 from world.errors import FlightError
@@ -51,6 +52,13 @@ def test_a_flight_may_take_its_length_at_its_slowest_ground_speed_and_more() -> 
     flight = airborne([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]], wind=(5.0, 0.0))
     seconds = PATIENCE * 3000.0 / 20.0 + PATIENCE_SECONDS
     assert flight.max_ticks == pytest.approx(seconds / flight.dt, abs=60)
+
+
+def test_a_return_may_take_five_minutes_more_for_its_circles() -> None:
+    setup = MAKE([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]])
+    back = replace(setup, route=replace(setup.route, return_from=0, return_to=ReturnCircle(0.0, 3000.0, 500.0, 80.0)))
+    plain, longer = (Gliding(one, AEROSONDE, load_gains(AEROSONDE)) for one in (setup, back))
+    assert (longer.max_ticks - plain.max_ticks) * plain.dt == pytest.approx(300.0, abs=1.0)
 
 
 def test_a_block_ends_with_the_time() -> None:

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from flight.autopilots.planfly.law import planfly_tick
+from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.guidance.navigation_error import MOTION
 from flight.guidance.path import NODE, PIECE, FlyByPath
 from flight.simulation.tick import (
     BANKED,
@@ -23,6 +25,7 @@ from flight.simulation.tick import (
     READ_FIELDS,
     STALLED,
     Workspace,
+    end_return,
 )
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE
 from tests.flight.simulation.hand_made import (
@@ -39,7 +42,7 @@ from tests.flight.simulation.hand_made import (
     GROUND as GROUND_AMSL,
 )
 from world.frames import polymap
-from world.kernels import field_names
+from world.kernels import Record, field_names
 
 
 @pytest.fixture
@@ -210,6 +213,47 @@ def test_the_last_row_shows_how_the_flight_ended() -> None:
     assert planfly_tick(space.block, level_ground()) == GROUND
     assert int(space.rows_filled[0]) == 1
     assert space.rows[0].clearance == pytest.approx(-3.0)
+
+
+def ended(memory: Record, north: float, up: float, ticks: int = 1, **target: float) -> bool:
+    """Whether a return is over after some seconds at a place; its target is at the origin, 400 m up."""
+    motion, b = np.zeros(1, MOTION)[0], np.zeros(1, WAYPOINT)[0]
+    motion.north, motion.up, b.up = north, up, 400.0
+    for name, value in target.items():
+        setattr(b, name, value)
+    path_over = bool(memory.done)
+    for _ in range(ticks):
+        memory.done = path_over
+        end_return(motion, b, memory, 1.0)
+    return bool(memory.done)
+
+
+def test_a_return_ends_with_its_path_a_minute_after_it_came_to_its_circle_and_height() -> None:
+    def fresh(*, done: bool) -> Record:
+        memory = np.zeros(1, GUIDANCE_MEMORY)[0]
+        memory.done = done
+        return memory
+
+    assert not ended(fresh(done=True), 299.0, 400.0, 60)
+    assert ended(fresh(done=True), 299.0, 400.0, 61)
+    # With its path not yet over, after five of them.
+    assert not ended(fresh(done=False), 299.0, 400.0, 300)
+    assert ended(fresh(done=False), 299.0, 400.0, 301)
+    # Too far away, too high, too low: it has not begun.  Two radii of a wide circle are near enough.
+    for north, up in ((301.0, 400.0), (0.0, 420.5), (0.0, 379.5)):
+        assert not ended(fresh(done=True), north, up, 400)
+    assert ended(fresh(done=True), 799.0, 400.0, 61, circle=-400.0)
+    memory = fresh(done=True)
+    ended(memory, 0.0, 400.0)
+    assert memory.returning
+
+
+def test_a_return_does_not_miss_the_end_of_a_path_that_it_need_not_follow() -> None:
+    for returning, status in ((False, MISSED), (True, COMPLETED)):
+        space = make_workspace()
+        space.record.memory.returning = returning
+        read(space, north=LENGTH + 0.01, east=300.0, up=HEIGHT + 300.0)
+        assert planfly_tick(space.block, level_ground()) == status
 
 
 def test_each_end_is_told_apart_by_people() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flight.mission.return_path import ReturnCircle
 from logs.recording.setup_schema import EnvelopeTable, MissionTable, RouteTable, SetupModel
 from tests.logs.log_copies import same
 from tests.logs.made_flight import make_setup
@@ -29,6 +30,10 @@ def through_json(table: SetupModel) -> Any:
 ROUTE, ENVELOPE = through_json(RouteTable.of(SETUP.route)), through_json(EnvelopeTable.of(SETUP.envelope))
 
 
+# Of a return: the circle at its end.
+RETURN = {"return_to_east_north_amsl_radius_slope_base_m": [0.0] * 5}
+
+
 def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
     same(MissionTable.model_validate(through_json(MissionTable.of(SETUP.mission))).mission(), SETUP.mission)
     same(RouteTable.model_validate(ROUTE).route("x"), SETUP.route)
@@ -40,6 +45,21 @@ def test_an_unknown_height_is_null() -> None:
     known = replace(SETUP.route, takeoff_ground=12.5)
     assert through_json(RouteTable.of(known))["takeoff_ground_m"] == 12.5
     same(RouteTable.of(known).route("x"), known)
+
+
+def test_a_return_comes_back_with_its_circle() -> None:
+    circle = ReturnCircle(1.5, -2.0, 435.1, -80.0, 335.0)
+    back = replace(SETUP.route, return_from=2, return_to=circle)
+    table = through_json(RouteTable.of(back))
+    assert table["return_from_waypoint"] == 2
+    assert table["return_to_east_north_amsl_radius_slope_base_m"] == [1.5, -2.0, 435.1, -80.0, 335.0]
+    made = RouteTable.model_validate(table).route("x")
+    same(made, back)
+    assert made.return_to is not None
+    assert made.return_to.radius == -80.0
+    # A log of before there were returns says nothing of them.
+    old = {key: value for key, value in ROUTE.items() if not key.startswith("return")}
+    assert RouteTable.model_validate(old).route("x").return_from == -1
 
 
 def test_numbers_stand_under_the_unit_that_they_have() -> None:
@@ -61,6 +81,9 @@ def test_numbers_stand_under_the_unit_that_they_have() -> None:
         ({"fly_over": [False]}, r"route\.fly_over: 1 values: 4"),
         ({"items": []}, r"route\.items: 0 values: 4"),
         ({"arcs_m": [0.0]}, r"route\.arcs_m: 1 values: 4"),
+        ({"return_from_waypoint": 1}, r"route\.return_from_waypoint: 1: a waypoint before the last, with its target"),
+        ({"return_from_waypoint": 3} | RETURN, r"route\.return_from_waypoint: 3: a waypoint before"),
+        (RETURN, r"route\.return_from_waypoint: -1: a waypoint before"),
     ],
 )
 def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:

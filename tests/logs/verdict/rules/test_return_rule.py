@@ -1,6 +1,7 @@
 """A return to launch in the verdict: where it goes, and what holds it and what does not."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +12,11 @@ from flight.autopilots.arduplane.parameters import load_parameters
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
+from logs.recording.reader import read_log
+from logs.recording.recorder import Recorder
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.views.replay.timeline import timeline
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
 from world.terrain import Peak, peaks_terrain
@@ -48,6 +52,17 @@ def test_a_return_is_flyable_on_every_level_though_it_turns_about() -> None:
         assert "to home, 2.7 km away, sinking 200 m on a straight slope to 200 m AMSL" in found.reason
 
 
+@pytest.mark.parametrize("up", [110.0, 300.0, 20.0])
+@pytest.mark.parametrize("north", [-30.0, 0.0, 60.0, 150.0, 260.0, 400.0])
+def test_a_return_from_near_its_target_comes_to_its_end(north: float, up: float) -> None:
+    # North over home, or short of it, or past it; level, to sink, to climb.
+    way = (wp(0, north - 1500, up), wp(0, north, up), RTL)
+    verdict, ended = flown(by_arduplane(setup_of(*way, home=HOME)))
+    assert ended == "completed"
+    assert of(verdict, "return").ok
+    assert verdict.complete, verdict.lines
+
+
 def test_nothing_holds_the_way_back_to_its_drawing_but_ground_and_energy_do() -> None:
     setup = by_arduplane(setup_of(*WAY, home=HOME))
     verdict, _ = flown(setup)
@@ -59,6 +74,19 @@ def test_nothing_holds_the_way_back_to_its_drawing_but_ground_and_energy_do() ->
     assert low
     assert all(item.ok for item in low)
     assert of(verdict, "energy").ok
+
+
+def test_a_replay_tells_the_way_back_as_a_return(tmp_path: Path) -> None:
+    setup = by_arduplane(setup_of(*WAY, home=HOME))
+    done = simulate(setup, load_aircraft("aerosonde"))
+    with Recorder(tmp_path / "a.mcap", setup) as recorder:
+        recorder.write(done.track)
+        recorder.finish(done.ended, judge_flight(setup, done.track, done.ended))
+    log = read_log(tmp_path / "a.mcap")
+    assert (log.setup.route.return_from, log.setup.route.return_to) == (1, setup.route.return_to)
+    texts = [entry.text for entry in timeline(log) if entry.kind == "leg"]
+    assert not [text for text in texts if text.startswith("loiter")]
+    assert len([text for text in texts if text.startswith("return of item 3: legs ")]) == 2
 
 
 @pytest.mark.parametrize("parameters", [{}, {"RTL_ALTITUDE": 20.0}])
