@@ -7,6 +7,7 @@ import pytest
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.law import demand_height, navigate_legs
+from flight.guidance.path import waypoint_records
 from tests.flight.autopilots.arduplane.kept_flights import KEPT, flown_return, kept_track, return_setup
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, waypoints
 from world.kernels import Record
@@ -154,6 +155,11 @@ def test_the_slope_begins_where_the_climb_has_ended() -> None:
 
 def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
     setup = return_setup("rtl-def-00")
+    records = waypoint_records(setup.route)
+    # It begins as early as at a right angle, the mission's end.
+    assert records["turn"][1] == pytest.approx(0.5 * math.pi)
+    assert records["returns"].tolist() == [False, False, *[True] * (len(records) - 2)]
+    assert set(records["centre_east"][2:].round()) == {9500.0}
     assert setup.route.return_from == 1
     assert (setup.route.airspeed[1:] == setup.airspeed).all()
     own = memory(leg=0)

@@ -76,6 +76,13 @@ def test_nothing_holds_the_way_back_to_its_drawing_but_ground_and_energy_do() ->
     assert of(verdict, "energy").ok
 
 
+def test_the_waypoint_before_a_return_is_reached_as_at_a_missions_end() -> None:
+    # WP_RADIUS in the standard atmosphere's thinner air at 400 m, although the way back is drawn straight on from it.
+    found = judge_geometry(by_arduplane(setup_of(*WAY, home=HOME))).findings
+    limits = {item.place.index: item.limit for item in found if item.rule == "waypoint"}
+    assert limits[1] == pytest.approx(90.0 * (1.0 - 2.25577e-5 * 400.0) ** -4.25588, abs=0.01)
+
+
 def test_a_replay_tells_the_way_back_as_a_return(tmp_path: Path) -> None:
     setup = by_arduplane(setup_of(*WAY, home=HOME))
     done = simulate(setup, load_aircraft("aerosonde"))
