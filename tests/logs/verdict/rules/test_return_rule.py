@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,8 +16,10 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import Verdict
+from logs.verdict.findings import Verdict, make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.rules.return_rule import without_style
 from logs.views.replay.timeline import timeline
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
@@ -74,6 +78,17 @@ def test_nothing_holds_the_way_back_to_its_drawing_but_ground_and_energy_do() ->
     assert low
     assert all(item.ok for item in low)
     assert of(verdict, "energy").ok
+
+
+def test_a_drawn_leg_that_holds_nothing_of_the_way_says_nothing_once_the_way_was_flown() -> None:
+    requirements = route_requirements(by_arduplane(setup_of(*WAY, home=HOME)))
+    unflown = [
+        make_finding("clearance", requirements.leg(leg), ok=None, reason="the leg was not flown") for leg in (0, 3, 4)
+    ]
+    for arrived, left in ((True, [0, 4]), (False, [0, 3, 4])):
+        aligned: Any = SimpleNamespace(passed=np.array([True, arrived]), flew=lambda leg: leg == 4)
+        kept = without_style(requirements, aligned, unflown)
+        assert [item.place.index for item in kept] == left
 
 
 def test_the_waypoint_before_a_return_is_reached_as_at_a_missions_end() -> None:
