@@ -15,6 +15,7 @@ from planfly.cli import main
 from planfly.commands.registry import COMMANDS
 from tests.kernels.__main__ import TESTS
 from tests.stopwatch import Stopwatch
+from world.kernel_cache import DECORATORS
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
@@ -23,7 +24,7 @@ CODE = sorted(
 )
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
 LONGEST = 60
-KERNELS = {"compiled", "compiled_inline", "inner", "inlined"}
+KERNELS = set(DECORATORS)
 INNER = {"inner", "inlined"}
 # Phrases that lean on a text the reader does not have; taken apart, so that this file may hold them.
 LEANING = ("Do the" + " same", "the design" + " document", "the" + " issue")

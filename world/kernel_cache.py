@@ -17,7 +17,9 @@ from pathlib import Path
 from world.interruption import unfinished
 
 PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
-_KERNEL = re.compile(rb"^@(?:compiled|compiled_inline|inner|inlined)$", re.MULTILINE)
+# Of `world.kernels`: each has a function compiled.
+DECORATORS = ("compiled", "compiled_inline", "inner", "inlined")
+_KERNEL = re.compile(rb"^@(?:" + "|".join(DECORATORS).encode() + rb")$", re.MULTILINE)
 _IMPORT = re.compile(rb"^from ((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import (\(?[^\n]*)", re.MULTILINE)
 
 

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from tests.mutations.mutant import ROOT, Mutant
+from world.kernel_cache import DECORATORS
 
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 # Beside the tests of its own name: where what a part's modules do shows.
@@ -91,4 +92,4 @@ def _importers() -> dict[str, set[str]]:
 
 
 def _has_kernels(file: str) -> bool:
-    return re.search(r"^@(compiled|inlined)\b", _sources()[file], re.MULTILINE) is not None
+    return re.search(rf"^@({'|'.join(DECORATORS)})$", _sources()[file], re.MULTILINE) is not None
