@@ -5,6 +5,7 @@ what this process would, takes the campaign once, and is sent as many flights at
 """
 
 import contextlib
+import errno
 import hashlib
 import ipaddress
 import itertools
@@ -109,7 +110,8 @@ class Workers:
 def connected(workers: Workers) -> Iterator[Any]:
     """A `distributed.Client` of these workers; workers of our own end with it.
 
-    Raises SchedulerError for an address that may not be used, and a scheduler that does not answer.
+    Raises SchedulerError for an address that may not be used, and a scheduler that does not answer; OSError where
+    workers of our own cannot be started.
     """
     import dask
     import distributed
@@ -197,7 +199,9 @@ def _local_cluster(cluster_types: Any, number: int, folder: Path) -> Any:
             env={"TMPDIR": str(folder)},
         )
     except (RuntimeError, OSError) as error:
-        raise SchedulerError.of_argument("workers", number, f"could not be started: {error}") from error
+        # The machine's fault, and nobody's input.
+        words = " ".join(str(error).split())
+        raise OSError(errno.EIO, f"could not be started: {words}", f"{number} workers") from error
 
 
 def checked_address(address: str) -> str:

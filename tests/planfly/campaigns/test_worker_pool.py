@@ -24,7 +24,9 @@ from planfly.campaigns.worker_pool import (
     in_own_process,
     kept_workers,
 )
+from planfly.cli import main
 from tests.planfly.campaigns.kills import spawned_processes
+from tests.planfly.campaigns.made_campaigns import write_short
 from tests.soak import SOAK, note
 from world.errors import MissionError
 
@@ -230,6 +232,24 @@ def test_our_own_workers_listen_on_loopback_alone() -> None:
         assert len(client.nthreads()) == 1
     assert len(ports) >= 2
     assert {address.ip for address in ports} == {"127.0.0.1"}
+
+
+@pytest.mark.parametrize("error", [RuntimeError("Nanny failed\nto start."), OSError(24, "Too many open files")])
+def test_workers_that_cannot_be_started_are_the_machines_fault(
+    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 1 and one line: nobody's input is wrong."""
+
+    def none(**_: object) -> None:
+        raise error
+
+    monkeypatch.setattr("distributed.LocalCluster", none)
+    mission, scenario = write_short(tmp_path)
+    line = ["campaign", str(mission), "--scenario", str(scenario), "--workers", "3", "--out", str(tmp_path / "out")]
+    assert main([*line, "--flights", "2"]) == 1
+    told = [one for one in capsys.readouterr().err.splitlines() if one.startswith("planfly: ")]
+    words = " ".join(str(error).split())
+    assert told == [f"planfly: 3 workers: could not be started: {words}"]
 
 
 @pytest.mark.filterwarnings("default")
