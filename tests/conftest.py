@@ -9,7 +9,11 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from planfly.process_setup import prepare_process
 from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files
+
+# Looking for garbage among all that tests import takes a tenth of their time.
+prepare_process()
 
 # The first example of a test may compile kernels, or share its core with another test: neither is the kernel's fault.
 settings.register_profile("planfly", deadline=None)

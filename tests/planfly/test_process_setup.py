@@ -1,0 +1,44 @@
+"""A process of planfly's own collects garbage seldom, and so do those that it starts; a script's own does not."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from planfly.process_setup import prepare_process, with_large_stack
+
+CHILD = "import gc, planfly; print(gc.get_threshold()[0])"
+PARENT = f"""
+import subprocess, sys
+from planfly.process_setup import prepare_process
+prepare_process()
+print(subprocess.run([sys.executable, "-c", {CHILD!r}], capture_output=True, text=True, check=True).stdout)
+"""
+
+
+def threshold(code: str) -> int:
+    env = {name: value for name, value in os.environ.items() if name != "PLANFLY_OWN_PROCESS"}
+    done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
+    return int(done.stdout)
+
+
+def test_only_processes_of_planflys_own_are_set_up() -> None:
+    pythons_own = threshold("import gc; print(gc.get_threshold()[0])")
+    assert threshold(CHILD) == pythons_own < 200_000
+    assert threshold(PARENT) == 200_000
+
+
+def test_a_number_of_threads_that_a_user_has_set_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    prepare_process()
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "3"
+
+
+def test_work_in_a_large_stack_returns_and_raises_as_it_does_alone() -> None:
+    def depth(left: int) -> int:
+        return 0 if left == 0 else 1 + depth(left - 1)
+
+    assert with_large_stack(lambda: depth(500)) == 500
+    with pytest.raises(ZeroDivisionError):
+        with_large_stack(lambda: 1 // 0)
