@@ -68,6 +68,14 @@ def finding(rule: str, margin: float | None, *, ok: bool | None = True, **other:
         ("slope", 0.25, 0.0, 0.25),
         ("slope", 0.99, None, 0.99),
         ("clearance", 2.5, None, 0.25),
+        # What a person would call a noticeable difference: half of 10 m, 50 Wh, 10 degrees of bank and 1 m/s.
+        *(
+            (rule, 5.0, None, 0.5)
+            for rule in ("corridor", "waypoint", "height", "loiter", "fence", "bounds", "departure")
+        ),
+        ("energy", 25.0, None, 0.5),
+        ("speed", 0.5, None, 0.5),
+        ("stall", 0.5, None, 0.5),
         # The tolerance counts as margin, too.
         ("slope", -0.25, 0.5, 0.25),
         # What passes beyond its limit.

@@ -87,6 +87,10 @@ def test_calm_the_roll_takes_the_bank_limit_over_the_rate() -> None:
     # 30 degrees into 30 degrees, less the 30 that any turn rolls in.
     assert s_turn.reversal[1] == pytest.approx(25.0 * ROLL_TIME * math.radians(30.0), rel=1e-6)
     assert same.reversal.tolist() == [0.0, 0.0, 0.0]
+    # A waypoint that is flown over has no arc to roll out of.
+    for over in ((1,), (2,), (1, 2)):
+        flown_over = route_requirements(make_setup(zigzag(60.0, 300.0, same_way=False), fly_over=over))
+        assert flown_over.reversal.tolist() == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("turn", [30.0, 60.0, 90.0, 120.0])

@@ -38,9 +38,12 @@ def test_clearance_is_exact_and_says_where() -> None:
     assert item.flown == pytest.approx(least, abs=1e-3)
     assert item.planned == pytest.approx(least, abs=1e-3)
     assert int(item.reason.split("north ")[1].split(" m")[0]) == pytest.approx(3000, abs=20)
+    # Nothing is required of a leg that passes.
+    assert of(judge_geometry(setup), "clearance", leg(1)).reason == f"{least:.1f} m above ground at the lowest"
     low = make_setup([[0, 0, 285], [0, 2000, 285], [0, 6000, 285]], terrain=hill_at)
     assert failing(judge(low, fly_path(low))) == {("clearance", leg(1))}
     assert failing(judge_geometry(low)) == {("clearance", leg(1))}
+    assert of(judge_geometry(low), "clearance", leg(1)).reason.endswith("m are required")
     dive = fly_path(setup, up=bump(4500.0, -285.0, 300.0))
     assert ("departure", FLIGHT) in failing(judge(setup, edited(dive, position=dive.position - [0, 0, 20.0])))
 

@@ -75,8 +75,9 @@ def test_an_arc_that_passes_too_far_is_known_before_the_flight(turn: float, offs
     missed = of(judge_geometry(accepting(make_setup(corner(turn)), own - 0.1)), "waypoint", waypoint(1))
     assert (missed.ok, missed.planned) == (False, pytest.approx(own))
     assert missed.reason.startswith(f"the arc of its {turn:.0f}° corner passes it at {own:.0f} m")
+    assert missed.margin == pytest.approx(-0.1, abs=1e-5)
     reached = of(judge_geometry(accepting(make_setup(corner(turn)), own + 0.1)), "waypoint", waypoint(1))
-    assert reached.ok
+    assert (reached.ok, reached.margin) == (True, pytest.approx(0.1, abs=1e-5))
     over = accepting(make_setup(corner(turn), fly_over=(1,)), 10.0)
     assert of(judge_geometry(over), "waypoint", waypoint(1)).reason == "flown over"
 
