@@ -6,8 +6,10 @@ driver is explicit, so that nothing that merely names another file (VRT, a URL, 
 """
 
 import hashlib
+import lzma
 import math
 import os
+import re
 import warnings
 import zipfile
 import zlib
@@ -32,6 +34,8 @@ ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 # A window with more pixels than this, or a file of more that is read as one array, is refused.
 MAX_PIXELS = 120_000_000
 _OWN_FILES = Path(__file__).parent / "elevation"
+# What zipfile raises, beside others, for a damaged file.
+_UNZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +200,7 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
         raise TerrainError(
             f"{name}: elevation: claims more than fits into memory", file=name, field="elevation"
         ) from None
-    except (OSError, ValueError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except (*_UNZIP_ERRORS, OSError, ValueError, TypeError, EOFError, RuntimeError) as error:
         raise TerrainError(f"{name}: not a readable .npz elevation file: {one_line(error)}", file=name) from error
 
 
@@ -204,6 +208,8 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
 # What rasterio reads.
 
 METRES = ("m", "metre", "metres", "meter", "meters")
+# Words of a unit that are feet; what a tag of a unit across the ground has in its name.
+_FEET, _ACROSS = {"ft", "feet", "foot", "ftus", "usft"}, re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
 # A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
 MAX_BLOCK = 32 * 2**20
 # Pixels of a window that are read before the next ones: numbers and masks take several times the heights' own memory.
@@ -241,6 +247,17 @@ _GUARD: dict[str, Any] = {
 }
 
 
+def _unit_of(source: Any) -> str:
+    """The unit of an open file's heights: its band's, or feet that a tag of file or band names; "" for none.
+
+    GDAL takes what other programs write as a tag for a remark, and gives the heights in metres, which they are not.
+    """
+    for key, value in {**source.tags(), **source.tags(1)}.items():
+        if "unit" in key.lower() and not _ACROSS.search(key) and _FEET & set(re.split("[^a-z]+", value.lower())):
+            return f"{value} (tag {key})"
+    return source.units[0] or ""
+
+
 def _open_rasterio(file: Path, driver: str) -> RasterFile:
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
@@ -253,7 +270,7 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
                 crs, forward, kind = source.crs, source.transform, np.dtype(source.dtypes[0]).kind
                 rows, cols, bands = source.height, source.width, source.count
                 scale, offset = float(source.scales[0]), float(source.offsets[0])
-                block, unit = math.prod(source.block_shapes[0]), source.units[0]
+                block, unit = math.prod(source.block_shapes[0]), _unit_of(source)
         transformer = None if crs is None else crs_transformer(crs.to_wkt())
         stated, metres = height_unit(crs.to_wkt()) if crs is not None else ("metre", 1.0)
     except (RasterioError, RasterioIOError, ValueError, TypeError, OSError) as error:

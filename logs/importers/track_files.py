@@ -6,6 +6,7 @@ time pairs all later times with the wrong places.
 """
 
 import calendar
+import lzma
 import math
 import re
 import zipfile
@@ -62,7 +63,8 @@ def _bytes_of(path: Path) -> bytes:
             with archive.open(entry) as file:
                 # What it claims to hold is not what it holds.
                 data = file.read(MAX_BYTES + 1)
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+    # bzip2 says OSError for bytes that it cannot unpack.
+    except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, OSError) as error:
         why = " ".join(str(error).split())[:120]
         raise LogError(f"{path}: a zipped file that cannot be read: {why}", file=path) from error
     if len(data) > MAX_BYTES:

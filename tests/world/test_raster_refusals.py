@@ -1,6 +1,8 @@
 """What is no elevation file, or has no data in the area, is refused in one line."""
 
+import re
 import warnings
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +45,30 @@ def test_heights_that_are_not_in_metres_are_refused(tmp_path: Path) -> None:
             assert_refused(path, "unit of heights: ft: metres are expected")
 
 
+@pytest.mark.parametrize("of_band", [True, False])
+@pytest.mark.parametrize(
+    ("key", "value", "taken"),
+    [
+        ("units", "feet", False),
+        ("VERTICAL_UNITS", "US_survey_foot", False),
+        ("elevation#units", "Ft (NAVD88)", False),
+        ("Unit", "us-ft", False),
+        ("units", "metres", True),
+        ("HORIZONTAL_UNITS", "feet", True),
+        ("source", "a map in feet", True),
+    ],
+)
+def test_feet_that_a_tag_states_are_refused(key: str, value: str, taken: bool, of_band: bool, tmp_path: Path) -> None:
+    """A tag that GDAL gives no meaning; what it says of the places across the ground, or as a remark, is no unit."""
+    path = write_geotiff(tmp_path / "unit.tif")
+    with rasterio.open(path, "r+") as out:
+        out.update_tags(*([1] if of_band else []), **{key: value})
+    if taken:
+        assert read_window(path).heights.size
+    else:
+        assert_refused(path, f"unit of heights: {re.escape(value)} \\(tag {key}\\): metres are expected")
+
+
 VRT = """<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Float32" band="1"><SimpleSource>
 <SourceFilename>secret.tif</SourceFilename></SimpleSource></VRTRasterBand></VRTDataset>"""
 
@@ -73,6 +99,20 @@ def test_what_is_no_elevation_is_refused(content: bytes, suffix: str, tmp_path: 
     assert_refused(path, "not")
     assert_refused(tmp_path / "missing.tif", "no such file")
     assert_refused(tmp_path, "no such file")
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_damaged_npz_is_refused_whatever_packed_it(method: int, tmp_path: Path) -> None:
+    whole, path = write_npz(tmp_path / "whole.npz"), tmp_path / "a.npz"
+    with zipfile.ZipFile(whole) as source, zipfile.ZipFile(path, "w", method) as target:
+        for name in source.namelist():
+            target.writestr(name, source.read(name))
+        first = target.infolist()[0]
+    begins = 30 + len(first.filename)
+    assert read_window(path).heights.size
+    data = path.read_bytes()
+    path.write_bytes(data[:begins] + bytes(first.compress_size) + data[begins + first.compress_size :])
+    assert_refused(path, r"not a readable \.npz elevation file")
 
 
 def test_odd_geotiffs(tmp_path: Path) -> None:

@@ -1,3 +1,4 @@
+import contextlib
 import re
 import time
 import zipfile
@@ -10,6 +11,7 @@ import pytest
 from logs.importers import track_files
 from logs.importers.raw_log import example_raw_log
 from logs.importers.track_files import read_gpx, read_igc, read_kml, track_text
+from planfly.cli import main
 from tests.logs.importers.written_logs import BEGAN, gpx, igc, kml
 from world.errors import LogError
 
@@ -54,6 +56,28 @@ def test_a_zipped_file_that_is_none_is_refused(tmp_path: Path) -> None:
     path.write_bytes(bytes(data))
     with pytest.raises(LogError, match="a zipped file that cannot be read"):
         track_text(path, xml=True)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_zipped_file_is_refused_in_one_line_whatever_packed_it(
+    tmp_path: Path, method: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each byte of the packed data changed: bzip2 and LZMA have errors of their own."""
+    path, text = tmp_path / "a.kmz", "<kml>" + "0123456789" * 100 + "</kml>"
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.writestr("doc.kml", text)
+        size = archive.infolist()[0].compress_size
+    data, begins = path.read_bytes(), 30 + len("doc.kml")
+    for at in range(begins, begins + size):
+        path.write_bytes(data[:at] + bytes([data[at] ^ 0xFF]) + data[at + 1 :])
+        # A changed bit of padding changes nothing.
+        with contextlib.suppress(LogError):
+            assert track_text(path, xml=True) == text
+    path.write_bytes(data[:begins] + bytes(size) + data[begins + size :])
+    assert main(["check", str(path)]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"planfly: {path}: a zipped file that cannot be read: ")
+    assert told.count("\n") == 1
 
 
 def test_what_unpacks_to_more_than_is_read_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
