@@ -318,9 +318,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     altered or does not fit.
     """
     if SETUP_FILE not in attachments:
-        raise LogError(
-            f"{source}: no {SETUP_FILE}: not a planfly flight log, or cut off before its first second", file=source
-        )
+        raise LogError(f"{source}: not a planfly log: an MCAP file without {SETUP_FILE}", file=source)
     try:
         file = _Setup.model_validate_json(attachments[SETUP_FILE])
     except ValidationError as error:

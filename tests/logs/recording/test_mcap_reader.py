@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zstandard
+from mcap.writer import Writer
 
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
@@ -149,3 +150,23 @@ def test_what_is_no_log_is_refused_in_one_line(tmp_path: Path, content: bytes, m
         read_log(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+@pytest.mark.parametrize("holds", ["nothing", "an attachment", "a message"])
+def test_a_whole_file_of_others_is_told_as_one(tmp_path: Path, chunked: bool, holds: str) -> None:
+    """As the mcap project's own writer writes it."""
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=chunked)
+        writer.start(profile="", library="another program")
+        if holds == "an attachment":
+            writer.add_attachment(1, 1, "camera.txt", "text/plain", b"calibrated")
+        if holds == "a message":
+            schema = writer.register_schema("text", "jsonschema", b"{}")
+            channel = writer.register_channel("/text", "json", schema)
+            writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()
+    with pytest.raises(LogError) as caught:
+        read_log(path)
+    assert str(caught.value) == f"{path}: not a planfly log: an MCAP file without setup.json"

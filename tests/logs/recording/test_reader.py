@@ -145,7 +145,7 @@ def test_an_mcap_file_of_another_kind_is_refused(tmp_path: Path, log_file: Path)
     def drop(item: Any, topic: str) -> Any:
         return None if topic.endswith(".json") else item
 
-    with pytest.raises(LogError, match=r"no setup\.json: not a planfly flight log"):
+    with pytest.raises(LogError, match=r"not a planfly log: an MCAP file without setup\.json"):
         read_log(rewrite(log_file, tmp_path / "other.mcap", drop))
 
 
