@@ -1,5 +1,6 @@
 """Files and folders that are written: refused where they would destroy something, cleared where they are ours."""
 
+import hashlib
 from pathlib import Path
 
 from world.errors import PlanflyError
@@ -93,12 +94,16 @@ def is_pattern(target: str | Path) -> bool:
 
 
 def filled_pattern(target: str | Path, name: str, seed: int) -> Path:
-    """A path with its {name} and {seed} filled in; the name so that it stays one folder.
+    """A path with its {name} and {seed} filled in; the name so that it stays one folder, and no other name's.
 
-    >>> str(filled_pattern(RUN_FOLDER, "../../etc", 3))
-    'runs/-..-etc-seed3'
+    A name that has to change for that ends with the beginning of its SHA-256.
+
+    >>> str(filled_pattern(RUN_FOLDER, "a/b", 3)), str(filled_pattern(RUN_FOLDER, "a b", 3))
+    ('runs/a-b-c14cdd-seed3', 'runs/a-b-c8687a-seed3')
     """
     safe = "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name).lstrip(".") or "run"
+    if safe != name:
+        safe += f"-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:6]}"
     return Path(str(target).replace("{name}", safe).replace("{seed}", str(seed)))
 
 

@@ -82,18 +82,30 @@ def test_another_command_leaves_a_runs_rounds_alone(tmp_path: Path) -> None:
     ("name", "folder"),
     [
         ("jacksboro", "runs/jacksboro-seed3"),
-        ("../../etc/passwd", "runs/-..-etc-passwd-seed3"),
-        ("a b/c", "runs/a-b-c-seed3"),
-        ("...", "runs/run-seed3"),
+        # The six letters are those of sha256sum (GNU coreutils).
+        ("../../etc/passwd", "runs/-..-etc-passwd-3754d6-seed3"),
+        ("a b/c", "runs/a-b-c-539138-seed3"),
+        ("...", "runs/run-ab5df6-seed3"),
+        (".", "runs/run-cdb4ee-seed3"),
+        ("..", "runs/run-5ec1f7-seed3"),
+        ("a/b", "runs/a-b-c14cdd-seed3"),
+        ("a\\b", "runs/a-b-c62016-seed3"),
     ],
 )
 def test_a_default_folder_stays_below_runs(name: str, folder: str) -> None:
     assert filled_pattern(RUN_FOLDER, name, 3) == Path(folder)
 
 
+def test_no_two_names_share_a_folder() -> None:
+    names = ["a/b", "a\\b", "a b", "a:b", "a-b", "a.b", ".a-b", ".", "..", "...", "run", "-", "/", "a", ".a", "\udcff"]
+    folders = {filled_pattern("{name}", name, 0) for name in names}
+    assert len(folders) == len(names)
+    assert all(len(folder.parts) == 1 and ".." not in folder.parts for folder in folders)
+
+
 def test_a_patterns_folder_may_be_missing_and_a_named_files_may_not(tmp_path: Path) -> None:
     made = file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, overwrite=False)
-    assert made == tmp_path / "a-b-3" / "plan.json"
+    assert made == tmp_path / "a-b-c14cdd-3" / "plan.json"
     made.parent.mkdir()
     made.write_text("mine", encoding="utf-8")
     with pytest.raises(PlanflyError, match="overwrite=True replaces it"):
