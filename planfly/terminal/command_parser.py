@@ -161,9 +161,12 @@ class LineParser(CommandParser):
         parsed, left = self.parse_known_args(words, namespace)
         if left:
             parser = self.commands[parsed.command]
-            unknown = next((word for word in left if word.startswith("-")), left[0]).partition("=")[0]
-            what = "option" if unknown.startswith("-") else "argument"
-            parser.error(f"{unknown}: no such {what}{did_you_mean(unknown, parser.options())}")
+            # What follows a -- is no option, whatever it begins with.
+            after = words[words.index("--") :] if "--" in words else []
+            option = next((word for word in left if word.startswith("-") and word not in after), "").partition("=")[0]
+            if option:
+                parser.error(f"{option}: no such option{did_you_mean(option, parser.options())}")
+            parser.error(f"{next((word for word in left if word != '--'), left[0])}: no such argument")
         return parsed
 
 

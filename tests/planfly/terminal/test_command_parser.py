@@ -91,6 +91,9 @@ Output = pytest.CaptureFixture[str]
         ("run tight --log f.mcap", "planfly run: "),
         ("check a.mcap b.mcap", "planfly check: b.mcap: no such argument (see planfly check --help)"),
         ("fly m.plan -x", "planfly fly: -x: no such option (see planfly fly --help)"),
+        ("fly m.plan -- --wnd", "planfly fly: --wnd: no such argument (see planfly fly --help)"),
+        ("fly --wnd -- m.plan --terain", "planfly fly: --wnd: no such option: did you mean '--wind'?"),
+        ("fly m.plan -- --wnd=3 x", "planfly fly: --wnd=3: no such argument (see planfly fly --help)"),
         ("qqqq", "planfly: 'qqqq': no such command; there are run, plan, "),
     ],
 )
