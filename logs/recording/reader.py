@@ -300,7 +300,6 @@ def read_log(path: Path | str) -> FlightLog:
                     break
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
-    # A whole file of others may have none, and is told as what it is.
     if not messages.chunks and (found.problem or SETUP_FILE in found.attachments):
         raise LogError(f"{path}: holds no complete chunk: {found.problem or 'an empty log'}", file=path)
     if SETUP_FILE not in found.attachments and found.problem:
