@@ -211,8 +211,9 @@ class _Walk:
 
     def _take_off(self, item: MissionItem) -> None:
         name = command_name(item.command)
+        vertical = item.command == Command.NAV_VTOL_TAKEOFF
         if self.stops:
-            if item.has_position:
+            if item.has_position and not vertical:
                 self.notes.add(f"{name} in the air: flown through as a waypoint", item.seq)
                 self.stops.append(self._stop(item))
             else:
@@ -224,7 +225,11 @@ class _Walk:
         self.takeoff = item
         over_home = replace(self._stop(item), lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg)
         goes_on = item.has_position and (item.lat_deg, item.lon_deg) != (self.home.lat_deg, self.home.lon_deg)
-        if goes_on:
+        if goes_on and vertical:
+            # ArduPlane climbs where it stands and goes on at the height (QuadPlane::takeoff_controller and
+            # verify_vtol_takeoff); a fixed wing of it passes the item over.
+            self.notes.add(f"{name}: its place is not flown to, as in ArduPlane; PX4 would", item.seq)
+        if goes_on and not vertical:
             self.stops += [replace(over_home, item=-1), self._stop(item)]
         else:
             self.stops.append(over_home)

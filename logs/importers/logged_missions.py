@@ -112,8 +112,10 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
         if problem is not None:
             warnings.append(f"item {item.seq}: left out: {problem}")
         elif item.seq == 0 and item.command == 16:
-            placed = item.has_position
-            home = Home(item.lat_deg, item.lon_deg, item.alt) if placed else None
+            if item.has_position:
+                home = Home(item.lat_deg, item.lon_deg, item.alt)
+            else:
+                warnings.append("item 0: home at 0, 0, which is no position: left out; the mission has no home")
         else:
             kept.append(item)
     if logged.total and not any(item.seq == 0 for item in logged.items):
@@ -123,6 +125,19 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
     end = max(logged.total - 1, logged.items[-1].seq) + shift
     mission = Mission(home, shifted(kept, shift), warnings=tuple(warnings), source=f"{source}: {origin}")
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)
+
+
+def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
+    """Items of PX4, which counts from 0, counted from 1.
+
+    After a vertical take-off PX4 flies to its place (docs.px4.io, "Mission Mode (VTOL)"), as after any other.
+
+    >>> [(item.seq, item.command) for item in px4_items([MissionItem(0, 84, 0, (0.0,) * 4, 46.0, 8.0, 75.0)])]
+    [(1, 22)]
+    """
+    vertical = Command.NAV_VTOL_TAKEOFF
+    made = (replace(one, command=int(Command.NAV_TAKEOFF)) if one.command == vertical else one for one in items)
+    return shifted(made, 1)
 
 
 def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:

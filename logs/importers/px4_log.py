@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
-from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid, shifted
+from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid
 from flight.simulation.setup import Damage
 from logs.importers.dataflash_frames import MappedFile, pieces
-from logs.importers.logged_missions import px4_state, without_gaps
+from logs.importers.logged_missions import px4_items, px4_state, without_gaps
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.errors import LogError
 from world.kernels import compiled
@@ -270,7 +270,7 @@ class _Topics:
         total = self._mission_length(float(stamps[-1]) if items else math.inf)
         if not items and not total:
             return
-        held = shifted([items[seq] for seq in sorted(items)], 1)
+        held = px4_items([items[seq] for seq in sorted(items)])
         mission = Mission(self._home(), held, source=f"{self._source}: mission items")
         found = LoggedMission(float(stamps[0]) * 1e-6, mission, "navigator_mission_item")
         made = without_gaps(found, total, max([total, *(item.seq for item in held[-1:])]))

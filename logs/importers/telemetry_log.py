@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flight.autopilots.arduplane.law import true_by_equivalent
-from flight.mission.items import Home, Mission, MissionItem, on_grid, shifted
+from flight.mission.items import Home, Mission, MissionItem, on_grid
 from flight.simulation.setup import Damage
 from logs.importers.clean_places import steady_clock
 from logs.importers.dataflash_frames import PIECE, MappedFile
@@ -27,6 +27,7 @@ from logs.importers.logged_missions import (
     gather_items,
     logged_mission,
     plane_mode,
+    px4_items,
     px4_mode,
     without_gaps,
 )
@@ -432,6 +433,6 @@ def _item(message: Any, *, scaled: bool) -> MissionItem:
 
 def _px4_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
     """PX4 keeps no home among the items, and counts them from 0."""
-    mission = Mission(None, shifted(logged.items, 1), source=f"{source}: {origin}")
+    mission = Mission(None, px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -106,3 +107,13 @@ def test_nothing_is_dropped_in_silence(command: int) -> None:
 def test_long_missions_walk_in_linear_time() -> None:
     stops = make_itinerary(mission(*[wp(k, k) for k in range(9000)])).stops
     assert len(stops) == 9000
+
+
+def test_a_vertical_take_off_is_over_home_and_its_place_is_not_flown_to() -> None:
+    """As ArduPlane does it: it climbs where it stands, and a fixed wing of it passes the item over."""
+    flown = route(wp(0, 700, 80, command=84), wp(900, 700))
+    assert flown.waypoints == pytest.approx(np.array([[0, 0, 380], [900, 700, 400]]), abs=0.01)
+    assert flown.notes[0] == "item 1: NAV_VTOL_TAKEOFF: its place is not flown to, as in ArduPlane; PX4 would"
+    later = route(wp(0, 0), wp(700, 700, command=84), wp(0, 900))
+    assert later.items.tolist() == [1, 3]
+    assert later.notes == ("item 2: NAV_VTOL_TAKEOFF in the air: not flown",)
