@@ -254,17 +254,25 @@ class Mission:
 
 
 def renumbered(mission: Mission) -> Mission:
-    """Mission with its first item after seq 0, which both file forms keep for home.
+    """Mission whose items are numbered from 1 without gaps, as ground stations count them; 0 is home's in both forms.
 
-    All numbers move up together, and the targets of jumps with them.
+    The targets of jumps move with them; a jump to an item that is not there stays one.
 
-    >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in range(2))
+    >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (0, 1, 5))
     >>> [item.seq for item in renumbered(Mission(None, way)).items]
-    [1, 2]
+    [1, 2, 3]
     """
-    if not mission.items or mission.items[0].seq > 0:
+    numbers = {item.seq: number for number, item in enumerate(mission.items, 1)}
+    if all(seq == number for seq, number in numbers.items()):
         return mission
-    return replace(mission, items=shifted(mission.items, 1 - mission.items[0].seq))
+    items = []
+    for item in mission.items:
+        params = item.params
+        if item.command == Command.DO_JUMP:
+            nowhere = max(params[0], len(numbers) + 1.0)
+            params = (float(numbers.get(int(params[0]), nowhere)), *params[1:])
+        items.append(replace(item, seq=numbers[item.seq], params=params))
+    return replace(mission, items=tuple(items))
 
 
 def shifted(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:

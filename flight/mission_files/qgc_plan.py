@@ -201,8 +201,8 @@ class _File(_Table):
 def parse_plan_file(text: str, source: str) -> Mission:
     """Read the text of a `.plan` file; ``source`` names it in messages.
 
-    An item's number is its doJumpId, or its index in the list where it has none.  null is NaN.  Raises MissionError
-    with file, field, value and what is allowed.
+    Items are counted as QGroundControl counts them, from 1 by their order; a jump goes to the item whose doJumpId it
+    names.  null is NaN.  Raises MissionError with file, field, value and what is allowed.
     """
     try:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
@@ -220,12 +220,18 @@ def parse_plan_file(text: str, source: str) -> Mission:
         if after.seq <= before.seq:
             allowed = f"must be above the one before, {before.seq}"
             raise MissionError.at(source, f"mission.items.{k}.doJumpId", after.seq, allowed)
-    lost = [item for item in items if item.command in PLACES | LANDINGS and not item.has_position]
+    counted = enumerate(items, 1)
+    lost = [(k, item) for k, item in counted if item.command in PLACES | LANDINGS and not item.has_position]
     if lost:
-        name = command_name(lost[0].command)
-        warnings.append(f"{source}: item {lost[0].seq}: {name} has no position ({len(lost)} such items in all)")
-    return Mission(
-        home=_read_home(file.mission.plannedHomePosition, source),
+        number, name = lost[0][0], command_name(lost[0][1].command)
+        warnings.append(f"{source}: item {number}: {name} has no position ({len(lost)} such items in all)")
+    home = _read_home(file.mission.plannedHomePosition, source)
+    if home is None and file.mission.plannedHomePosition is not None:
+        warnings.append(f"{source}: plannedHomePosition is no position: left out; the mission has no home")
+    if [item.seq for item in items] != list(range(1, len(items) + 1)):
+        warnings.append(f"{source}: doJumpId is not 1 to {len(items)}: items are counted by their order")
+    mission = Mission(
+        home=home,
         items=tuple(items),
         fences=_read_fences(file.geoFence, source),
         rally=_read_rally(file.rallyPoints, source),
@@ -233,6 +239,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         warnings=tuple(warnings),
         source=source,
     )
+    return renumbered(mission)
 
 
 def _check_kind(data: Any, source: str) -> list[str]:

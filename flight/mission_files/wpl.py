@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import pairwise
 
@@ -69,8 +69,9 @@ def parse_waypoints(text: str, source: str) -> Mission:
     """Read the text of a WPL 110 file; ``source`` names it in messages.
 
     Taken as found: CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, more than seven
-    decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries).  Raises MissionError with file, line, field,
-    value and what is allowed.
+    decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries).  Items are counted by their lines, as Mission
+    Planner, QGroundControl and MAVProxy count them, and so are the targets of jumps: seq must rise, and says no more.
+    Raises MissionError with file, line, field, value and what is allowed.
     """
     breaks = max(text.count("\n"), text.count("\r"))
     if breaks > MAX_LINES:
@@ -100,7 +101,8 @@ def parse_waypoints(text: str, source: str) -> Mission:
         if after.item.seq <= before.item.seq:
             allowed = f"must be above the one before, {before.item.seq}"
             raise _refused(after.where, "seq", after.item.seq, str(after.item.seq), allowed)
-    home, body = _split_home(rows)
+    warnings = _warnings(rows, *_split_home(rows))
+    home, body = _split_home(_counted(rows))
     fences = numbered([row.item for row in body if row.item.command in FENCES])
     fence_shapes(fences, source)
     return Mission(
@@ -108,7 +110,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
         items=tuple(row.item for row in body if row.item.command not in FENCES | {Command.NAV_RALLY_POINT}),
         fences=fences,
         rally=numbered([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
-        warnings=tuple(_warnings(rows, body)),
+        warnings=tuple(warnings),
         source=source,
     )
 
@@ -163,6 +165,11 @@ def _number(where: TextLine, name: str, text: str) -> float:
     return float(text) + 0.0
 
 
+def _counted(rows: list[_Row]) -> list[_Row]:
+    """The rows with their items numbered by where they stand, from the first one's number on."""
+    return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, rows[0].item.seq)]
+
+
 def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
     first = rows[0].item
     if first.seq != 0 or first.command != Command.NAV_WAYPOINT:
@@ -172,7 +179,7 @@ def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
     return Home(first.lat_deg, first.lon_deg, first.alt), rows[1:]
 
 
-def _warnings(rows: list[_Row], body: list[_Row]) -> list[str]:
+def _warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
     found: list[str] = []
     plain = [row for row in body if row.item.command not in FENCES | {Command.NAV_RALLY_POINT}]
     if not plain:
@@ -182,14 +189,17 @@ def _warnings(rows: list[_Row], body: list[_Row]) -> list[str]:
         found.append("no current item: flown from the first")
     if len(body) == len(rows):
         found.append(f"{rows[0].where}: not a home line (seq 0, command 16): the mission has no home")
-    elif rows[0].item.has_position and rows[0].item.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
+    elif home is None:
+        found.append(f"{rows[0].where}: home at 0, 0, which is no position: left out; the mission has no home")
+    elif rows[0].item.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
         found.append(
             f"{rows[0].where}: home in frame {rows[0].item.frame}: its height is taken as above mean sea level"
         )
     gaps = [after for before, after in pairwise(rows) if after.item.seq != before.item.seq + 1]
     if gaps:
         found.append(
-            f"{gaps[0].where}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): numbers kept as written"
+            f"{gaps[0].where}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): items are counted by"
+            " their lines, as ground stations do, and jumps go by that count"
         )
     lost = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
     if lost:

@@ -25,7 +25,7 @@ SAMPLES = Path(__file__).parents[1] / "missions"
 LEGS = {
     "by_hand.waypoints": (3, [1, 2, 3, 5]),
     "endless.waypoints": (7, [1, 2, 3, 4, 1, 2, 3, 4]),
-    "mavproxy.txt": (21, [1, 2, 4, 7, 8]),
+    "mavproxy.txt": (21, [1, 2, 3, 5, 6]),
     "mavproxy_terrain.txt": (3, [1, 2, 3, 4]),
     "mission_planner.waypoints": (10, [1, 3, 4, 5, 6, 7, 4, 5, 6, 7, 10]),
     "mission_planner_land.waypoints": (5, [1, 2, 3, 6, 7]),

@@ -85,3 +85,12 @@ def test_malformed_plans_are_refused(case: str, tmp_path: Path) -> None:
     file = tmp_path / "bad.plan"
     file.write_text(data if isinstance(data, str) else json.dumps(data), encoding="utf-8")
     refused(file, wanted)
+
+
+def test_items_are_counted_by_their_order_and_jumps_go_to_the_item_named() -> None:
+    """As QGroundControl loads a plan: doJumpId says which item a jump means, and no more."""
+    jump = simple(9, 0.0) | {"command": 177, "frame": 2, "params": [5, 1, 0, 0, 0, 0, 0]}
+    mission = parse_mission(plan_with(simple(2, 36.4), simple(5, 36.5), jump), "a.plan")
+    assert [item.seq for item in mission.items] == [1, 2, 3]
+    assert mission.items[2].params[0] == 2.0
+    assert mission.warnings == ("a.plan: doJumpId is not 1 to 3: items are counted by their order",)

@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import pytest
-from pymavlink.mavwp import MAVFenceLoader
+from pymavlink.mavwp import MAVFenceLoader, MAVWPLoader
 
-from flight.mission_files.formats import read_fence
-from flight.mission_files.wpl import is_point_list, parse_fence_points
+from flight.mission.items import Mission, MissionItem
+from flight.mission.itinerary import make_itinerary
+from flight.mission_files.formats import mission_text, parse_mission, read_fence
+from flight.mission_files.wpl import is_point_list, parse_fence_points, parse_waypoints, waypoints_text
 from tests.flight.mission_files.malformed_files import BAD_WPL, refused
 from world.errors import MissionError
 
@@ -73,3 +75,57 @@ def test_three_corners_and_255_points_are_enough() -> None:
 @pytest.mark.parametrize(("text", "points"), [("", False), ("QGC WPL 110\n", False), ("{}", False), ("-3.5 8", True)])
 def test_a_list_of_points_begins_with_a_number(text: str, points: bool) -> None:
     assert is_point_list(text) is points
+
+
+# ----------------------------------------------------------------------
+# Items are counted by their lines.
+
+JUMPING = """QGC WPL 110
+0 1 0 16 0 0 0 0 36.5 -84.2 300 1
+3 0 3 16 0 0 0 0 36.51 -84.2 100 1
+7 0 3 16 0 0 0 0 36.52 -84.2 100 1
+9 0 2 177 2 1 0 0 0 0 0 1
+40 0 3 16 0 0 0 0 36.53 -84.2 100 1
+"""
+
+
+def test_items_whose_seq_jumps_are_counted_as_pymavlink_counts_them(tmp_path: Path) -> None:
+    file = tmp_path / "a.waypoints"
+    file.write_text(JUMPING, encoding="utf-8")
+    loader = MAVWPLoader()
+    loader.load(str(file))
+    theirs = [loader.wp(k) for k in range(1, loader.count())]
+    mission = parse_waypoints(JUMPING, "a.waypoints")
+    assert [(item.seq, item.command, item.lat_deg) for item in mission.items] == [
+        (one.seq, one.command, pytest.approx(one.x)) for one in theirs
+    ]
+    # The jump goes to the second item, whatever number its line has.
+    assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
+    (said,) = mission.warnings
+    assert said == (
+        "a.waypoints:3: a gap in seq before 3 (4 in all): items are counted by their lines, as ground stations do, and"
+        " jumps go by that count"
+    )
+
+
+@pytest.mark.parametrize("kind", ["waypoints", "plan"])
+def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
+    """It is counted as home all the same: the first item is number 1."""
+    text = JUMPING.replace("36.5 -84.2 300", "0 0 0").replace("\n3 ", "\n1 ").replace("\n7 ", "\n2 ")
+    text = text.replace("\n9 ", "\n3 ").replace("\n40 ", "\n4 ")
+    mission = parse_waypoints(text, "a.waypoints")
+    if kind == "plan":
+        mission = parse_mission(mission_text(mission, "plan"), "a.plan")
+    assert mission.home is None
+    assert [item.seq for item in mission.items] == [1, 2, 3, 4]
+    (said,) = mission.warnings
+    assert "no position: left out; the mission has no home" in said
+
+
+def test_what_is_written_has_no_gap_and_jumps_to_the_same_item() -> None:
+    places = [MissionItem(seq, 16, 3, (0.0,) * 4, 36.5 + seq / 100, -84.2, 100.0) for seq in (2, 5, 9)]
+    jumps = [MissionItem(seq, 177, 2, (float(to), 1.0, 0.0, 0.0), 0.0, 0.0, 0.0) for seq, to in ((11, 5), (12, 7))]
+    again = parse_waypoints(waypoints_text(Mission(None, (*places, *jumps))), "a.waypoints")
+    assert [item.seq for item in again.items] == [1, 2, 3, 4, 5]
+    # To the second, and to one that is not there.
+    assert [item.params[0] for item in again.items[3:]] == [2.0, 7.0]
