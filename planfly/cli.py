@@ -11,7 +11,7 @@ from planfly.terminal.command_parser import coloured, error_text
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
 from planfly.terminal.output import asked_output, open_standard_streams, printable, tolerate_closed_output
 from planfly.terminal.signal_watch import end_process, ended_by_signals
-from world.errors import PlanflyError
+from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
 
 
@@ -48,9 +48,13 @@ def _outcome(argv: Sequence[str] | None) -> int:
             with tolerate_closed_output(), asked_output(args):
                 return find_command(args.command)(args)
         except PlanflyError as error:
-            return _fail(BAD_INPUT, error_text(error, line.commands[args.command]))
+            code = FAULT if isinstance(error, CrashError) else BAD_INPUT
+            return _fail(code, error_text(error, line.commands[args.command]))
     except OSError as error:
         return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
+    except MemoryError as error:
+        said = str(error)
+        return _fail(FAULT, f"too little memory: {said}" if said and "bad_alloc" not in said else "too little memory")
     except Interrupted as interrupted:
         return _fail(128 + interrupted.number, "interrupted")
     except KeyboardInterrupt:

@@ -109,6 +109,10 @@ class FlightError(PlanflyError):
     """An aircraft model or a start condition is unusable."""
 
 
+class CrashError(FlightError):
+    """A program that steered failed in flight: the machine's failure, and no bad input."""
+
+
 class ParameterError(PlanflyError):
     """A file of an autopilot's parameters cannot be used as it stands."""
 

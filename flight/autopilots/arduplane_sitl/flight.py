@@ -47,7 +47,7 @@ from flight.simulation.tick import (
     end_return,
     end_tick,
 )
-from world.errors import FlightError
+from world.errors import CrashError, FlightError
 from world.frames import to_geo
 from world.kernels import Record, Records, compiled, inner
 from world.terrain import Heights
@@ -184,9 +184,10 @@ class AutopilotFlight(ProgramFlight):
         return self._lockstep.time
 
     def prepare(self) -> None:
-        """Have the autopilot settle, take the mission and fly to the first waypoint.  Raises FlightError."""
+        """Have the autopilot settle, take the mission and fly to the first waypoint.  Raises as the class does."""
         with self._named():
             self._converse(self._preflight.prepare(self._mission))
+        with self._named(CrashError):
             for k in range(1, math.ceil(self._rail.push_time * FRAME_HZ) + 1):
                 self._lockstep.hold(self._rail, k / FRAME_HZ)
             self._run_in()
@@ -197,13 +198,13 @@ class AutopilotFlight(ProgramFlight):
         return self._process.keep_log(target)
 
     @contextlib.contextmanager
-    def _named(self) -> Iterator[None]:
-        """Name the program in what goes wrong with it."""
+    def _named(self, kind: type[FlightError] = FlightError) -> Iterator[None]:
+        """Name the program in what goes wrong with it, as an error of this kind."""
         try:
             yield
         except FlightError as error:
             named = str(error).startswith(str(self._binary))
-            raise FlightError.from_error(error, "" if named else self._binary) from error
+            raise kind.from_error(error, "" if named else self._binary) from error
 
     def _make_rail(self, setup: FlightSetup) -> RailEnd:
         """Trim the aircraft where it is let go: before the first waypoint, straight and level, over no ground."""
@@ -267,7 +268,7 @@ class AutopilotFlight(ProgramFlight):
         return status
 
     def _fly(self, count: int) -> int:
-        with self._named():
+        with self._named(CrashError):
             return self._loop(count)
 
     def _serve(self) -> bool:

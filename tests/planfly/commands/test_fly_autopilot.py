@@ -54,18 +54,19 @@ def test_a_flight_is_logged_judged_and_judged_again(
 
 
 @pytest.mark.parametrize(
-    ("fault", "said"),
+    ("fault", "code", "said"),
     [
-        ("panic", "panicked: Failed to load defaults"),
-        ("refuses", "refused the mission at item 2 (NAV_WAYPOINT): MAV_MISSION_UNSUPPORTED"),
-        ("crash-in-air", "ended with exit code 1"),
+        ("panic", 2, "panicked: Failed to load defaults"),
+        ("refuses", 2, "refused the mission at item 2 (NAV_WAYPOINT): MAV_MISSION_UNSUPPORTED"),
+        ("crash-in-air", 1, "ended with exit code 1"),
+        ("reboot", 1, "began anew in the air: frame 1 after frame"),
     ],
 )
 def test_a_program_that_fails_is_one_line_and_leaves_no_log(
-    mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str, said: str
+    mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str, code: int, said: str
 ) -> None:
     program, log = write_fake(tmp_path, fault), tmp_path / "f.mcap"
-    assert main(["fly", str(mission), "--autopilot", str(program), "--log", str(log)]) == 2
+    assert main(["fly", str(mission), "--autopilot", str(program), "--log", str(log)]) == code
     errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("planfly: ")]
     assert len(errors) == 1
     assert errors[0].startswith(f"planfly: {program}: {said}")
