@@ -61,7 +61,7 @@ def height_datum(crs: str | None, stated: StatedDatum | None) -> HeightDatum:
     crs: the file's reference system; None where it has none.
     stated: by a person, who knows better than the file: a `NamedDatum` or a number; None where nobody did.
 
-    Raises ValueError for heights above an ellipsoid where no grid of a geoid is at hand.
+    Raises ValueError for heights above an ellipsoid where no grid of a geoid is at hand, and for depths.
     """
     if stated is not None and not isinstance(stated, str):
         return HeightDatum(f"{_MEAN_SEA_LEVEL}, at {stated:g} m of the file's heights as stated", _level(stated))
@@ -70,6 +70,8 @@ def height_datum(crs: str | None, stated: StatedDatum | None) -> HeightDatum:
     if stated == "ellipsoid" or (crs is not None and counts_from_ellipsoid(crs)):
         name, transformer = _geoid()
         return HeightDatum(f"{_MEAN_SEA_LEVEL}, converted from the ellipsoid by {name}", _undulation(transformer))
+    if crs is not None and _counts_downwards(crs):
+        raise ValueError("heights count downwards, as depths")
     name = "" if crs is None else _vertical_name(crs)
     return HeightDatum(f"{_MEAN_SEA_LEVEL} ({name}, as the file states)" if name else UNSTATED)
 
@@ -101,7 +103,13 @@ def _geoid() -> tuple[str, Any]:
             warnings.simplefilter("ignore", UserWarning)
             if TransformerGroup("EPSG:4979", target, always_xy=True).best_available:
                 return name, Transformer.from_crs("EPSG:4979", target, always_xy=True, only_best=True)
-    raise ValueError("no grid of a geoid is at hand")
+    raise ValueError("heights count from the ellipsoid, and no grid of a geoid is at hand")
+
+
+def _counts_downwards(crs: str) -> bool:
+    from pyproj import CRS
+
+    return any(axis.direction == "down" for axis in CRS.from_user_input(crs).axis_info)
 
 
 def _vertical_name(crs: str) -> str:

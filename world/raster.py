@@ -338,7 +338,8 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
     (344, 403)
     """
     if path in EMBEDDED:
-        return open_npz(_OWN_FILES / EMBEDDED[path], path)
+        raster = open_npz(_OWN_FILES / EMBEDDED[path], path)
+        return replace(raster, datum=_datum_of(raster, datum))
     if path.startswith("/vsi") or "://" in path:
         allowed = "only local files are read, not URLs or virtual file systems"
         raise TerrainError(f"{path}: terrain path: {allowed}", file=path, allowed=allowed)
@@ -368,15 +369,11 @@ def _datum_of(raster: RasterFile, stated: StatedDatum | None) -> HeightDatum:
         return height_datum(raster.crs, stated)
     except ValueError as error:
         allowed = (
-            "state the height of mean sea level in the file as [terrain] height_datum (some 47.0 m in the Alps), or"
-            " give PROJ the grid of a geoid (projsync --file us_nga_egm96_15.tif)"
+            "give PROJ the grid of a geoid (projsync --file us_nga_egm96_15.tif), or state the height of mean sea level"
+            " in the file (some 47.0 m in the Alps) as height_datum in a scenario's [terrain]"
         )
         raise TerrainError(
-            f"{raster.name}: heights count from the ellipsoid, and {error}: {allowed}",
-            file=raster.name,
-            field="height datum",
-            value="ellipsoid",
-            allowed=allowed,
+            f"{raster.name}: {error}: {allowed}", file=raster.name, field="height datum", allowed=allowed
         ) from error
 
 

@@ -196,12 +196,13 @@ def make_finding(
 
     faults: what the reason begins with, where it begins with faults.
     facts: measured beside it; one that is not a number is left out.
-    A finding that fails by other evidence than its number has no margin: the reason says what failed.
+    A finding that fails by other evidence than its number, which is within the limit and its tolerance, has no margin:
+    the reason says what failed.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
     True
     """
-    if ok is False and margin is not None and margin >= 0.0:
+    if ok is False and margin is not None and margin >= -(tolerance or 0.0):
         margin = None
     return Finding(
         rule=rule,

@@ -55,7 +55,8 @@ def _state(rule: Rule, findings: list[Finding]) -> str:
     value = closest.planned if closest.flown is None else closest.flown
     if value is None or closest.limit is None:
         return text
-    where = "" if closest.place.kind == "flight" else f"closest to its limit at {place_text(closest.place)}: "
+    how = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
+    where = "" if closest.place.kind == "flight" else f"{how} at {place_text(closest.place)}: "
     limit = quantity_text(closest.limit, closest.unit)
     whose = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
     return f"{text}; {where}{rule.margin.of} {quantity_text(value, closest.unit)} (limit {limit}{whose})"

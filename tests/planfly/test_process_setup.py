@@ -39,6 +39,15 @@ def test_work_in_a_large_stack_returns_and_raises_as_it_does_alone() -> None:
     def depth(left: int) -> int:
         return 0 if left == 0 else 1 + depth(left - 1)
 
+    def stack_around() -> int:
+        frame, largest = sys._getframe(), 0
+        while frame.f_back is not None:
+            frame = frame.f_back
+            largest = max(largest, frame.f_code.co_stacksize)
+        return largest
+
+    # The piece of memory that frames lie in is as large as the largest of them asks for.
+    assert stack_around() < 1000 < 100_000 < with_large_stack(stack_around)
     assert with_large_stack(lambda: depth(500)) == 500
     with pytest.raises(ZeroDivisionError):
         with_large_stack(lambda: 1 // 0)

@@ -82,7 +82,9 @@ def test_ellipsoidal_systems_are_refused_where_no_grid_is_at_hand_and_others_are
     file = tmp_path / "hill.tif"
     write_tile(file, crs)
     if SYSTEMS[crs]:
-        with pytest.raises(TerrainError, match=r"hill\.tif: heights count from the ellipsoid.*height_datum") as caught:
+        with pytest.raises(
+            TerrainError, match=r"hill\.tif: heights count from the ellipsoid, .*height_datum"
+        ) as caught:
             open_raster(str(file))
         assert "\n" not in str(caught.value)
     else:
@@ -113,6 +115,22 @@ def test_another_datum_is_refused_in_one_line(value: str, tmp_path: Path) -> Non
     with pytest.raises(ScenarioError, match=r"terrain\.height_datum") as caught:
         scenario_over(tmp_path / "hill.tif", "EPSG:4326", f"height_datum = {value}")
     assert "\n" not in str(caught.value)
+
+
+def test_depths_are_refused(tmp_path: Path) -> None:
+    # EPSG:5715 is depth below mean sea level.
+    write_tile(tmp_path / "hill.tif", "EPSG:4326+5715")
+    with pytest.raises(TerrainError, match=r"hill\.tif: heights count downwards"):
+        open_raster(str(tmp_path / "hill.tif"))
+
+
+def test_the_datum_of_a_tile_that_we_ship_may_be_stated_too() -> None:
+    levels = []
+    for datum in (None, 100.0):
+        raster = open_raster("jacksboro", datum=datum)
+        ground = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
+        levels.append(float(ground.height(0.0, 0.0)))
+    assert levels[0] - levels[1] == pytest.approx(100.0, abs=1e-4)
 
 
 def test_ground_that_is_made_has_no_datum(tmp_path: Path) -> None:

@@ -86,6 +86,8 @@ SOURCES = {
     "planner/inner.py": "from world.factors import (\n    TWICE,\n)\n\n\n@compiled\ndef scaled(a):\n    return TWICE\n",
     "flight/outer.py": "from planner import inner\n\n\n@inlined\ndef shifted(a):\n    return inner.scaled(a) + 1.0\n",
     "logs/report.py": "from flight.outer import shifted\n\nprint(shifted(10.0))\n",
+    "world/waves.py": "@inner\ndef wave(a):\n    return a\n",
+    "world/folds.py": "@compiled_inline\ndef fold(a):\n    return a\n",
 }
 
 

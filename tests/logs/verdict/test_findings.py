@@ -258,11 +258,18 @@ def test_a_failed_finding_is_closest_to_its_limit_everywhere(
     verdict = Verdict(tuple(findings), flyable=False, complete=True, lines=("not flyable",), level="flown")
     # The terminal names the place only with a number that tells how far it is.
     (line,) = (line for line in verdict_lines(verdict, []) if line.startswith("  slope"))
-    assert ("closest to its limit at" in line) == (margin is not None)
+    assert ("limit at" in line) == (margin is not None)
     if margin is not None:
+        assert ("furthest beyond its limit at" if margin < 0.0 else "closest to its limit at") in line
         assert f"at leg {leg}" in line
     (row,) = rule_rows(findings)
     assert row.where == ("" if leg is None else f"leg {leg}")
     assert [(rule, least.value) for rule, least in least_margins(tuple(findings))] == (
         [] if margin is None else [("slope", margin)]
     )
+
+
+@pytest.mark.parametrize(("margin", "kept"), [(-0.2, None), (-1.1, None), (-1.2, -1.2)])
+def test_a_finding_that_fails_within_its_tolerance_fails_by_other_evidence(margin: float, kept: float | None) -> None:
+    item = make_finding("slope", Place("leg", 1), ok=False, reason="too weak", margin=margin, tolerance=1.1, unit="deg")
+    assert item.margin == kept
