@@ -53,7 +53,7 @@ def test_failures_stand_below_the_summary_with_what_would_pass(capsys: pytest.Ca
     assert lines[1] == "  failed  slope at leg 1: leg 1 is as it is"
     assert lines[2].endswith("would pass: make leg 1 400 m long instead of 300 m")
     # Of 5 and 7.5 and 9 against 8 the last has the least margin.
-    assert "2 of 3 ok; closest to its limit at leg 1: slope 9° (limit 8°, aircraft)" in lines[3]
+    assert "2 of 3 ok; furthest beyond its limit at leg 1: slope 9° (limit 8°, aircraft)" in lines[3]
     assert lines[-1] == "  note    gusty"
 
 
