@@ -15,7 +15,7 @@ LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/fligh
 	tests/flight/live tests/logs/recording tests/logs/verdict tests/planfly/campaigns/statistics \
 	tests/planfly/campaigns/test_dispersions.py tests/planfly/campaigns/test_dispersions_draws.py
 # What pyproject.toml names.
-DIRECT := ^(dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
+DIRECT := ^(cryptography|dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
 	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
 # Bytecode is made on all cores; pip makes it on one.  What cannot be compiled is no module, but a template.
 define INSTALL
