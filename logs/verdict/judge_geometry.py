@@ -29,12 +29,12 @@ def unflyable_items(setup: FlightSetup) -> list[Finding]:
 
 def geometric_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
     """Findings of a route's geometry against the aircraft's envelope."""
-    return _judged(requirements, None, geometric=True)
+    return _judged(requirements, None, (), geometric=True)
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
     """Findings of a flown track against its route and the aircraft's envelope, but for how the flight ended."""
-    return (*unflyable_items(requirements.setup), *_judged(requirements, aligned, geometric=False))
+    return (*unflyable_items(requirements.setup), *_judged(requirements, aligned, (), geometric=False))
 
 
 def flown_findings(
@@ -45,17 +45,21 @@ def flown_findings(
     ended: "completed" or what stopped it.  log_complete: the record has its end.
     """
     ends = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
-    at_end = (item for judge in ends for item in judge(requirements, aligned, ended, log_complete))
-    return (*track_findings(requirements, aligned), *at_end)
+    at_end = tuple(item for judge in ends for item in judge(requirements, aligned, ended, log_complete))
+    return (*unflyable_items(requirements.setup), *_judged(requirements, aligned, at_end, geometric=False))
 
 
-def _judged(requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool) -> tuple[Finding, ...]:
+def _judged(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, at_end: Sequence[Finding], *, geometric: bool
+) -> tuple[Finding, ...]:
+    """Findings of all rules, and then those of how the flight ended, merged."""
     findings: tuple[Finding, ...] = tuple(
         item
         for rule in RULES.values()
         if rule.judge is not None
         for item in rule.judge(requirements, aligned, geometric=geometric)
     )
+    findings = (*findings, *at_end)
     for rule in RULES.values():
         if rule.merge is not None:
             findings = rule.merge(requirements, aligned, findings)

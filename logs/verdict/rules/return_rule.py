@@ -7,7 +7,11 @@ area, speed, stall and energy are judged on it as on every other leg.
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from flight.mission.items import Command
+from flight.mission.itinerary import UNLIMITED
+from flight.simulation.tick import AT_HEIGHT, NEAR
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -20,24 +24,61 @@ _OF_LEGS = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 def return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a mission that ends with a return to launch: where to and how, and whether it got there."""
+    """Where a planned return to launch goes and how, and whether that of an imported flight got to its end.
+
+    How planfly's own flights ended is known beside their track: `flown_return_findings` judges them.
+    """
+    if geometric:
+        return _finding(requirements, None, "not flown yet")
+    if requirements.setup.source is None:
+        return []
+    return _flown(requirements, aligned is not None and bool(aligned.passed[-1]) and circled(requirements, aligned))
+
+
+def flown_return_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
+) -> list[Finding]:
+    """Where a flown return to launch goes and how, and whether it got there.
+
+    ended: "completed", which is no sooner than it has circled, or what stopped it.  log_complete: told by completion.
+    """
+    arrived = aligned is not None and bool(aligned.passed[-1]) and ended == "completed"
+    why = "" if ended == "completed" else f": {ended}"
+    return _flown(requirements, arrived, why)
+
+
+def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
+    """Whether a track has been at its return's circle for as long as that is flown, from when it had come to it.
+
+    It has come there near its middle and at its height, as for a simulated flight (`flight.simulation.tick.NEAR`).
+    """
+    end = requirements.setup.route.return_to
+    if end is None:
+        return False
+    track = aligned.track
+    east, north, up = (track.position - (end.east, end.north, end.up)).T
+    there = (np.hypot(east, north) < max(NEAR, 2.0 * abs(end.radius))) & (np.abs(up) < AT_HEIGHT)
+    return bool(there.any()) and float(track.time[-1] - track.time[int(np.argmax(there))]) >= UNLIMITED
+
+
+def _flown(requirements: RouteRequirements, arrived: bool, why: str = "") -> list[Finding]:
+    outcome = "flown to its end" if arrived else f"the flight did not get to its end{why}"
+    return _finding(requirements, True if arrived else None, outcome)
+
+
+def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
+    """One finding of a mission that ends with a return to launch."""
     route = requirements.setup.route
     if route.return_from < 0:
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     told = next((note.partition(name)[2] for note in route.notes if name in note), "")
-    ok: bool | None = True
-    facts = [f"by {requirements.setup.autopilot.title}'s law: {told}"]
-    if not geometric:
-        reached = aligned is not None and bool(aligned.passed[-1])
-        ok = True if reached else None
-        facts.append("flown to its end" if reached else "the flight did not get to its end")
     return [
         make_finding(
             "return",
             requirements.waypoint(route.return_from + 1),
             ok=ok,
-            reason="; ".join(facts),
+            reason=f"by {requirements.setup.autopilot.title}'s law: {told}; {outcome}",
             method="the autopilot's own way back",
         )
     ]
@@ -46,7 +87,10 @@ def return_findings(
 def without_style(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Findings without those that hold the way back to its drawing."""
+    """Findings without those that hold the way back to its drawing.
+
+    findings: with that of the return itself.
+    """
     first = requirements.setup.route.return_from
     if first < 0:
         return tuple(findings)
@@ -59,7 +103,7 @@ def without_style(
         for item in findings
         if not ((item.rule in _OF_LEGS and item.place in places) or (item.rule == "turn" and item.place == corner))
     ]
-    if aligned is None or not aligned.passed[-1]:
+    if aligned is None or not any(item.rule == "return" and item.ok for item in kept):
         return tuple(kept)
     # All of the way is on some leg, and one that is drawn and has nothing of it was none.
     unflown = {requirements.leg(i) for i in range(first, requirements.legs) if not aligned.flew(i)}
@@ -72,5 +116,6 @@ RULE = Rule(
     asks="Where does the return to launch go, how, and did the flight get there?",
     margin=None,
     judge=return_findings,
+    judge_end=flown_return_findings,
     merge=without_style,
 )

@@ -19,7 +19,8 @@ from logs.recording.recorder import Recorder
 from logs.verdict.findings import Verdict, make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.rules.return_rule import without_style
+from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.rules.return_rule import circled, without_style
 from logs.views.replay.timeline import timeline
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
@@ -85,10 +86,12 @@ def test_a_drawn_leg_that_holds_nothing_of_the_way_says_nothing_once_the_way_was
     unflown = [
         make_finding("clearance", requirements.leg(leg), ok=None, reason="the leg was not flown") for leg in (0, 3, 4)
     ]
-    for arrived, left in ((True, [0, 4]), (False, [0, 3, 4])):
-        aligned: Any = SimpleNamespace(passed=np.array([True, arrived]), flew=lambda leg: leg == 4)
-        kept = without_style(requirements, aligned, unflown)
-        assert [item.place.index for item in kept] == left
+    # Beside its target it may have ended in the ground.
+    aligned: Any = SimpleNamespace(passed=np.array([True, True]), flew=lambda leg: leg == 4)
+    for arrived, left in ((True, [0, 4]), (None, [0, 3, 4]), (False, [0, 3, 4])):
+        end = make_finding("return", requirements.waypoint(2), ok=arrived, reason="")
+        kept = without_style(requirements, aligned, [*unflown, end])
+        assert [item.place.index for item in kept if item.rule == "clearance"] == left
 
 
 def test_the_waypoint_before_a_return_is_reached_as_at_a_missions_end() -> None:
@@ -133,3 +136,41 @@ def test_a_return_that_meets_a_ridge_has_not_got_to_its_end() -> None:
     assert of(verdict, "return").ok is None
     assert "did not get to its end" in of(verdict, "return").reason
     assert not verdict.flyable
+
+
+@pytest.mark.parametrize("hill", [Peak(60.0, 0.0, 600.0, 60.0), Peak(-100.0, 0.0, 600.0, 80.0)])
+def test_a_return_that_meets_a_hill_at_home_has_not_got_to_its_end(hill: Peak) -> None:
+    setup = by_arduplane(setup_of(*WAY, home=HOME))
+    ground = peaks_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), [hill], 100.0)
+    verdict, ended = flown(setup.in_scenario(replace(setup.scenario, terrain=ground)))
+    assert ended == "ground contact"
+    assert of(verdict, "return").ok is None
+    assert "did not get to its end: ground contact" in of(verdict, "return").reason
+
+
+def test_a_return_with_an_empty_battery_has_not_got_to_its_end() -> None:
+    setup = by_arduplane(setup_of(*WAY, home=HOME))
+    setup = replace(setup, battery=0.02 * setup.battery)
+    verdict, ended = flown(setup)
+    assert ended == "nothing is left in the battery or the tank"
+    assert of(verdict, "return").ok is None
+
+
+def test_a_planned_return_is_told_and_not_judged() -> None:
+    setup = by_arduplane(setup_of(*WAY, home=HOME))
+    found = of(judge_geometry(setup), "return")
+    assert found.ok is None
+    assert "sinking 200 m on a straight slope" in found.reason
+    assert "not flown yet" in found.reason
+
+
+@pytest.mark.parametrize(("seconds", "arrived"), [(0.0, True), (-30.0, False)])
+def test_an_imported_return_has_circled_at_its_height(seconds: float, arrived: bool) -> None:
+    # Of an imported flight nobody knows how it ended but by its rows.
+    setup = by_arduplane(setup_of(*WAY, home=HOME))
+    done = simulate(setup, load_aircraft("aerosonde"))
+    rows = done.track.rows(0, len(done.track) + round(seconds / float(done.track.time[1] - done.track.time[0])))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, rows)
+    assert aligned is not None
+    assert circled(requirements, aligned) is arrived
