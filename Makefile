@@ -17,10 +17,11 @@ LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/fligh
 # What pyproject.toml names.
 DIRECT := ^(cryptography|dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
 	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
-# Bytecode is made on all cores; pip makes it on one.  What cannot be compiled is no module, but a template.
+# Bytecode is made on all cores, but of other packages' own tests; pip makes it on one.  What cannot be compiled is no
+# module, but a template.
 define INSTALL
 	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.$(EXTRAS)'
-	$(BIN)/python -W ignore -m compileall -qq -j 0 $(VENV)/lib || true
+	$(BIN)/python -W ignore -m compileall -qq -j 0 -x '/tests/' $(VENV)/lib || true
 endef
 EXTRAS :=
 # What is installed: an environment that is made; planfly; what the pages take, too; what the tests take, too.
