@@ -65,6 +65,7 @@ class ReturnRules:
     climb_first: height that it gains before it turns with all its bank, m; inf for all that is missing, 0 for none.
     first_bank: bank limit meanwhile, rad.
     sink: fastest descent, m/s.
+    least_slope: m; a slope that falls less is flown as a step, at once.
     rally_limit: m; a nearest rally point further away than this is not flown to; 0 for no limit.
     includes_home: whether home counts where it is nearer than every rally point.
     slope_to_stated_height: whether the slope down to a rally point is drawn to its height over home as if that were a
@@ -80,6 +81,7 @@ class ReturnRules:
     climb_first: float = 0.0
     first_bank: float = math.radians(5.0)
     sink: float = math.inf
+    least_slope: float = 15.0
     rally_limit: float = 5000.0
     includes_home: bool = False
     slope_to_stated_height: bool = False
@@ -164,6 +166,8 @@ def described_return(target: ReturnTarget, rules: ReturnRules, up: float) -> str
     rise = target.position[2] - up
     reason = f" ({target.reason})" if target.reason else ""
     way = f"sinking {-rise:.0f} m on a straight slope to" if rise <= -1.0 else f"climbing {rise:.0f} m at once to"
+    if -rise >= 1.0 and abs(target.slope_base - rise) < rules.least_slope:
+        way = f"sinking {-rise:.0f} m at once to"
     if abs(rise) < 1.0:
         way = "at"
     first = ""
@@ -190,14 +194,16 @@ def lay_return(
     stop: the return's.
 
     The turn goes the short way.  Heights of a descent are on the straight slope from where the turn begins to the
-    target, by the place along that line, no steeper than the aircraft can; a climb begins at once.  What is missing at
-    the circle is climbed or sunk there, and then the circle is flown for `flight.mission.itinerary.UNLIMITED` s.
+    target, by the place along that line, no steeper than the aircraft can; a climb or a small fall begins at once.
+    What is missing at the circle is climbed or sunk there, and then the circle is flown for
+    `flight.mission.itinerary.UNLIMITED` s.
     """
     here = before[-1].position
     course = _course(before[-2].position, here) if len(before) > 1 else _course(here, target.position)
     radius = math.copysign(max(abs(rules.radius), ability.circle), rules.radius)
     circle = Node(stop, *target.position, radius)
-    plan = _Plan(circle, target.slope_base, ability, min(ability.dive, rules.sink / ability.airspeed), here)
+    dive = min(ability.dive, rules.sink / ability.airspeed)
+    plan = _Plan(circle, target.slope_base, rules.least_slope, ability, dive, here)
     if _distance(here, target.position) <= abs(radius) + _NO_TURN:
         # So near that it is on the circle as soon as it is across it.
         plan.circle_from(*_rim_ahead(here, course, circle))
@@ -213,11 +219,17 @@ class _Plan:
     at: the last place.  slope_from: where the slope begins.
     """
 
-    def __init__(self, circle: Node, slope_base: float, ability: ReturnAbility, dive: float, here: Place) -> None:
+    def __init__(
+        self, circle: Node, slope_base: float, least_slope: float, ability: ReturnAbility, dive: float, here: Place
+    ) -> None:
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
-        self._ability, self._dive = ability, dive
+        self._least_slope, self._ability, self._dive = least_slope, ability, dive
         self._at = self._slope_from = here
+
+    @property
+    def _is_step(self) -> bool:
+        return abs(self._slope_from[2] - self._circle.up + self._slope_base) < self._least_slope
 
     @property
     def _rise(self) -> float:
@@ -262,11 +274,13 @@ class _Plan:
         self.circle_from(*on_rim(self._circle, onward), onward)
 
     def _straight(self, onward: float) -> None:
-        """A waypoint where a climb ends on the straight way, or where a height that is held first begins to fall."""
+        """A waypoint where a climb or a step ends on the straight way, or where a height held first begins to fall."""
         join = on_rim(self._circle, onward)
         run = math.hypot(join[0] - self._at[0], join[1] - self._at[1])
         if self._rise > 0.0:
             needed = self._rise / self._ability.climb
+        elif self._is_step:
+            needed = -self._rise / self._dive
         else:
             fall = self._slope_from[2] - self._circle.up
             begins = self._slope_base / max(1e-6, fall + self._slope_base)
@@ -322,8 +336,10 @@ class _Plan:
         self.points.append(RoutePoint(self._stop, self._at, arc))
 
     def _on_slope(self, east: float, north: float) -> float:
-        """Height of the straight slope to the target beside a place."""
+        """Height of the straight slope to the target beside a place, or that of its end where it is a step."""
         start, end = self._slope_from[2], self._circle.up
+        if self._is_step:
+            return end
         left = 1.0 - min(1.0, max(0.0, self._share(east, north)))
         return min(start, end + left * (start - end + self._slope_base))
 

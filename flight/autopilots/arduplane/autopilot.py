@@ -111,7 +111,7 @@ class ArduPlane(Autopilot):
 
     @property
     def return_rules(self) -> ReturnRules:
-        """By RTL_ALTITUDE, RTL_RADIUS, RTL_CLIMB_MIN, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_SINK_MAX.
+        """By RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_SINK_MAX and GLIDE_SLOPE_MIN.
 
         >>> made = ArduPlane(default_parameters().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16))
         >>> made.return_rules.height, made.return_rules.climb_first, made.return_rules.rally_limit
@@ -124,6 +124,7 @@ class ArduPlane(Autopilot):
             climb_first=math.inf if made.climbs_before_turn else made.rtl_climb_min,
             first_bank=min(made.level_roll_limit, made.roll_limit),
             sink=made.tecs_sink_max or math.inf,
+            least_slope=made.glide_slope_min,
             rally_limit=made.rally_limit,
             includes_home=made.rally_includes_home > 0.0,
             slope_to_stated_height=True,

@@ -197,6 +197,20 @@ def test_a_target_near_by_is_circled_whatever_the_course(away: float, course: fl
     assert way[-1, 2] == 450.0
 
 
+def test_a_small_fall_is_a_step_at_once() -> None:
+    # 14 m at 0.08 are 175 m; 16 m are a slope of 8 km.
+    way, arcs = laid(0.0, (0.0, 8000.0, 486.0))
+    down = way[(arcs == 0.0) & (way[:, 2] == 486.0)][0]
+    assert down[1] == pytest.approx(14.0 / 0.08, abs=20.0)
+    # What counts is the slope that is drawn.
+    lower = ReturnRules(least_slope=10.0)
+    for up, rules, base in ((484.0, USUAL_RULES, 0.0), (486.0, lower, 0.0), (486.0, USUAL_RULES, 5.0)):
+        slope, _ = laid(0.0, (0.0, 8000.0, up), rules, base)
+        assert not ((slope[:, 1] < 7000.0) & (slope[:, 2] < up + 2.0)).any()
+    step = choose_target(ReturnRules(), (0.0, 6000.0, 414.0), HOME, [])
+    assert "sinking 14 m at once to 400 m AMSL" in described_return(step, ReturnRules(), 414.0)
+
+
 # ----------------------------------------------------------------------
 # In a route.
 
