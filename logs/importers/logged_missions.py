@@ -1,6 +1,6 @@
 """What several formats hold alike: missions, ArduPlane's parameters and flight modes, by the names of any release."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -41,8 +41,8 @@ class LoggedItems(NamedTuple):
 def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
     """Missions that items, in the order of the log, come to.
 
-    Items from number 0 on are a mission anew.  An item alone is one that is flown if it is as it was, and else one that
-    was changed.  A mission that is logged twice, each time in part, is one.
+    Items from number 0 on are a mission anew, also where some are lost behind it.  An item alone is one that is flown
+    if it is as it was, and else one that was changed.  A mission that is logged twice, each time in part, is one.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> logged = [Item(1.0, 3, way[0]), Item(1.0, 3, way[1]), Item(1.0, 3, way[2]), Item(9.0, 3, way[1])]
@@ -54,13 +54,14 @@ def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
     totals: list[int] = []
     ordered = list(rows)
     for k, (time, total, item, begins) in enumerate(ordered):
-        follows = k + 1 < len(ordered) and ordered[k + 1].item.seq == 1
-        if not found or begins or (item.seq == 0 and follows and len(found[-1][1]) > 1):
+        following = ordered[k + 1].item if k + 1 < len(ordered) else None
+        if not found or begins or (item.seq == 0 and len(found[-1][1]) > 1 and _is_of_another(following, found[-1][1])):
             found.append((time, {}))
         elif item.seq in found[-1][1] and not _same(found[-1][1][item.seq], item):
             found.append((time, dict(found[-1][1])))
         found[-1][1][item.seq] = item
-        totals = [*totals, *[0] * (len(found) - len(totals))]
+        if len(totals) < len(found):
+            totals.append(0)
         totals[-1] = total or totals[-1]
     out: list[LoggedItems] = []
     for (start, items), total in zip(found, totals, strict=True):
@@ -73,12 +74,22 @@ def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
     return out
 
 
+def _is_of_another(following: MissionItem | None, known: Mapping[int, MissionItem]) -> bool:
+    """Whether what follows an item 0 shows that a mission begins with it: item 1, or one that is not known as it is."""
+    if following is None or following.seq == 0:
+        return False
+    return following.seq == 1 or following.seq not in known or not _same(known[following.seq], following)
+
+
 def _are_one(one: LoggedItems, other: LoggedItems) -> bool:
-    """Whether two are the same mission: item by item; or where the same number is announced, in the items of both."""
+    """Whether two are the same mission: item by item; or where the same number is announced, in the items of both.
+
+    Home, item 0, is the same in all that is flown from a place: it alone in common tells nothing.
+    """
     known = {item.seq: item for item in one.items}
     common = [item for item in other.items if item.seq in known]
     whole = len(common) == len(one.items) == len(other.items)
-    announced = one.total == other.total > 0 and bool(common)
+    announced = one.total == other.total > 0 and any(item.seq > 0 for item in common)
     return (whole or announced) and all(_same(known[item.seq], item) for item in common)
 
 
@@ -92,7 +103,7 @@ def _content(item: MissionItem) -> tuple[object, ...]:
 
 
 def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
-    """The mission of logged items, the first of number 0 being home; None where it has fewer than two.
+    """The mission of logged items, the first of number 0 being home; None where that is all, or all but one item.
 
     An item that no autopilot could make sense of is left out and told.  Where items are missing, the mission is the
     longest run of items without a gap.
@@ -145,7 +156,7 @@ def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission |
 
     total: how many items it is said to have, 0 where that is not known.  end: the number of its last item, as far as
     that is known.
-    None for a mission of fewer than two items.
+    None for a whole mission of fewer than two items; of one that is not whole, even none may be left.
     """
     held = {item.seq for item in logged.mission.items}
     missing = tuple(sorted(set(range(1, end + 1)) - held))
@@ -168,12 +179,15 @@ def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
 
 
 def _before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """The items of a run before the first jump to an item that is not in it."""
-    held = {float(item.seq) for item in run}
-    for k, item in enumerate(run):
-        if item.command == Command.DO_JUMP and item.params[0] not in held:
-            return run[:k]
-    return run
+    """The items of a run before the first jump to an item that is not among them."""
+    at = {float(item.seq): k for k, item in enumerate(run)}
+    end = len(run)
+    jumps = [(at.get(item.params[0], end), k) for k, item in enumerate(run) if item.command == Command.DO_JUMP]
+    # The farthest first: what one cuts off, those behind it in this order may lead to.
+    for target, k in sorted(jumps, reverse=True):
+        if target >= end:
+            end = min(end, k)
+    return run[:end]
 
 
 # ----------------------------------------------------------------------

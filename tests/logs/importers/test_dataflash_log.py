@@ -8,7 +8,7 @@ import pytest
 
 from flight.mission.items import Home
 from logs.importers.dataflash_log import read_dataflash
-from logs.importers.raw_log import example_raw_log
+from logs.importers.raw_log import LoggedMission, example_raw_log
 from tests.logs.importers.pymavlink_rows import FLIGHTS, mission_lines, read_rows
 from tests.logs.importers.written_logs import DataflashWriter, dataflash
 from world.errors import LogError
@@ -165,3 +165,37 @@ def test_equivalent_airspeeds_become_true_ones_by_height_where_no_ratio_is_logge
     raw = read_dataflash(dataflash(tmp_path / "a.BIN", example_raw_log(up=3000.0), leave_out=["CTUN"]))
     # The standard atmosphere at 3,000 m has 0.7422 of the density at the sea.
     assert raw.series["airspeed"].values[0, 0] == pytest.approx(24.4 / math.sqrt(0.7422), rel=1e-3)
+
+
+# ----------------------------------------------------------------------
+# Numbers that no autopilot writes: of a hostile log, or of garbage that looks like a message.
+
+COMMAND_COLUMNS = "TimeUS,CTot,CNum,CId,Prm1,Prm2,Prm3,Prm4,Lat,Lng,Alt,Frame"
+
+
+def missions_of(path: Path, rows: list[tuple[float, float, float]]) -> list[LoggedMission]:
+    """Missions of a log whose messages CMD have these counts, numbers and commands, as doubles."""
+    out = DataflashWriter()
+    for total, number, command in rows:
+        place = (0.0, 0.0, 0.0, 0.0, 46.0, 8.0, 100.0, 3)
+        out.message("CMD", "QdddffffLLfB", COMMAND_COLUMNS, 0, total, number, command, *place)
+    out.message("POS", "QLLff", "TimeUS,Lat,Lng,Alt,RelHomeAlt", 0, 46.0, 8.0, 500.0, 0.0)
+    path.write_bytes(bytes(out.data))
+    return list(read_dataflash(path).missions)
+
+
+@pytest.mark.parametrize("total", [4e6, -1.0, math.nan, math.inf])
+def test_a_count_that_cannot_be_is_none(tmp_path: Path, total: float) -> None:
+    (logged,) = missions_of(tmp_path / "a.BIN", [(total, k, 16.0) for k in range(4)])
+    assert [item.seq for item in logged.mission.items] == [1, 2, 3]
+    assert logged.missing is None
+
+
+@pytest.mark.parametrize(
+    ("number", "command"), [(4e6, 16.0), (-2.0, 16.0), (math.nan, 16.0), (math.inf, 16.0), (3.0, math.nan)]
+)
+def test_an_item_whose_number_or_command_cannot_be_is_left_out(tmp_path: Path, number: float, command: float) -> None:
+    rows = [*((0.0, float(k), 16.0) for k in range(3)), (0.0, number, command)]
+    (logged,) = missions_of(tmp_path / "a.BIN", rows)
+    assert [item.seq for item in logged.mission.items] == [1, 2]
+    assert logged.missing is None

@@ -53,6 +53,20 @@ def test_a_second_upload_whose_first_items_are_lost_is_not_mixed_with_the_first(
     assert [one.items for one in found] == [tuple(WAY), tuple(moved[2:])]
 
 
+@pytest.mark.parametrize("begins", [False, True])
+def test_a_mission_elsewhere_of_as_many_items_and_the_same_home_is_another(begins: bool) -> None:
+    """Of the first the end is lost, of the second the beginning: but for home they have no item in common."""
+    way = [replace(WAY[0], seq=k) for k in range(6)]
+    north = [replace(item, lat_deg=47.0) for item in way[4:]]
+    rows = [*items(1.0, way[:3], 6), Item(50.0, 6, way[0], begins=begins), *items(50.0, north, 6)]
+    assert [one.items for one in gather_items(rows)] == [tuple(way[:3]), (way[0], *north)]
+
+
+def test_a_home_that_is_logged_again_begins_no_mission() -> None:
+    (found,) = gather_items([*items(1.0, WAY), Item(30.0, 4, WAY[0]), Item(30.0, 4, WAY[2]), Item(60.0, 4, WAY[0])])
+    assert found.items == tuple(WAY)
+
+
 def test_items_that_no_autopilot_takes_are_left_out_and_told() -> None:
     way = [replace(WAY[0], seq=k, lat_deg=46.0 + 0.01 * k) for k in range(6)]
     made = made_of([*way[:2], replace(way[2], lat_deg=95.0), *way[3:]], 6)
@@ -99,6 +113,17 @@ def test_a_run_ends_before_a_jump_out_of_it() -> None:
     assert made is not None
     assert made.missing == MissingItems((8, 9), total=10, first=1, last=4, end=9)
     assert len(made.mission.items) == 4
+
+
+def test_a_run_ends_before_a_jump_to_what_was_cut() -> None:
+    """Items 1 to 6 of 12: item 5 jumps out of them, and item 3 to item 6, which is cut off with it."""
+    way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + 0.01 * k, 8.0, 75.0) for k in range(7)]
+    for k, target in ((3, 6.0), (5, 9.0)):
+        way[k] = MissionItem(k, int(Command.DO_JUMP), 2, (target, 1.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    made = made_of(way, 12)
+    assert made is not None
+    assert [item.seq for item in made.mission.items] == [1, 2]
+    assert made.missing == MissingItems(tuple(range(7, 12)), total=12, first=1, last=2, end=11)
 
 
 def test_a_home_that_is_not_in_the_log_is_told() -> None:
