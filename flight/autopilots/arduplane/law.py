@@ -157,6 +157,8 @@ def navigate_legs(
     if not reached or own.leg + 2 >= waypoints.shape[0]:
         return
     own.leg += 1
+    # The next circle is another one, though a return's height is asked for before it is flown to.
+    own.on_circle = False
     after = waypoints[own.leg + 1]
     own.from_east, own.from_north, own.from_up = b.east, b.north, b.up
     if after.circle == 0.0 and past_line(estimated, b.east, b.north, after):

@@ -127,6 +127,18 @@ def test_the_circle_is_flown_at_the_targets_height_and_grows_with_height() -> No
     assert own.side_acceleration == pytest.approx(-(25.0**2) / (200.0 * 1.05**2))
 
 
+def test_after_a_loiter_the_slope_begins_at_its_top() -> None:
+    # At the corner of the loiter's circle where it is left: the return has a circle of its own, 4 km away.
+    way = waypoints((-60.0, -60.0, 500.0), (0.0, 0.0, 500.0), (EAST, NORTH, 100.0))
+    for name, loiter, ahead in (("centre_east", 120.0, EAST), ("centre_north", 0.0, NORTH), ("circle", 120.0, 60.0)):
+        way[name][:2], way[name][2] = loiter, ahead
+    way["returns"][2] = True
+    here = flying(0.0, 1.0)
+    own = navigated(memory(), here, way)
+    assert own.leg == 1
+    assert asked(own, here, way) > 499.0
+
+
 def test_it_banks_little_before_it_has_climbed_what_it_has_to() -> None:
     most = GRAVITY * math.tan(math.radians(5.0))
     way = back(700.0)
