@@ -110,10 +110,13 @@ def _return_places(
     home = ReturnPlace(float(east), float(north), heights.home_amsl())
     places = [home]
     stops = rally_stops(mission)
-    for stop, (point_east, point_north) in zip(stops, on_map(mission.source, stops, origin).tolist(), strict=True):
+    numbers = [number for number, item in enumerate(mission.rally, 1) if item.has_position]
+    points = on_map(mission.source, stops, origin).tolist()
+    for number, stop, (point_east, point_north) in zip(numbers, stops, points, strict=True):
         # Ground stations have no rally point without a height: one is home's.
         up = heights.amsl(stop, point_east, point_north, home.up)
-        places.append(ReturnPlace(point_east, point_north, up, home.up if stop.frame in OVER_HOME else 0.0))
+        base = home.up if stop.frame in OVER_HOME else 0.0
+        places.append(ReturnPlace(point_east, point_north, up, base, number))
     return tuple(places)
 
 

@@ -26,12 +26,14 @@ class ReturnPlace(NamedTuple):
 
     east, north, up: m, AMSL; home's height is that of its ground.
     base: height that its own counts from as it is stated, m AMSL: home's, or 0 for one above the sea.
+    number: a rally point's, counted from 1 as they stand in the file; 0 where nobody counted.
     """
 
     east: float
     north: float
     up: float
     base: float = 0.0
+    number: int = 0
 
 
 class ReturnCircle(NamedTuple):
@@ -145,7 +147,7 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
         return go_home
     nearest = min(range(len(rally)), key=lambda k: _distance(here, rally[k]))
     away = _distance(here, rally[nearest])
-    name = f"rally point {nearest + 1}"
+    name = f"rally point {rally[nearest].number or nearest + 1}"
     if 0.0 < rules.rally_limit < away:
         reason = f"{name}, the nearest, is {_km(away)} away, beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
         return go_home._replace(reason=reason)
@@ -171,9 +173,11 @@ def described_return(target: ReturnTarget, rules: ReturnRules, up: float) -> str
     if abs(rise) < 1.0:
         way = "at"
     first = ""
-    if rules.climb_first > 0.0 and not (math.isinf(rules.climb_first) and rise <= 0.0):
+    if rules.climb_first > 0.0 and not (math.isinf(rules.climb_first) and rise < -1.0):
         bank = math.degrees(rules.first_bank)
         first = f"; banks no more than {bank:.0f} degrees before it has climbed {min(rules.climb_first, rise):.0f} m"
+        if math.isinf(rules.climb_first) and rise <= 1.0:
+            first = f"; banks no more than {bank:.0f} degrees until it is above that height"
         if rise < rules.climb_first < math.inf:
             first = (
                 f"; banks no more than {bank:.0f} degrees all the way, as it never climbs the"

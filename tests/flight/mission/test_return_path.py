@@ -79,6 +79,10 @@ def test_why_it_goes_there_is_said() -> None:
     assert "climbing 20 m at once to 400 m AMSL; banks no more than 5 degrees all the way" in told
     assert "before it has climbed 20 m" in described_return(climb, ReturnRules(climb_first=math.inf), 380.0)
     assert "banks" not in described_return(far, ReturnRules(climb_first=math.inf), 900.0)
+    # At its height already, give or take what a height is known to: how long it banks little is anybody's guess.
+    for up in (399.6, 400.0, 400.4):
+        level = described_return(climb, ReturnRules(climb_first=math.inf), up)
+        assert "at 400 m AMSL; banks no more than 5 degrees until it is above that height;" in level
 
 
 # ----------------------------------------------------------------------
@@ -229,6 +233,15 @@ def test_a_route_goes_back_where_its_rules_say() -> None:
     assert flown.return_to is not None
     assert flown.return_to[:4] == pytest.approx((0.0, 0.0, 400.0, 80.0), abs=0.01)
     assert flown.waypoints[-1, 2] == pytest.approx(400.0, abs=0.01)
+
+
+def test_a_rally_point_is_named_by_its_place_in_the_file() -> None:
+    # The first, at 0, 0, is none.
+    nowhere = "3 5100 0 0 0 0 0 0 90"
+    flown = route(wp(0, 3000, 400), wp(2000, 3000, 400), RTL, nowhere, rally_line(2000, 2000, 90))
+    assert any("to rally point 2, 1.0 km away (the nearest rally point)" in note for note in flown.notes), flown.notes
+    two = route(wp(0, 3000), wp(2000, 3000), RTL, nowhere, rally_line(-5000, 0, 90), rally_line(2000, 2000, 90))
+    assert any("to rally point 3, 1.0 km away (the nearest of 2 rally points)" in note for note in two.notes), two.notes
 
 
 def test_a_speed_that_was_set_does_not_count_on_the_way_back() -> None:
