@@ -11,7 +11,7 @@ import math
 import os
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -92,7 +92,7 @@ def same_flight(one: FlightRow, other: FlightRow) -> bool:
 # ----------------------------------------------------------------------
 # The file: made or opened to go on, locked by one process, and refused where it holds something else.
 
-# Flights of a table whose settings do not say how many it may have.
+# Flights of a table whose settings do not say how many it may have, and of a broken one beyond what they say.
 _MOST = 100_000
 
 
@@ -161,6 +161,8 @@ class LockedTable:
         run = self._connection.execute
         for statement in self._create():
             run(statement)
+        # Before the new settings are written: those of a refused question would stay.
+        self._refuse_more(settings)
         values = {
             "schema": self._kind.schema,
             "made_of": self.made_of,
@@ -210,7 +212,8 @@ class LockedTable:
 
     def _mend(self, known: dict[str, str]) -> None:
         """Keep the flights that are whole, and say which are not; the file is made anew then."""
-        most = json.loads(known["settings"]).get("flights", _MOST)
+        # A search may have been asked for fewer flights than are there: those beyond are kept, too.
+        most = max(json.loads(known["settings"]).get("flights", _MOST), self._last() + 1)
         examined = examine(self._connection, tuple(self._kind.columns), most)
         if examined.sound and not examined.damaged:
             return
@@ -223,6 +226,22 @@ class LockedTable:
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
         self._hold()
         say(f"{self.path}: {examined.text()}")
+
+    def _last(self) -> int:
+        """The largest number of a flight that can be read, one after the other; -1 for none."""
+        last = -1
+        for order in ("", " DESC"):
+            with suppress(sqlite3.Error, UnicodeDecodeError):
+                for (number,) in self._connection.execute(f"SELECT flight FROM flights ORDER BY flight{order}"):
+                    # That of a damaged page may be any.
+                    if isinstance(number, int) and number < _MOST:
+                        last = max(last, number)
+                        if order:
+                            break
+        return last
+
+    def _refuse_more(self, settings: Mapping[str, Any]) -> None:
+        """Refuse more flights than may be there.  Raises StoreError."""
 
     def __enter__(self) -> Self:
         """Hold it."""
@@ -352,8 +371,13 @@ class Store(LockedTable):
     """A campaign's table, held by one process at a time; a flight's number is its draw's index."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Make the table, or open it to go on; as `LockedTable`."""
+        """Make the table, or open it to go on; as `LockedTable`, and never for fewer flights than are there."""
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
+
+    def _refuse_more(self, settings: Mapping[str, Any]) -> None:
+        if (flown := self.tally().flown) > settings.get("flights", math.inf):
+            words = f"flights {settings['flights']}: {flown} have been flown there"
+            raise StoreError(f"{self.path}: {words}", file=self.path)
 
     def add(self, row: FlightRow) -> None:
         """Write a flight, for good.  Raises OSError for a full disk; what was written before stays."""

@@ -19,7 +19,7 @@ from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
 from planfly.campaigns.summary import summarise
-from planfly.campaigns.tables import DATABASE, StoreError, read_table
+from planfly.campaigns.tables import DATABASE, StoreError, kept_settings, read_table
 from planfly.campaigns.worker_pool import FlightRequest, FlyOne, WorkerPool, Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
@@ -147,6 +147,9 @@ def test_fewer_flights_than_were_flown_are_refused_and_none_is_lost(base: Campai
     with pytest.raises(StoreError, match="flights 4: 5 have been flown there"):
         open_store(base, Goal(None, False, 4), tmp_path, resume=True)
     assert table(tmp_path / DATABASE) == before
+    # Nor are the refused question's settings kept.
+    assert kept_settings(tmp_path / DATABASE)["flights"] == 5
+    assert resumed_goal(None, tmp_path) == Goal(None, False, 5)
     with open_store(base, Goal(None, False, 5), tmp_path, resume=True) as store:
         assert store.tally().flown == 5
 

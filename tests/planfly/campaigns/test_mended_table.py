@@ -1,5 +1,6 @@
 """Damaged tables: no traceback, no row but those that were written, and what is missing is flown again."""
 
+import json
 import math
 import random
 import shutil
@@ -151,6 +152,22 @@ def test_a_changed_field_takes_its_row_out_and_no_other(kept: Kept, tmp_path: Pa
             connection.execute(f"UPDATE flights SET {name} = ? WHERE flight = ?", (other, number))
         with kept.opened(path) as store:
             assert kept.read(store) == {k: row for k, row in kept.rows.items() if k != number}, (name, other)
+
+
+def test_flights_beyond_those_last_asked_for_are_kept_where_a_file_is_broken(kept: Kept, tmp_path: Path) -> None:
+    path = tmp_path / "c.sqlite"
+    shutil.copy(kept.path, path)
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        known = dict(connection.execute("SELECT key, value FROM campaign"))
+        known["settings"] = json.dumps(json.loads(known["settings"]) | {"flights": 3})
+        known["checksum"] = checksum(known[name] for name in ("schema", "made_of", "settings"))
+        connection.executemany("UPDATE campaign SET value = ? WHERE key = ?", [(v, k) for k, v in known.items()])
+    data = bytearray(path.read_bytes())
+    # How many pages are free, of which there are none (SQLite, Database File Format, 1.3).
+    data[39] += 5
+    path.write_bytes(data)
+    with kept.opened(path) as store:
+        assert kept.read(store) == kept.rows
 
 
 @pytest.mark.parametrize("key", ["settings", "made_of", "checksum"])
