@@ -47,6 +47,20 @@ def test_a_fault_of_our_own_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> No
         main(["scenarios"])
 
 
+@pytest.mark.parametrize(
+    ("said", "told"), [("std::bad_alloc", ""), ("", ""), ("Unable to allocate 9 GiB", ": Unable to allocate 9 GiB")]
+)
+def test_too_little_memory_is_one_line(
+    said: str, told: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: object) -> int:
+        raise MemoryError(*([said] if said else []))
+
+    monkeypatch.setattr("planfly.cli.find_command", lambda _name: fail)
+    assert main(["scenarios"]) == 1
+    assert capsys.readouterr().err == f"planfly: too little memory{told}\n"
+
+
 def test_the_commands_own_code_is_the_process_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[str] = []
 
