@@ -8,7 +8,11 @@ _FROM, _UNTIL = datetime(1970, 1, 1, tzinfo=UTC), datetime(9999, 12, 31, tzinfo=
 
 
 class Certificate(NamedTuple):
-    """A self-signed certificate and its private key, as PEM text; both in memory alone."""
+    """A self-signed certificate and its private key, as PEM text.
+
+    Both exist in the memory of the run's processes, and, for the moment in which Python's TLS loads them, in a
+    temporary folder that only their user can read.
+    """
 
     certificate: str
     key: str
