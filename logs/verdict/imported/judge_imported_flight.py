@@ -140,11 +140,11 @@ def missing_text(missing: MissingItems) -> str:
     """Which part of a mission is not judged, and which of its items are not in the log, in words.
 
     >>> missing_text(MissingItems(tuple(range(7, 14)), total=14, first=1, last=6, end=13))
-    'not judged beyond item 6: items 7 to 13 of 14 are not in the log'
+    'not judged beyond item 6: items 7 to 13 of 14 are not in the log or left out'
     >>> missing_text(MissingItems((1, 5), total=0, first=2, last=4, end=9))
-    'not judged before item 2 and beyond item 4: items 1 and 5 are not in the log'
+    'not judged before item 2 and beyond item 4: items 1 and 5 are not in the log or left out'
     >>> missing_text(MissingItems((1, 2, 3), total=4, first=0, last=0, end=3))
-    'not judged: items 1 to 3 of 4 are not in the log'
+    'not judged: items 1 to 3 of 4 are not in the log or left out'
     """
     runs: list[list[int]] = []
     for number in missing.numbers:
@@ -161,7 +161,7 @@ def missing_text(missing: MissingItems) -> str:
     where = " and ".join(filter(None, [before, beyond]))
     several = len(missing.numbers) > 1
     of = f" of {missing.total}" if missing.total else ""
-    items = f"{'items' if several else 'item'} {listed}{of} {'are' if several else 'is'} not in the log"
+    items = f"{'items' if several else 'item'} {listed}{of} {'are' if several else 'is'} not in the log or left out"
     return f"not judged{' ' if where else ''}{where}: {items}"
 
 
