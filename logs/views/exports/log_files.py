@@ -24,7 +24,7 @@ from flight.live.telemetry import (
     status_texts,
     telemetry_message,
 )
-from flight.mission.items import OVER_HOME, Home
+from flight.mission.items import OVER_HOME, Home, MissionItem
 from flight.simulation.local_map import LocalMap
 from flight.simulation.track import PITCH, ROLL, THROTTLE, YAW, track_rows
 from logs.recording.reader import FlightLog
@@ -363,7 +363,10 @@ def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
 
 
 def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
-    """navigator_mission_item: each item when it becomes the one that is flown to, and first the one at the start."""
+    """navigator_mission_item: each item when it becomes the one that is flown to, and first the one at the start.
+
+    Items that are no place stand with the next that is one, at 0, 0: a gap in the numbers would be items that are lost.
+    """
     track, items = log.track, {item.seq: item for item in log.setup.mission.items}
     legs, firsts = np.unique(track.leg[rows], return_index=True)
     targets = [(0.0, int(log.setup.route.items[0]))]
@@ -373,7 +376,11 @@ def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
         if 0 <= leg < len(log.setup.route.items) - 1
     ]
     aims = targets if len(rows) else []
-    flown = [(time, items[seq]) for time, seq in aims if seq in items and items[seq].has_position]
+    flown: list[tuple[float, MissionItem]] = []
+    for time, seq in aims:
+        if seq in items and items[seq].has_position:
+            before = flown[-1][1].seq if flown else 0
+            flown += [(time, items[k]) for k in range(before + 1, seq) if k in items] + [(time, items[seq])]
     radii = [item.params[1] for _, item in flown]
     kinds = {
         "sequence_current": "<u2", "nav_cmd": "<u2", "acceptance_radius": "<f4", "latitude": "<f8", "longitude": "<f8",
@@ -381,12 +388,13 @@ def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     }  # fmt: skip
     values = {
         "timestamp": np.array([round(time * 1e6) for time, _ in flown], dtype=np.uint64),
-        "sequence_current": np.array([item.seq for _, item in flown]),
+        # PX4 counts from 0.
+        "sequence_current": np.array([item.seq - 1 for _, item in flown]),
         "nav_cmd": np.array([item.command for _, item in flown]),
         "acceptance_radius": np.nan_to_num(np.array(radii)),
-        "latitude": np.array([item.lat_deg for _, item in flown]),
-        "longitude": np.array([item.lon_deg for _, item in flown]),
-        "altitude": np.array([item.alt for _, item in flown]),
+        "latitude": np.nan_to_num(np.array([item.lat_deg for _, item in flown])),
+        "longitude": np.nan_to_num(np.array([item.lon_deg for _, item in flown])),
+        "altitude": np.nan_to_num(np.array([item.alt for _, item in flown])),
         "altitude_is_relative": np.array([item.frame in OVER_HOME for _, item in flown]),
     }
     return _Topic("navigator_mission_item", _FAST, list(kinds.items()), values)
