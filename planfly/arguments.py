@@ -23,7 +23,7 @@ class Range(NamedTuple):
     def allows(self, value: Any) -> bool:
         """Whether a value is a number in the range; a truth value is none.
 
-        >>> Range(0, 20, "a whole number", whole=True).allows(3), Range(0, 1, "a share").allows(float("nan"))
+        >>> Range(0, 20, "a whole number", integer=True).allows(3), Range(0, 1, "a share").allows(float("nan"))
         (True, False)
         """
         try:

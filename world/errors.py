@@ -5,7 +5,8 @@
     ├── TerrainError    an elevation file
     ├── MissionError    a plan or mission file
     ├── FlightError     an aircraft model or a start condition
-    │   └── StartError  a flight that cannot begin as its mission has it: `fly` makes a verdict of it
+    │   ├── StartError  a flight that cannot begin as its mission has it: `fly` makes a verdict of it
+    │   └── CrashError  a program that steered and failed in flight: the command line ends with 1
     ├── ParameterError  a file of an autopilot's parameters
     ├── LogError        a flight log
     └── ArgumentError   an argument of a call that is out of its range: a ValueError, too

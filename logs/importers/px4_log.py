@@ -41,6 +41,8 @@ _TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp
 _AMSL, _OVER_HOME = 0, 3
 # Degrees, and m, that no home has; each is checked again where the mission is placed.
 _PLACE = np.array([90.0, 180.0, 10_000.0])
+# Numbers of items are 16 bits.
+_MAX_ITEMS = 65_535
 
 
 def read_px4(path: Path) -> RawLog:
@@ -290,13 +292,14 @@ class _Topics:
         for k in range(count):
             number, command, lat, lon, up = (float(data[name][k]) for name in wanted)
             # Before anything is made of them: garbage may be too large for any degrees.
-            if not (abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)):
+            placed = abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)
+            if not (placed and 0.0 <= number < _MAX_ITEMS and math.isfinite(command)):
                 continue
             frame = _OVER_HOME if relative[k] else _AMSL
             params = (0.0, float(radius[k]), 0.0, 0.0)
             place = (on_grid(lat), on_grid(lon), round(up, 6))
             item = MissionItem(int(number), int(command), frame, params, *place)
-            if math.isfinite(number) and item_problem(item) is None:
+            if item_problem(item) is None:
                 items.setdefault(item.seq, item)
         return items
 
@@ -306,7 +309,8 @@ class _Topics:
         if "seq_total" not in data:
             return 0
         before = np.flatnonzero(np.asarray(data["timestamp"], dtype=np.float64) <= stamp)
-        return int(data["seq_total"][before[-1] if before.size else 0])
+        total = float(data["seq_total"][before[-1] if before.size else 0])
+        return int(total) if 0.0 <= total <= _MAX_ITEMS else 0
 
     def _home(self) -> Home | None:
         found = self._table("home_position", ("lat", "lon", "alt"))

@@ -11,6 +11,7 @@ from planfly.cli import main
 from planfly.commands import shell
 from world.errors import (
     ArgumentError,
+    CrashError,
     FlightError,
     LogError,
     MissionError,
@@ -27,7 +28,7 @@ KINDS = (ScenarioError, TerrainError, MissionError, FlightError, ParameterError,
 def test_every_error_is_a_planfly_error() -> None:
     members = [kind for _, kind in inspect.getmembers(world.errors, inspect.isclass)]
     defined = [kind for kind in members if kind.__module__ == "world.errors"]
-    assert set(defined) == {PlanflyError, StartError, ArgumentError, *KINDS}
+    assert set(defined) == {PlanflyError, StartError, CrashError, ArgumentError, *KINDS}
     assert all(issubclass(kind, PlanflyError) for kind in defined)
 
 
@@ -35,14 +36,14 @@ def test_no_error_hides_a_fault_of_the_program() -> None:
     # Who catches bad input must not catch a wrong index, a wrong type or a failed assertion with it.
     for kind in KINDS:
         assert kind.__mro__ == (kind, PlanflyError, Exception, BaseException, object)
-    assert StartError.__mro__[1:] == FlightError.__mro__
+    assert StartError.__mro__[1:] == CrashError.__mro__[1:] == FlightError.__mro__
     # Callers may take a number that is out of its range for what Python calls it.
     assert ArgumentError.__mro__[1:-1] == (PlanflyError, ValueError, Exception, BaseException)
 
 
 def test_the_tree_in_the_docstring_names_each_error() -> None:
     tree = (world.errors.__doc__ or "").splitlines()
-    for kind in (StartError, ArgumentError, *KINDS):
+    for kind in (StartError, CrashError, ArgumentError, *KINDS):
         assert sum(kind.__name__ in line for line in tree) == 1
 
 

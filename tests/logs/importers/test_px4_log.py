@@ -1,4 +1,5 @@
 import io
+import math
 import re
 import struct
 import subprocess
@@ -128,6 +129,19 @@ def test_numbers_that_no_place_or_time_has_are_passed_over(tmp_path: Path) -> No
     assert (missing.numbers, missing.total) == ((2,), 3)
     places = clean_places(raw.series["position"])
     assert (len(places.time), places.faults.unusable) == (458, 2)
+
+
+@pytest.mark.parametrize("off", [math.nan, math.inf, 4e6, -1e6])
+def test_a_length_that_no_mission_has_says_nothing(tmp_path: Path, off: float) -> None:
+    (logged,) = open_log(px4(tmp_path / "a.ulg", numbers_off=(off, 0.0))).missions
+    assert (len(logged.mission.items), logged.missing) == (3, None)
+
+
+@pytest.mark.parametrize("off", [math.nan, -math.inf, 4e6, -1e6])
+def test_an_item_with_a_number_that_none_has_is_lost(tmp_path: Path, off: float) -> None:
+    (logged,) = open_log(px4(tmp_path / "a.ulg", numbers_off=(0.0, off))).missions
+    assert logged.missing is not None
+    assert (logged.missing.numbers, logged.missing.total) == ((1,), 3)
 
 
 def test_home_is_the_vehicles(tmp_path: Path) -> None:

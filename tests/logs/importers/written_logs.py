@@ -2,7 +2,7 @@
 
 import math
 import struct
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flight.mission.items import Mission
 from logs.importers.raw_log import RawLog, example_raw_log
 
 Floats = NDArray[np.float64]
@@ -183,6 +184,22 @@ _TOPICS = {
     "float acceptance_radius;double latitude;double longitude;float altitude;uint8_t altitude_is_relative;",
     "mission_result": "uint64_t timestamp;uint16_t seq_current;uint16_t seq_total;",
 }
+# Those of the mission, with numbers of 64 bits.
+_WIDE_TOPICS = {
+    name: _TOPICS[name].replace("uint16_t seq", "double seq") for name in ("navigator_mission_item", "mission_result")
+}
+
+
+def _mission_rows(
+    mission: Mission, without_items: Collection[int], numbers_off: tuple[float, float]
+) -> Iterator[tuple[Any, ...]]:
+    """The name of a topic and its values behind the time, of a mission's length and of its items."""
+    # Zero as a whole number, which alone fits a field of 16 bits.
+    length, first = (off or 0 for off in numbers_off)
+    yield "mission_result", 0, len(mission.items) + length
+    for k, it in enumerate(one for one in mission.items if one.seq not in without_items):
+        number = it.seq - 1 + (0 if k else first)
+        yield "navigator_mission_item", number, 16, 0.0, it.lat_deg, it.lon_deg, it.alt, 0
 
 
 def px4(
@@ -192,25 +209,28 @@ def px4(
     vehicle_type: int = 2,
     nav_state: int = 3,
     without_items: Collection[int] = (),
+    numbers_off: tuple[float, float] = (0.0, 0.0),
 ) -> Path:
     """Write a log as a `.ulg` (PX4, "ULog File Format"), byte by byte.
 
     without_items: numbers of items, from 1, that the mission has and the log does not hold.
+    numbers_off: added to the mission's length and to its first item's number, whose fields are then of 64 bits.
     """
     raw = example_raw_log() if log is None else log
+    topics = _TOPICS if numbers_off == (0.0, 0.0) else _TOPICS | _WIDE_TOPICS
     codes = {"uint64_t": "Q", "double": "d", "float": "f", "uint8_t": "B", "uint16_t": "H", "float[4]": "4f"}
     packers = {
         name: "<" + "".join(codes[field.split()[0]] for field in fields.rstrip(";").split(";"))
-        for name, fields in _TOPICS.items()
+        for name, fields in topics.items()
     }
-    numbers = {name: number for number, name in enumerate(_TOPICS)}
+    numbers = {name: number for number, name in enumerate(topics)}
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 20_000_000))
 
     def record(letter: bytes, body: bytes) -> None:
         out.extend(struct.pack("<Hc", len(body), letter) + body)
 
     record(b"B", bytes(40))
-    for name, fields in _TOPICS.items():
+    for name, fields in topics.items():
         record(b"F", f"{name}:{fields}".encode())
     key = b"char[3] sys_name"
     record(b"I", bytes([len(key)]) + key + b"PX4")
@@ -233,10 +253,8 @@ def px4(
         row("wind", stamp, -3.0, 0.0)
         if k == 0:
             row("vehicle_status", stamp, nav_state, vehicle_type)
-            mission = raw.missions[0].mission
-            row("mission_result", stamp, 0, len(mission.items))
-            for it in (one for one in mission.items if one.seq not in without_items):
-                row("navigator_mission_item", stamp, it.seq - 1, 16, 0.0, it.lat_deg, it.lon_deg, it.alt, 0)
+            for name, *values in _mission_rows(raw.missions[0].mission, without_items, numbers_off):
+                row(name, stamp, *values)
     path.write_bytes(bytes(out))
     return path
 
