@@ -130,7 +130,7 @@ def _clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Ti
 
 
 def _height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    """A lower greatest height above ground, where the flight came too high and there is room below."""
+    """A lower greatest height above ground, where the flight came too high and can fly lower."""
     now = scenario.limits.max_height_m
     over = [-item.margin for item in failed if item.rule == "height" and item.margin is not None]
     if now is None or not over:
@@ -143,7 +143,7 @@ def _height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tight
 
 
 def _zones(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    """More room beside zones, where the flight and not the plan itself violates one."""
+    """A larger margin beside zones, where the flight and not the plan itself violates one."""
     mine = [item for item in failed if item.rule == "fence" and not (item.planned or 0.0) > ROUNDING]
     deep = [-item.margin for item in mine if item.margin is not None]
     if not deep:

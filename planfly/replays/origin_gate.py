@@ -23,7 +23,7 @@ VIEWERS = ("https://app.foxglove.dev", "https://studio.foxglove.dev", "file://")
 _LONGEST_HEAD, _PATIENCE, _AT_ONCE, _PIECE = 16_384, 10.0, 64, 65_536
 # s.  What is under way when the gate closes has this long to arrive.
 _CLOSING = 0.5
-# Refusals that are told, and characters of each.
+# How many refusals are reported, and how many characters of each.
 _MOST_TOLD, _LONGEST_TOLD = 16, 80
 
 

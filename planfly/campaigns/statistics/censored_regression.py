@@ -63,8 +63,8 @@ class BinaryLink(Protocol):
     def information(self, x: Floats, width: float = 0.0) -> Floats:
         """Fisher's, of a flight about its predictor.
 
-        width: of predictors above its own; by how much a flight passed is told where that is less, so that 0 is for
-        one that tells no more than whether it failed.
+        width: of predictors above its own; a flight that passed by less than this states its margin, so that 0 is
+        for one that states only whether it failed.
         """
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:

@@ -38,7 +38,7 @@ Floats = NDArray[np.float64]
 # Each sample's boundary is first found over so few of what may be drawn, to so many m/s; the logarithm of the share
 # that fails, over all of it, is then nearly straight in the wind: so many steps of the secant method follow.
 _FEW, _NEAR, _SECANTS = 256, 0.1, 2
-# The smallest share that is told from none.
+# The smallest probability that counts as more than zero.
 _MIN_PROBABILITY = 1e-12
 
 
