@@ -31,7 +31,9 @@ from world.files import TextLine
 # The QGC WPL 110 text form of a mission (`.waypoints`): read as people write it, written for the strictest reader.
 #
 # A header line, then twelve columns a line: seq, current, frame, command, p1..p4, latitude, longitude, altitude,
-# autocontinue (MAVLink file formats, "Plain-Text File Format").  Line 0 is home.
+# autocontinue (MAVLink file formats, "Plain-Text File Format").  Line 0 is home whatever command it has, and is not
+# flown.  A file whose first line has another number has no home: Mission Planner puts an empty one before it, and so
+# does planfly; QGroundControl and MAVProxy take even that line for home.
 
 HEADER = "QGC WPL 110"
 # Lines of a file, comments and empty ones included: ten an item.
@@ -53,6 +55,8 @@ _COLUMNS = (
 )
 _WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+# What files of their own hold, beside missions.
+_APART = FENCES | {Command.NAV_RALLY_POINT}
 _ALLOWED = {"seq": (0, 65535), "current": (0, 1), "frame": (0, 255), "command": (0, 65535), "autocontinue": (0, 1)}
 
 
@@ -107,7 +111,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
     fence_shapes(fences, source)
     return Mission(
         home=home,
-        items=tuple(row.item for row in body if row.item.command not in FENCES | {Command.NAV_RALLY_POINT}),
+        items=tuple(row.item for row in body if row.item.command not in _APART),
         fences=fences,
         rally=numbered([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
         warnings=tuple(warnings),
@@ -166,14 +170,20 @@ def _number(where: TextLine, name: str, text: str) -> float:
 
 
 def _counted(rows: list[_Row]) -> list[_Row]:
-    """The rows with their items numbered by where they stand, from the first one's number on."""
-    return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, rows[0].item.seq)]
+    """The rows with their items numbered by where they stand; without a home line the first is number 1."""
+    first = 0 if _begins_with_home(rows) or rows[0].item.command in _APART else 1
+    return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, first)]
+
+
+def _begins_with_home(rows: list[_Row]) -> bool:
+    """Whether the first line is home's: fences and rally points have files without one, as MAVProxy writes them."""
+    return rows[0].item.seq == 0 and rows[0].item.command not in _APART
 
 
 def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
-    first = rows[0].item
-    if first.seq != 0 or first.command != Command.NAV_WAYPOINT:
+    if not _begins_with_home(rows):
         return None, rows
+    first = rows[0].item
     if not first.has_position:
         return None, rows[1:]
     return Home(first.lat_deg, first.lon_deg, first.alt), rows[1:]
@@ -181,20 +191,27 @@ def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
 
 def _warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
     found: list[str] = []
-    plain = [row for row in body if row.item.command not in FENCES | {Command.NAV_RALLY_POINT}]
-    if not plain:
+    if all(row.item.command in _APART for row in body):
         # A fence or rally file: no home line, as MAVProxy has it, or one, as Mission Planner does.
         return found
     if not any(row.current for row in rows):
         found.append("no current item: flown from the first")
+    first = rows[0].item
     if len(body) == len(rows):
-        found.append(f"{rows[0].where}: not a home line (seq 0, command 16): the mission has no home")
-    elif home is None:
-        found.append(f"{rows[0].where}: home at 0, 0, which is no position: left out; the mission has no home")
-    elif rows[0].item.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
         found.append(
-            f"{rows[0].where}: home in frame {rows[0].item.frame}: its height is taken as above mean sea level"
+            f"{rows[0].where}: no home line (seq 0): the mission has no home and begins with this item, as in Mission"
+            " Planner; QGroundControl and MAVProxy take it for home and leave it out"
         )
+    elif first.command != Command.NAV_WAYPOINT:
+        found.append(
+            f"{rows[0].where}: {command_name(first.command)} in the line of home (seq 0): left out, as ground stations"
+            " take that line for home and do not fly it"
+        )
+    if len(body) < len(rows):
+        if home is None:
+            found.append(f"{rows[0].where}: home at 0, 0, which is no position: left out; the mission has no home")
+        elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
+            found.append(f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level")
     gaps = [after for before, after in pairwise(rows) if after.item.seq != before.item.seq + 1]
     if gaps:
         found.append(

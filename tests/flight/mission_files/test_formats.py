@@ -184,12 +184,15 @@ def test_what_is_written_to_the_byte() -> None:
 
 
 def test_a_file_without_home_keeps_its_first_item() -> None:
-    """Some autopilot tools number their first item 0; both written forms keep 0 for home."""
-    text = "QGC WPL 110\n0 1 3 22 0 0 0 0 36.5 -84 100 1\n1 0 3 16 0 0 0 0 36.6 -84 100 1\n2 0 2 177 0 1 0 0 0 0 0 1\n"
+    """As Mission Planner, which puts an empty home before it; both written forms keep 0 for home."""
+    text = "QGC WPL 110\n3 1 3 22 0 0 0 0 36.5 -84 100 1\n4 0 3 16 0 0 0 0 36.6 -84 100 1\n5 0 2 177 1 1 0 0 0 0 0 1\n"
     mission = parse_mission(text, "a.waypoints")
     assert mission.home is None
-    assert [item.seq for item in mission.items] == [0, 1, 2]
-    assert "no home" in mission.warnings[0]
+    assert [item.seq for item in mission.items] == [1, 2, 3]
+    assert mission.warnings[0] == (
+        "a.waypoints:2: no home line (seq 0): the mission has no home and begins with this item, as in Mission Planner;"
+        " QGroundControl and MAVProxy take it for home and leave it out"
+    )
     for kind in ("waypoints", "plan"):
         again = parse_mission(mission_text(mission, kind), f"a.{kind}")
         assert [item.seq for item in again.items] == [1, 2, 3]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pymavlink.mavwp import MAVFenceLoader, MAVWPLoader
 
-from flight.mission.items import Mission, MissionItem
+from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.itinerary import make_itinerary
 from flight.mission_files.formats import mission_text, parse_mission, read_fence
 from flight.mission_files.wpl import is_point_list, parse_fence_points, parse_waypoints, waypoints_text
@@ -120,6 +120,38 @@ def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
     assert [item.seq for item in mission.items] == [1, 2, 3, 4]
     (said,) = mission.warnings
     assert "no position: left out; the mission has no home" in said
+
+
+@pytest.mark.parametrize(
+    ("line", "home", "said"),
+    [
+        ("0 22 15 0 0 0 36.5 -84.2 310", Home(36.5, -84.2, 310.0), []),
+        ("3 22 15 0 0 0 36.5 -84.2 310", Home(36.5, -84.2, 310.0), ["home in frame 3: its height is taken as above"]),
+        ("3 22 15 0 0 0 0 0 100", None, ["home at 0, 0, which is no position"]),
+        ("2 178 0 22 0 0 0 0 0", None, ["home at 0, 0, which is no position"]),
+    ],
+)
+def test_whatever_stands_in_the_line_of_home_is_home_as_in_pymavlink(
+    line: str, home: Home | None, said: list[str], tmp_path: Path
+) -> None:
+    text = f"QGC WPL 110\n0 1 {line} 1\n1 0 3 16 0 0 0 0 36.51 -84.2 100 1\n2 0 2 177 1 1 0 0 0 0 0 1\n"
+    file = tmp_path / "a.waypoints"
+    file.write_text(text, encoding="utf-8")
+    loader = MAVWPLoader()
+    loader.load(str(file))
+    mission = parse_waypoints(text, "a.waypoints")
+    # pymavlink's first is what ArduPilot takes for home.
+    assert [(item.seq, item.command) for item in mission.items] == [
+        (loader.wp(k).seq, loader.wp(k).command) for k in range(1, loader.count())
+    ]
+    assert mission.home == home
+    name = "NAV_TAKEOFF" if " 22 15" in line else "DO_CHANGE_SPEED"
+    assert mission.warnings[0] == (
+        f"a.waypoints:2: {name} in the line of home (seq 0): left out, as ground stations take that line for home and"
+        " do not fly it"
+    )
+    for found, wanted in zip(mission.warnings[1:], said, strict=True):
+        assert wanted in found
 
 
 def test_what_is_written_has_no_gap_and_jumps_to_the_same_item() -> None:
