@@ -6,10 +6,11 @@ VENV := .venv
 # Bytecode is kept, whatever the shell says: each of the tests' many processes would compile all it imports anew.
 export PYTHONDONTWRITEBYTECODE :=
 BIN := $(VENV)/bin
-# Two processes test on two cores: threads of NumPy's linear algebra would stand in the other's way.
+# Three processes test on two cores: threads of NumPy's linear algebra would stand in the other's way.
 test low newest: export OPENBLAS_NUM_THREADS := 1
-# A file's tests run in one of two processes, so that what they share is made once; files in their own order.
-TWO := -n 2 --dist loadfile --no-loadscope-reorder
+# A file's tests run in one of three processes, so that what they share is made once; files in their own order.  Three,
+# since a tenth of the tests' time is waiting: for a port, a timeout, a process that ends.
+SPREAD := -n 3 --dist loadfile --no-loadscope-reorder
 # Rooms that need nothing but planfly itself; the others test with clients, which have their own lower bounds.
 LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/flight/mission_files tests/flight/dynamics \
 	tests/flight/live tests/logs/recording tests/logs/verdict tests/planfly/campaigns/statistics \
@@ -17,11 +18,12 @@ LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/fligh
 # What pyproject.toml names.
 DIRECT := ^(cryptography|dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
 	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
-# Bytecode is made on all cores, but of other packages' own tests; pip makes it on one.  What cannot be compiled is no
-# module, but a template.
+# uv installs some five times as fast as pip; pip does it where uv cannot (a registry that pip alone is told of).
+# Python compiles what is imported, and keeps it: nothing compiles the rest.
 define INSTALL
-	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.$(EXTRAS)'
-	$(BIN)/python -W ignore -m compileall -qq -j 0 -x '/tests/' $(VENV)/lib || true
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt uv
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.$(EXTRAS)' || \
+		$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.$(EXTRAS)'
 endef
 EXTRAS :=
 # What is installed: an environment that is made; planfly; what the pages take, too; what the tests take, too.
@@ -44,7 +46,7 @@ test: $(TESTED) clients
 	$(BIN)/python -m tests.kernels >/dev/null & compiled=$$!; $(BIN)/mypy && $(BUILD_PAGES) && wait $$compiled
 	@echo "tested with the versions of constraints.txt:"
 	@$(BIN)/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
-	$(BIN)/python -m pytest $(TWO)
+	$(BIN)/python -m pytest $(SPREAD)
 
 bench: $(TESTED)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
@@ -58,7 +60,7 @@ soak: $(TESTED) clients docs
 	@$(SOAKED) $(BIN)/python -m tests.soak $(if $(GO_ON),--go-on)
 # Pytest ends with 5 where every file has passed before.  What a command takes to end is measured with nothing beside it.
 	$(SOAKED) $(BIN)/python -m pytest -m "soak and alone" -n 0 || test $$? = 5
-	$(SOAKED) $(BIN)/python -m pytest -m "soak and not alone" $(TWO) || test $$? = 5
+	$(SOAKED) $(BIN)/python -m pytest -m "soak and not alone" $(SPREAD) || test $$? = 5
 	$(BIN)/python -m tests.mutations --count 200 $(if $(GO_ON),--go-on)
 
 # The wheel, installed anew and flown with on every Python that is there.
@@ -77,7 +79,7 @@ low newest:
 	build/$@/bin/python -m pip install --quiet $(SET) --editable . hypothesis pytest pytest-xdist trimesh
 	@echo "tested with the $(if $(filter low,$@),lowest,newest) versions:"
 	@build/$@/bin/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
-	NUMBA_CACHE_DIR=$(CURDIR)/build/$@/kernels build/$@/bin/python -m pytest $(TWO) $(LOW)
+	NUMBA_CACHE_DIR=$(CURDIR)/build/$@/kernels build/$@/bin/python -m pytest $(SPREAD) $(LOW)
 
 dev: $(TESTED)
 
