@@ -40,6 +40,8 @@ from world.scenario_file import first_fault
 
 _TRANSECTS = ("survey", "CorridorScan")
 _LANDING = "fwLandingPattern"
+# QGC's altitude mode of a height that it counts from the terrain and sends as one above mean sea level.
+_CALCULATED = 3
 _COORDINATE = "latitude, longitude and altitude are expected"
 
 
@@ -52,7 +54,7 @@ def expand_items(items: list[Any], source: str, warnings: list[str]) -> list[Any
     for k, item in enumerate(items):
         kind = item.get("type", "SimpleItem") if isinstance(item, dict) else "SimpleItem"
         if kind == "SimpleItem":
-            out.append(item)
+            out.append(_as_written_now(item, f"{source}: mission.items.{k}", warnings))
             continue
         place = f"mission.items.{k}"
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
@@ -68,6 +70,26 @@ def expand_items(items: list[Any], source: str, warnings: list[str]) -> list[Any
         warnings.append(f"{source}: {place}: {name} taken as the {len(made)} simple items that it stands for")
         out += made
     return out
+
+
+def _as_written_now(item: Any, place: str, warnings: list[str]) -> Any:
+    """A simple item as QGroundControl writes it now, of one that an older version wrote, or that lacks its height.
+
+    Until 2018 a place stood in ``coordinate``, beside four parameters (`MissionItem::_convertJsonV2ToV3`).  A height
+    that QGroundControl counts from the terrain is null in the parameters until it knows the terrain; it is ``Altitude``
+    above the ground at that place, which an item in a terrain frame is, too.
+    """
+    if not isinstance(item, dict) or not isinstance(params := item.get("params"), list):
+        return item
+    place_of_old = item.get("coordinate")
+    if len(params) == 4 and isinstance(place_of_old, list) and len(place_of_old) == 3:
+        return {**item, "params": [*params, *place_of_old]}
+    height = item.get("Altitude")
+    known = isinstance(height, int | float) and not isinstance(height, bool)
+    if len(params) == 7 and params[6] is None and item.get("AltitudeMode") == _CALCULATED and known:
+        warnings.append(f"{place}: its height is not calculated yet: taken as {height:g} m above the terrain there")
+        return {**item, "frame": int(Frame.GLOBAL_TERRAIN_ALT), "params": [*params[:6], height]}
+    return item
 
 
 def _transects(item: dict[str, Any], source: str, place: str, name: str) -> list[Any]:
@@ -214,7 +236,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
     except ValidationError as error:
         raise MissionError(**first_fault(error, data).at(source)) from error
     items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
-    if not items:
+    if not (items or file.geoFence.circles or file.geoFence.polygons or file.rallyPoints.points):
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")
     for k, (before, after) in enumerate(pairwise(items), 1):
         if after.seq <= before.seq:

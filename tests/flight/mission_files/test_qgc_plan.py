@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from flight.mission_files.formats import parse_mission
+from flight.mission_files.formats import parse_mission, read_fence
 from tests.flight.mission_files.malformed_files import BAD_PLAN, plan_data, refused
 from world.errors import MissionError
 
@@ -94,3 +94,45 @@ def test_items_are_counted_by_their_order_and_jumps_go_to_the_item_named() -> No
     assert [item.seq for item in mission.items] == [1, 2, 3]
     assert mission.items[2].params[0] == 2.0
     assert mission.warnings == ("a.plan: doJumpId is not 1 to 3: items are counted by their order",)
+
+
+# ----------------------------------------------------------------------
+# What QGroundControl's own plans hold beyond that (mavlink/qgroundcontrol: test/plans, src/MissionManager/UnitTest,
+# custom/res/geofences), in files of our own.
+
+
+def test_a_height_that_is_counted_from_the_terrain_and_not_calculated_is_above_the_terrain() -> None:
+    """As TerrainTest-ArduPlane.plan has it: frame 0, null, and the height beside it."""
+    late = simple(2, 36.5) | {"frame": 0, "AltitudeMode": 3, "Altitude": 150}
+    late["params"] = [*late["params"][:6], None]
+    done = simple(3, 36.6) | {"frame": 0, "AltitudeMode": 3, "Altitude": 150, "AMSLAltAboveTerrain": 480.0}
+    mission = parse_mission(plan_with(simple(1, 36.4), late, done), "a.plan")
+    assert [(item.frame, item.alt) for item in mission.items] == [(3, 100.0), (10, 150.0), (0, 100.0)]
+    assert mission.warnings == (
+        "a.plan: mission.items.1: its height is not calculated yet: taken as 150 m above the terrain there",
+    )
+
+
+def test_a_place_of_an_older_version_is_read() -> None:
+    """As SectionTest.plan has it: four parameters and a coordinate."""
+    old = simple(1, 36.4)
+    old |= {"params": [0, 0, 0, None], "coordinate": [36.4, -84.2, 20]}
+    (first, second) = parse_mission(plan_with(old, simple(2, 36.5)), "a.plan").items
+    assert (first.lat_deg, first.lon_deg, first.alt) == (36.4, -84.2, 20.0)
+    assert second.seq == 2
+
+
+def test_a_plan_of_a_fence_alone_is_a_fence(tmp_path: Path) -> None:
+    """As ce_geofence_rd_2.plan has it: no items, and the corners of an inclusion and an exclusion."""
+    data = plan_data()
+    data["mission"]["items"] = []
+    ring = [[36.5, -84.2], [36.6, -84.2], [36.6, -84.1]]
+    polygons = [{"inclusion": side, "polygon": ring, "version": 1} for side in (True, False)]
+    data["geoFence"] = {"circles": [], "polygons": polygons, "version": 2}
+    file = tmp_path / "a.plan"
+    file.write_text(json.dumps(data), encoding="utf-8")
+    assert [item.command for item in read_fence(file)] == [5001] * 3 + [5002] * 3
+    # Without one it is no plan of anything.
+    data["geoFence"] = {"circles": [], "polygons": [], "version": 2}
+    with pytest.raises(MissionError, match=r"^a\.plan: mission\.items: no items$"):
+        parse_mission(json.dumps(data), "a.plan")
