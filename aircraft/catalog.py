@@ -264,6 +264,17 @@ def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
     ('README.md', 'ardupilot.parm', 'ardupilot.toml', 'gains.toml', 'mine.toml')
     1124.9
     """
+    target = check_new_folder(folder)
+    files = _renamed(source, target.name)
+    write_folder(target, files)
+    return tuple(sorted(files))
+
+
+def check_new_folder(folder: Path) -> Path:
+    """The whole path of a folder that an aircraft is to be made in.
+
+    Raises FlightError if it exists, its parent does not, or its name is not valid for a model.
+    """
     target = folder.absolute()
     if _NAME.fullmatch(target.name) is None or target.name in _TAKEN:
         allowed = f"a folder's name of letters, digits, '.', '_' and '-' is expected, none of {', '.join(_TAKEN)}"
@@ -272,9 +283,7 @@ def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
         raise FlightError(f"{folder}: exists; name a folder that does not", file=folder)
     if not target.parent.is_dir():
         raise FlightError(f"{folder}: its folder {target.parent} does not exist", file=folder)
-    files = _renamed(source, target.name)
-    write_folder(target, files)
-    return tuple(sorted(files))
+    return target
 
 
 def _renamed(source: Aircraft, name: str) -> dict[str, bytes]:

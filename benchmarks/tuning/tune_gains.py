@@ -21,43 +21,15 @@ import numpy as np
 from aircraft.catalog import Aircraft, load_aircraft
 from benchmarks.flight import Errors, errors_of, flown_with, straight_rms
 from benchmarks.tuning.tuning_missions import Case, cases
-from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
-from flight.dynamics.trim import linearise, straight
+from flight.dynamics.fdm import JSBSIM_VERSION
 from flight.guidance.gains import Gains, load_gains
+from flight.guidance.model_gains import ROUND_FIGURES, airframe_gains, at_airspeed
 from flight.simulation import simulate as simulation
 from flight.simulation.simulate import SimulatedFlight, simulate
 from tests.setups import MakeSetup, setup_maker, standard
 
-# Where every search starts, at an airspeed of 25 m/s: round figures, of the size that earlier searches of the Aerosonde
-# found.  `start` slows them down for an aircraft that is faster: its turns take longer by as much.
-START = {
-    "cross_track_frequency": 1.0,
-    "cross_track_damping": 0.8,
-    "cross_track_integral": 0.05,
-    "turn_lead": 0.2,
-    "turn_smoothing": 0.2,
-    "aside_frequency": 1.0,
-    "side_gain": 0.5,
-    "side_lag": 0.1,
-    "push_lead": 0.05,
-    "push_smoothing": 0.1,
-    "roll_frequency": 6.0,
-    "roll_gain": 1.0,
-    "roll_rate_gain": 0.1,
-    "roll_disturbance_lag": 0.1,
-    "aileron_lead": 0.03,
-    "yaw_rate_gain": 0.2,
-    "sideslip_gain": 0.5,
-    "height_frequency": 1.0,
-    "height_damping": 1.0,
-    "height_integral": 0.1,
-    "slope_lead": 0.2,
-    "load_lead": 0.1,
-    "pitch_rate_gain": 0.2,
-    "speed_gain": 0.1,
-    "speed_integral": 0.01,
-    "throttle_per_slope": 2.0,
-}
+# Where every search starts: round figures, of the size that earlier searches of the Aerosonde found.
+START = ROUND_FIGURES
 SEARCHED = tuple(START)
 # Missions that are searched on and reported on, numbered apart under the one seed.
 TRAINED, REPORTED = {"aerosonde": range(16), "c172x": range(8)}, range(1000, 1024)
@@ -79,31 +51,6 @@ RESERVE = math.radians(2.7)
 DIGITS = 3
 # No lag or smoothing is shorter than a tick at 60 Hz, s.
 TICK = 0.017
-
-
-def model_gains(aircraft: Aircraft) -> dict[str, float]:
-    """The gains that are the airframe's own, off its linearisation in level cruise at 500 m."""
-    fdm = Fdm(aircraft)
-    level = straight(fdm, aircraft.airspeed, 500.0)
-    if level is None:
-        raise SystemExit(f"{aircraft.name} holds no level flight at cruise")
-    a, b = linearise(fdm, level)
-    speed = aircraft.airspeed
-    _, v, w, p, q, r = range(6)
-    elevator, aileron, rudder = range(3)
-    # Steady yaw rate without sideslip: ailerons and rudder balance its rolling and yawing moments.
-    hold = np.linalg.solve(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])
-    return {
-        "reference_airspeed": speed,
-        "alpha_per_g": -9.80665 / (a[w, w] * speed),
-        "elevator_per_alpha": -a[q, w] * speed / b[q, elevator],
-        "elevator_per_pitch_rate": -a[q, q] / b[q, elevator],
-        "aileron_per_roll_rate": -a[p, p] / b[p, aileron],
-        "aileron_per_roll_acceleration": 1.0 / b[p, aileron],
-        "rudder_per_yaw_rate": -float(hold[1]),
-        "side_per_sideslip": -a[v, v] * speed,
-        "side_per_aileron": b[v, aileron],
-    }
 
 
 def fly(aircraft: Aircraft, gains: Gains, case: Case) -> SimulatedFlight:
@@ -181,20 +128,6 @@ def _cost(task: tuple[Gains, int]) -> float:
     gains, number = task
     aircraft, case = _missions[number]
     return cost(aircraft, gains, case)
-
-
-def start(aircraft: Aircraft) -> dict[str, float]:
-    """`START` for this aircraft's airspeed.
-
-    Gains on surfaces are per airspeed's own effect on them, and stay.
-    """
-    ratio = aircraft.airspeed / 25.0
-    powers = {"frequency": -1, "lead": 1, "smoothing": 1, "lag": 1, "cross_track_integral": -3, "height_integral": -3}
-    found = {}
-    for name, value in START.items():
-        power = next((power for end, power in powers.items() if name.endswith(end)), 0)
-        found[name] = value * ratio**power
-    return found
 
 
 def rounded(gains: Gains) -> Gains:
@@ -287,9 +220,9 @@ def main() -> None:
     args = parser.parse_args()
     aircraft = load_aircraft(args.aircraft)
     make = setup_maker(aircraft)
-    own = {name: float(f"{value:.4g}") for name, value in model_gains(aircraft).items()}
+    own = {name: float(f"{value:.4g}") for name, value in airframe_gains(aircraft).items()}
     print("off the model: " + ", ".join(f"{name} {value:.4g}" for name, value in own.items()))
-    gains = replace(load_gains(aircraft), **own, **start(aircraft))
+    gains = replace(load_gains(aircraft), **own, **at_airspeed(aircraft.airspeed))
     trained = cases(aircraft, make, args.seed, TRAINED[aircraft.name])
     fresh = cases(aircraft, make, args.seed, REPORTED)
     with Trial(aircraft, trained) as trial:

@@ -175,6 +175,7 @@ class Variation:
     control: on the moments of the surfaces.
     parasite_drag: its coefficient; None keeps the model's own.
     volts: of the battery.
+    properties: values of the model's own properties by their names, such as ``ident/thrust``.
     """
 
     mass: float = 1.0
@@ -182,6 +183,7 @@ class Variation:
     control: float = 1.0
     parasite_drag: float | None = None
     volts: float = 1.0
+    properties: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -427,6 +429,8 @@ def _vary(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) 
         properties.set("aero/parasite-drag", variation.parasite_drag)
     if variation.volts != 1.0:
         properties.set("motor/battery-v", variation.volts * aircraft.battery_voltage)
+    for name, value in variation.properties:
+        properties.set(name, value)
 
 
 def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool) -> jsbsim.FGFDMExec:

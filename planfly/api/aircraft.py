@@ -8,6 +8,7 @@ from typing import overload
 
 from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft, make_own_folder, model_hash
 from aircraft.envelope import Envelope
+from aircraft.model_writer import Layout
 from flight.autopilots.catalog import AUTOPILOTS
 from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, modes_at, step_responses, trim_table
 from flight.dynamics.envelope_tables import load_envelope
@@ -63,20 +64,67 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     return find_aircraft(str(name.resolve()) if isinstance(name, Path) else name)
 
 
-def new_aircraft(folder: str | Path, source: str | Path = "aerosonde") -> Aircraft:
-    """Make the folder of an aircraft of one's own, which must not be there yet, with copies of another's files.
+@with_warm_up()
+def new_aircraft(
+    folder: str | Path,
+    source: str | Path | None = None,
+    *,
+    mass: float | None = None,
+    span: float | None = None,
+    area: float | None = None,
+    cruise: float | None = None,
+    stall: float | None = None,
+    top: float | None = None,
+    bank: float | None = None,
+    climb: float | None = None,
+    battery: str | None = None,
+    motor: float | None = None,
+    prop: str | None = None,
+    layout: Layout | None = None,
+    fuel: float | None = None,
+    params: str | Path | None = None,
+) -> Aircraft:
+    """Make the folder of an aircraft of one's own, which must not be there yet.
 
-    source: the aircraft to begin with, a name or a folder.
+    Without numbers it holds copies of another aircraft's files: source is that aircraft, a name or a folder (the
+    Aerosonde if not given).  With numbers it holds a model that does what they say, scaled from published aircraft of
+    its class, and what is not known of it; mass, span, cruise and stall are needed, the others guessed if not given.
+
+    mass: kg.  span: of the wing, m.  area: of the wing, m^2.
+    cruise, stall, top: airspeeds, m/s: usual, slowest and fastest level flight.
+    bank: steepest in turns, degrees.  climb: steepest at cruise, degrees.
+    battery: volts and capacity, "14.8V,5Ah" or "14.8V,74Wh".  motor: rpm a volt.  prop: inches, "12x6".
+    layout: "tail" (if not given), "wing" for a flying wing with elevons, "vtail" for a V-tail.
+    fuel: kg, for an aircraft that burns it.
+    params: a file of ArduPlane's parameters; cruise, stall, bank, climb and drag are taken from it if not given and if
+    it states them, other than ArduPlane's own values.
     Raises a `planfly.PlanflyError` for bad input; nothing is made then.
 
     >>> import planfly, tempfile
     >>> with tempfile.TemporaryDirectory() as place:
-    ...     made = planfly.new_aircraft(Path(place) / "mine")
-    >>> made.name, made.mass
+    ...     copied = planfly.new_aircraft(Path(place) / "mine")
+    ...     made = planfly.new_aircraft(Path(place) / "foam", mass=2.1, span=1.6, cruise=15, stall=10, layout="wing")
+    >>> copied.name, copied.mass
     ('mine', 11.0)
+    >>> made.mass, made.airspeed, round(made.wing_area, 2)
+    (2.1, 15.0, 0.32)
     """
-    make_own_folder(Path(folder), _opened(source))
-    return find_aircraft(str(Path(folder).absolute()))
+    numbers = {
+        "mass": mass, "span": span, "area": area, "cruise": cruise, "stall": stall, "top": top, "bank": bank,
+        "climb": climb, "motor": motor, "fuel": fuel,
+    }  # fmt: skip
+    given = [name for name, value in (numbers | {"battery": battery, "prop": prop, "params": params}).items() if value]
+    given += ["layout"] if layout is not None else []
+    if not given and not any(value is not None for value in numbers.values()):
+        make_own_folder(Path(folder), _opened("aerosonde" if source is None else source))
+        return find_aircraft(str(Path(folder).absolute()))
+    if source is not None:
+        raise PlanflyError.of_argument("source", source, f"goes without {given[0]}: a copy has that aircraft's numbers")
+    from planfly.data_sheets import make_data_sheet_folder, parse_sheet
+
+    sheet = parse_sheet(numbers, battery=battery, prop=prop, layout=layout)
+    with stage(f"making {Path(folder).name}"):
+        return make_data_sheet_folder(Path(folder), sheet, None if params is None else Path(params))
 
 
 @with_warm_up()

@@ -24,6 +24,21 @@ if TYPE_CHECKING:
 
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
 _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
+_SHEET = (
+    "mass",
+    "span",
+    "area",
+    "cruise",
+    "stall",
+    "top",
+    "bank",
+    "climb",
+    "battery",
+    "motor",
+    "prop",
+    "layout",
+    "fuel",
+)
 # Wind of the ground slopes that are shown, m/s.
 _WIND = 10.0
 
@@ -34,7 +49,8 @@ def aircraft_options(line: LineParser) -> None:
         "aircraft",
         "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list them",
         "planfly aircraft aerosonde --out aerosonde",
-        "planfly aircraft --new ./mine --from aerosonde",
+        "planfly aircraft --new ./mine --mass 2.1 --span 1.6 --cruise 15 --stall 10 --layout wing",
+        "planfly aircraft --new ./copy --from aerosonde",
     )
     completed(
         parser.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)"),
@@ -49,6 +65,27 @@ def aircraft_options(line: LineParser) -> None:
         ),
         aircraft_words,
     )
+    sheet = parser.group("a data sheet: with --new; mass, span, cruise and stall are needed, the rest is guessed")
+    numbers = {
+        "mass": ("KG", "mass, 0.5 to 25 kg"),
+        "span": ("M", "wing span, m"),
+        "area": ("M2", "wing area, m2 (default: what carries the mass at the stall)"),
+        "cruise": ("M/S", "usual airspeed"),
+        "stall": ("M/S", "airspeed of slowest level flight"),
+        "top": ("M/S", "airspeed of fastest level flight (default: 1.4 times the cruise's)"),
+        "bank": ("DEG", "steepest bank in turns (default: 35)"),
+        "climb": ("DEG", "steepest climb at cruise (default: 12)"),
+        "motor": ("KV", "rpm a volt"),
+        "fuel": ("KG", "fuel carried, for an aircraft without a battery"),
+    }
+    for name, (unit, text) in numbers.items():
+        sheet.add_argument(f"--{name}", metavar=unit, type=float, help=text)
+    sheet.add_argument("--battery", metavar="V,AH", help="battery, such as 14.8V,5Ah")
+    sheet.add_argument("--prop", metavar="DxP", help="propeller, inches, such as 12x6")
+    sheet.add_argument("--layout", choices=("tail", "wing", "vtail"), help="(default: tail)")
+    sheet.add_argument(
+        "--params", metavar="FILE", help="ArduPlane's parameters: what they say of the aircraft is taken"
+    )
     result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced)")
 
 
@@ -56,6 +93,9 @@ def aircraft(args: argparse.Namespace) -> int:
     """List the embedded aircraft, print and draw the one that is named, or make a folder for a new one."""
     if args.folder is not None:
         return _make_folder(args)
+    for name in _SHEET:
+        if getattr(args, name) is not None:
+            raise PlanflyError.of_argument(name, getattr(args, name), "goes with `folder` FOLDER", shown="")
     if args.source is not None:
         allowed = "goes with `folder` FOLDER, the folder to make"
         raise PlanflyError.of_argument("source", args.source, allowed, shown="")
@@ -87,14 +127,36 @@ def _make_folder(args: argparse.Namespace) -> int:
     if args.name is not None:
         message = f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with"
         raise PlanflyError(message, field="--new", value=args.folder)
-    folder, source = Path(args.folder), args.source or "aerosonde"
+    folder = Path(args.folder)
     made = call(planfly.new_aircraft, args)
     files = sorted(file.name for file in made.folder.iterdir())
     shown = folder if folder.is_absolute() else f"./{folder}"
-    print(f"aircraft  {shown}/ ({', '.join(files)}), as {Path(source).name}")
+    sheet = any(getattr(args, name) is not None for name in (*_SHEET, "params"))
+    whose = "from a data sheet" if sheet else f"as {Path(args.source or 'aerosonde').name}"
+    print(f"aircraft  {shown}/ ({', '.join(files)}), {whose}")
+    if sheet:
+        _print_sheet(made)
     give_answer(args, lambda: _answer([made]))
     print(f"next      planfly aircraft {shlex.quote(str(shown))}, and --aircraft {shlex.quote(str(shown))} flies it")
     return FLYABLE
+
+
+def _print_sheet(made: "Aircraft") -> None:
+    """What the model of a data sheet can do, and how sure that is."""
+    from aircraft.uncertainty import read_uncertainty
+    from flight.dynamics.envelope_tables import load_envelope
+
+    envelope = load_envelope(made)
+    climb, descent = (math.degrees(angle) for angle in envelope.air_angles(made.airspeed, 500.0))
+    known = read_uncertainty(made.folder)
+    print(f"  speed    cruise {made.airspeed:g} m/s, stall {made.stall_speed:g}, up to {made.airspeed_max:g} m/s")
+    if known is not None:
+        up, down = math.degrees(known.climb), math.degrees(known.descent)
+        print(
+            f"  slopes   climb {climb:.1f} degrees, give or take {up:.1f}; descent {descent:.1f}, give or take"
+            f" {down:.1f} (at cruise and 500 m; one standard deviation)"
+        )
+    print("  guessed  README.md says what was, and how far off it may be")
 
 
 def _print_numbers(numbers: "AircraftNumbers") -> None:

@@ -1,0 +1,403 @@
+"""Writes the JSBSim model of a small aircraft from its numbers: mass, coefficients, and what drives its propeller.
+
+Equations and signs are those of R. W. Beard and T. W. McLain, *Small Unmanned Aircraft*, chapters 3 and 4, as in
+``aircraft/aerosonde/aerosonde.xml``: elevator trailing edge down, aileron rolling right and rudder yawing left are
+positive.  What is not known for certain of an aircraft stands in the model as a property ``ident/NAME``, a factor that
+is 1 unless somebody sets another: so a draw of an uncertain aircraft is a set of properties.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from aircraft.propulsion import Propulsion
+from aircraft.xml_text import number, product, scaled, total
+
+# What moves: a tail with elevator and rudder, a flying wing with elevons, a V-tail with ruddervators.
+Layout = Literal["tail", "wing", "vtail"]
+
+# Factors of the model that may be set, and what each multiplies.
+FACTORS = {
+    "zero-lift-drag": "least drag coefficient",
+    "induced-drag": "drag due to lift",
+    "thrust": "thrust at a given propeller speed",
+    "motor-speed": "motor speed per volt (of an engine: the root of its torque)",
+    "windmill-drag": "drag of the propeller that the air turns",
+    "lift-slope": "lift curve slope",
+    "pitch-stiffness": "pitching moment per angle of attack",
+    "pitch-damping": "pitching moment per pitch rate",
+    "elevator-power": "pitching moment per elevator",
+    "roll-damping": "rolling moment per roll rate",
+    "aileron-power": "rolling moment per aileron",
+}
+# Elevons and ruddervators reach this much beyond the stop of either of the two commands that they mix.
+MIXED_TRAVEL = 1.3
+_SLUG_FT2 = 1.3558179483314004  # kg m^2 in one slug ft^2
+_POUND = 0.45359237
+
+
+@dataclass(frozen=True, slots=True)
+class AeroCoefficients:
+    """Aerodynamic coefficients by the book's names, a radian and a reduced rate (p b/2V, q c/2V, r b/2V) each.
+
+    lift_0, lift_alpha, lift_q, lift_elevator: of the lift.
+    drag_min, drag_lift, lift_at_least_drag: CD = drag_min + drag_lift (CL - lift_at_least_drag)^2, where CL is that of
+    the angle of attack alone.
+    drag_elevator, drag_elevator_2: on the elevator's size, and on its square.  drag_beta_2: on the sideslip's square.
+    pitch_0 .. yaw_rudder: of the moments.  side_beta .. side_rudder: of the side force.
+    stall_alpha, stall_sharpness: where the lift curve breaks (rad), and the book's M.
+    """
+
+    lift_0: float
+    lift_alpha: float
+    drag_min: float
+    drag_lift: float
+    pitch_0: float
+    pitch_alpha: float
+    pitch_q: float
+    pitch_elevator: float
+    side_beta: float
+    roll_beta: float
+    roll_p: float
+    roll_r: float
+    roll_aileron: float
+    yaw_beta: float
+    yaw_p: float
+    yaw_r: float
+    yaw_aileron: float
+    stall_alpha: float
+    lift_q: float = 0.0
+    lift_elevator: float = 0.0
+    lift_at_least_drag: float = 0.0
+    drag_elevator: float = 0.0
+    drag_elevator_2: float = 0.0
+    drag_beta_2: float = 0.0
+    side_p: float = 0.0
+    side_r: float = 0.0
+    side_aileron: float = 0.0
+    side_rudder: float = 0.0
+    roll_rudder: float = 0.0
+    yaw_rudder: float = 0.0
+    stall_sharpness: float = 50.0
+
+
+@dataclass(frozen=True, slots=True)
+class ModelNumbers:
+    """All that a model is made of, SI units and radians.
+
+    title: for a person.  source: where the numbers are from, a sentence.
+    inertia: Jx, Jy, Jz, Jxz about the centre of gravity, kg m^2; Jxz is the integral of x z dm.
+    throw: of elevator, aileron and rudder, either way.  rate: rad/s.  lag: of surfaces and of the motor, s.
+    lift_behind: how far the wing's forces act behind the centre of gravity, m.
+    """
+
+    title: str
+    source: str
+    mass: float
+    area: float
+    span: float
+    chord: float
+    inertia: tuple[float, float, float, float]
+    aero: AeroCoefficients
+    propulsion: Propulsion
+    layout: Layout = "tail"
+    throw: tuple[float, float, float] = (0.5236, 0.5236, 0.5236)
+    rate: float = 3.490658503988659
+    lag: tuple[float, float] = (0.05, 0.1)
+    lift_behind: float = 0.0
+    factors: tuple[str, ...] = field(default=tuple(FACTORS))
+
+
+def model_xml(name: str, numbers: ModelNumbers) -> str:
+    """The text of ``NAME.xml``.
+
+    It has no ``<input>`` and ``<output>`` channels, and the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`.
+    """
+    jx, jy, jz, jxz = (value / _SLUG_FT2 for value in numbers.inertia)
+    return f"""<?xml version="1.0"?>
+<!-- {_comment(numbers.title)}
+     {_comment(numbers.source)}
+     Written by aircraft/model_writer.py; signs and equations as in aircraft/aerosonde/aerosonde.xml. -->
+<fdm_config name="{name}" version="2.0" release="BETA">
+  <fileheader>
+    <author>planfly</author>
+    <version>1.0</version>
+    <description>{_comment(numbers.title)}</description>
+  </fileheader>
+
+  <metrics>
+    <wingarea unit="M2"> {number(numbers.area)} </wingarea>
+    <wingspan unit="M"> {number(numbers.span)} </wingspan>
+    <chord unit="M"> {number(numbers.chord)} </chord>
+    <location name="AERORP" unit="M"> <x> {number(numbers.lift_behind)} </x> <y> 0 </y> <z> 0 </z> </location>
+    <location name="EYEPOINT" unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
+    <location name="VRP" unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
+  </metrics>
+
+  <!-- Jxz is the integral of x z dm; slug ft2, because JSBSim's own conversion from kg m2 is off by 9e-5. -->
+  <mass_balance negated_crossproduct_inertia="false">
+    <ixx unit="SLUG*FT2"> {number(jx)} </ixx>
+    <iyy unit="SLUG*FT2"> {number(jy)} </iyy>
+    <izz unit="SLUG*FT2"> {number(jz)} </izz>
+    <ixz unit="SLUG*FT2"> {number(jxz)} </ixz>
+    <emptywt unit="LBS"> {number(numbers.mass / _POUND)} </emptywt>
+    <location name="CG" unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
+    <pointmass name="payload">
+      <weight unit="LBS"> 0 </weight>
+      <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
+    </pointmass>
+  </mass_balance>
+
+  <ground_reactions/>
+  <propulsion/>
+
+{_flight_control(numbers)}
+
+{_external_reactions(numbers)}
+
+{_aerodynamics(numbers)}
+</fdm_config>
+"""
+
+
+def _comment(text: str) -> str:
+    """A text that may stand in XML and in its comments."""
+    return text.replace("&", "and").replace("<", "").replace(">", "").replace("--", "-")
+
+
+# ----------------------------------------------------------------------
+# Servos: each moves one control, or two of them are mixed.
+
+
+def _flight_control(numbers: ModelNumbers) -> str:
+    elevator, aileron, rudder = numbers.throw
+    plain = {"elevator": elevator, "aileron": aileron, "rudder": rudder}
+    mixed = {"tail": (), "wing": ("elevator", "aileron"), "vtail": ("elevator", "rudder")}[numbers.layout]
+    channels = [
+        _servo(f"surface/{name}-rad", f"command/{name}-rad", limit, numbers)
+        for name, limit in plain.items()
+        if name not in mixed
+    ]
+    if mixed:
+        first, second = mixed
+        name = "elevon" if numbers.layout == "wing" else "ruddervator"
+        limit = MIXED_TRAVEL * max(plain[first], plain[second])
+        sides = {"left": 1.0, "right": -1.0}
+        # The outer functions only take commands to surfaces and back; the servos between them have lag and stops.
+        for side, sign in sides.items():
+            asked = total(f"<p> command/{first}-rad </p>", scaled(sign, f"command/{second}-rad"))
+            channels.append(_function(f"{name}/{side}-command-rad", asked))
+            channels.append(_servo(f"{name}/{side}-rad", f"{name}/{side}-command-rad", limit, numbers))
+        for control, signs in ((first, (0.5, 0.5)), (second, (0.5, -0.5))):
+            parts = (scaled(sign, f"{name}/{side}-rad") for side, sign in zip(sides, signs, strict=True))
+            channels.append(_function(f"surface/{control}-rad", total(*parts)))
+    lag = 1.0 / numbers.lag[1]
+    return f"""  <flight_control name="servos">
+    <property value="0"> command/elevator-rad </property>
+    <property value="0"> command/aileron-rad </property>
+    <property value="0"> command/rudder-rad </property>
+    <property value="0"> command/throttle-norm </property>
+    <channel name="surfaces">
+{chr(10).join(channels)}
+    </channel>
+    <channel name="motor">
+      <actuator name="motor/throttle-norm">
+        <input> command/throttle-norm </input>
+        <lag> {number(lag)} </lag>
+        <clipto> <min> 0 </min> <max> 1 </max> </clipto>
+      </actuator>
+    </channel>
+  </flight_control>"""
+
+
+def _servo(name: str, command: str, limit: float, numbers: ModelNumbers) -> str:
+    return f"""      <actuator name="{name}">
+        <input> {command} </input>
+        <lag> {number(1.0 / numbers.lag[0])} </lag>
+        <rate_limit> {number(numbers.rate)} </rate_limit>
+        <clipto> <min> {number(-limit)} </min> <max> {number(limit)} </max> </clipto>
+      </actuator>"""
+
+
+def _function(name: str, content: str) -> str:
+    return f"""      <fcs_function name="{name}">
+        <function> {content} </function>
+      </fcs_function>"""
+
+
+# ----------------------------------------------------------------------
+# Propeller and motor.
+
+
+_TORQUE = """    <!-- The reaction to the propeller's torque rolls the aircraft left. -->
+    <moment name="torque" frame="BODY">
+      <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
+      <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
+    </moment>"""
+
+
+def _external_reactions(numbers: ModelNumbers) -> str:
+    declared = "\n".join(f'    <property value="1"> ident/{name} </property>' for name in numbers.factors)
+    x, y, z = numbers.propulsion.direction
+    # JSBSim's structural axes point aft, right and up; the body's forward, right and down.
+    ahead, right, below = numbers.propulsion.place
+    # Without a rudder only sideslip would balance the torque and the ailerons against it, and trims have none.
+    torque = "    <!-- No torque of the propeller: its elevons are rigged against it. -->"
+    if numbers.layout != "wing":
+        torque = _TORQUE
+    return f"""  <external_reactions>
+    <!-- What is not known for certain: factors, 1 for the model as published or as guessed. -->
+{declared}
+    <property value="0"> motor/braking </property>
+
+    <!-- SI throughout; slug/ft3 to kg/m3 and ft/s to m/s here, N to lbf and N m to lbf ft at the end. -->
+    <function name="motor/rho-kg_m3">
+      <product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>
+    </function>
+    <function name="motor/airspeed-mps">
+      <product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>
+    </function>
+{numbers.propulsion.functions(numbers.factors)}
+    <force name="thrust" frame="BODY">
+      <function> <product> <p> motor/thrust-n </p> <v> 0.2248089430997105 </v> </product> </function>
+      <location unit="M"> <x> {number(-ahead)} </x> <y> {number(right)} </y> <z> {number(-below)} </z> </location>
+      <direction> <x> {number(x)} </x> <y> {number(y)} </y> <z> {number(z)} </z> </direction>
+    </force>
+{torque}
+  </external_reactions>"""
+
+
+# ----------------------------------------------------------------------
+# Forces and moments.  In the stability frame JSBSim takes X aft and Z up as positive: drag and lift.
+
+_Q = "<p> aero/qbar-area </p>"
+_ALPHA, _BETA = "aero/alpha-rad", "aero/beta-rad"
+_RATE_P, _RATE_Q, _RATE_R = (f"velocities/{axis}-aero-rad_sec" for axis in "pqr")
+_ELEVATOR, _AILERON, _RUDDER = (f"surface/{name}-rad" for name in ("elevator", "aileron", "rudder"))
+_CONTROL = "aero/control-factor"
+
+
+def _aerodynamics(numbers: ModelNumbers) -> str:
+    span, chord = "<p> metrics/bw-ft </p>", "<p> metrics/cbarw-ft </p>"
+    forces, moments = _forces(numbers.aero, numbers.factors), _moments(numbers.aero, numbers.factors)
+    drag_factor = "<p> aero/drag-factor </p>"
+    written = "\n".join(
+        [
+            _axis("X", "force/drag", product(_Q, drag_factor, forces[0]), ' frame="STABILITY"'),
+            _axis("Z", "force/lift", product(_Q, forces[1]), ' frame="STABILITY"'),
+            _axis("Y", "force/side", product(_Q, forces[2]), ' frame="STABILITY"'),
+            _axis("ROLL", "moment/roll", product(_Q, span, moments[0])),
+            _axis("PITCH", "moment/pitch", product(_Q, chord, moments[1])),
+            _axis("YAW", "moment/yaw", product(_Q, span, moments[2])),
+        ]
+    )
+    return f"""  <aerodynamics>
+    <!-- For robustness studies: factors on all drag and on the control surfaces' moments. -->
+    <property value="1"> aero/drag-factor </property>
+    <property value="1"> aero/control-factor </property>
+
+{_lift_curve(numbers.aero, numbers.factors)}
+
+{written}
+  </aerodynamics>"""
+
+
+def _axis(axis: str, name: str, content: str, frame: str = "") -> str:
+    return f"""    <axis name="{axis}"{frame}>
+      <function name="aero/{name}">
+        {content}
+      </function>
+    </axis>"""
+
+
+def _uncertain(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
+    """The property of a factor, if the model has it."""
+    return (f"ident/{name}",) if name in factors else ()
+
+
+def _forces(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str]:
+    """Drag, lift and side force, each as a coefficient."""
+    apart = f"<difference> <p> aero/lift-linear </p> <v> {number(a.lift_at_least_drag)} </v> </difference>"
+    induced = (f"<p> {name} </p>" for name in _uncertain("induced-drag", known))
+    drag = total(
+        scaled(a.drag_min, *_uncertain("zero-lift-drag", known)),
+        product(f"<v> {number(a.drag_lift)} </v>", *induced, apart, apart),
+        product(f"<v> {number(a.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
+        scaled(a.drag_elevator_2, _ELEVATOR, _ELEVATOR),
+        scaled(a.drag_beta_2, _BETA, _BETA),
+    )
+    lift = total(
+        "<p> aero/lift-alpha </p>",
+        scaled(a.lift_q, "aero/ci2vel", _RATE_Q),
+        scaled(a.lift_elevator, _ELEVATOR),
+    )
+    side = total(
+        scaled(a.side_beta, _BETA),
+        scaled(a.side_p, "aero/bi2vel", _RATE_P),
+        scaled(a.side_r, "aero/bi2vel", _RATE_R),
+        scaled(a.side_aileron, _AILERON),
+        scaled(a.side_rudder, _RUDDER),
+    )
+    return drag, lift, side
+
+
+def _moments(a: AeroCoefficients, known: tuple[str, ...]) -> tuple[str, str, str]:
+    """Rolling, pitching and yawing moment, each as a coefficient."""
+    roll = total(
+        scaled(a.roll_beta, _BETA),
+        scaled(a.roll_p, "aero/bi2vel", _RATE_P, *_uncertain("roll-damping", known)),
+        scaled(a.roll_r, "aero/bi2vel", _RATE_R),
+        scaled(a.roll_aileron, _CONTROL, _AILERON, *_uncertain("aileron-power", known)),
+        scaled(a.roll_rudder, _CONTROL, _RUDDER),
+    )
+    pitch = total(
+        f"<v> {number(a.pitch_0)} </v>",
+        scaled(a.pitch_alpha, _ALPHA, *_uncertain("pitch-stiffness", known)),
+        scaled(a.pitch_q, "aero/ci2vel", _RATE_Q, *_uncertain("pitch-damping", known)),
+        scaled(a.pitch_elevator, _CONTROL, _ELEVATOR, *_uncertain("elevator-power", known)),
+    )
+    yaw = total(
+        scaled(a.yaw_beta, _BETA),
+        scaled(a.yaw_p, "aero/bi2vel", _RATE_P),
+        scaled(a.yaw_r, "aero/bi2vel", _RATE_R),
+        scaled(a.yaw_aileron, _CONTROL, _AILERON),
+        scaled(a.yaw_rudder, _CONTROL, _RUDDER),
+    )
+    return roll, pitch, yaw
+
+
+def _lift_curve(a: AeroCoefficients, known: tuple[str, ...]) -> str:
+    """Lift by angle of attack: a straight line, and past the stall a flat plate."""
+    line = total(f"<v> {number(a.lift_0)} </v>", scaled(a.lift_alpha, _ALPHA, *_uncertain("lift-slope", known)))
+    sine = f"<sin> <p> {_ALPHA} </p> </sin>"
+    plate = product("<v> 2 </v>", sine, f"<abs> {sine} </abs>", f"<cos> <p> {_ALPHA} </p> </cos>")
+    apart = f"<difference> {plate} <p> aero/lift-linear </p> </difference>"
+    return f"""    <function name="aero/lift-linear">
+      {line}
+    </function>
+    <!-- Share of separated flow: the book's blend of the straight line and of a flat plate. -->
+    <function name="aero/separated">
+      <table>
+        <independentVar lookup="row"> {_ALPHA} </independentVar>
+        <tableData>
+{_separation_table(a.stall_alpha, a.stall_sharpness)}
+        </tableData>
+      </table>
+    </function>
+    <function name="aero/lift-alpha">
+      {total("<p> aero/lift-linear </p>", product("<p> aero/separated </p>", apart))}
+    </function>"""
+
+
+def _separation_table(stall: float, sharpness: float) -> str:
+    """Share of separated flow by angle of attack, rad (Beard and McLain, equation 4.10), exactly 0 in attached flow."""
+    width = 10.0 / sharpness
+    steps = [stall - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]
+    points = sorted({-math.pi, *(-step for step in steps), *steps, math.pi})
+    rows = []
+    for alpha in points:
+        inner, outer = math.exp(-sharpness * (alpha - stall)), math.exp(sharpness * (alpha + stall))
+        share = (1.0 + inner + outer) / ((1.0 + inner) * (1.0 + outer))
+        share = 0.0 if abs(alpha) <= stall - width + 1e-9 else min(1.0, share)
+        rows.append(f"          {alpha:.6f}  {share:.8f}")
+    return "\n".join(rows)

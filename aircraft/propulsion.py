@@ -1,0 +1,411 @@
+"""What drives a small aircraft's propeller, as numbers and as JSBSim functions.
+
+Each kind makes the properties ``motor/thrust-n``, ``motor/torque-n_m``, ``motor/battery-current-a`` and
+``motor/battery-power-w`` of ``motor/throttle-norm`` (0..1), ``motor/rho-kg_m3`` and ``motor/airspeed-mps``.
+All of them are closed forms: nothing spins up, so that a trim is exact.  Factors of the model are properties
+``ident/NAME``.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from aircraft.xml_text import number, product, scaled, total
+
+Place = tuple[float, float, float]
+
+
+class Propulsion(Protocol):
+    """What `aircraft.model_writer` needs of a kind of propulsion.
+
+    direction: of the thrust in body axes.  place: where it acts, m forward, right and below the centre of gravity.
+    """
+
+    @property
+    def direction(self) -> Place:
+        """Of the thrust."""
+
+    @property
+    def place(self) -> Place:
+        """Where it acts."""
+
+    def functions(self, factors: tuple[str, ...]) -> str:
+        """JSBSim functions; factors: names of the model's ``ident/`` properties."""
+
+
+@dataclass(frozen=True, slots=True)
+class Propeller:
+    """A propeller: T = rho n^2 D^4 CT(J), Q = rho n^2 D^5 CQ(J), J = V / (n D); n in revolutions a second.
+
+    diameter: m.
+    thrust, torque: (c0, c1, c2) of CT = c0 + c1 J + c2 J^2, and of CQ.
+    """
+
+    diameter: float
+    thrust: tuple[float, float, float]
+    torque: tuple[float, float, float]
+
+    def scaled(self, *, diameter: float = 1.0, blades: float = 1.0, pitch: float = 1.0) -> "Propeller":
+        """One of another size: coefficients grow with the blades' area, and J counts in the pitch.
+
+        A steeper propeller gives its thrust up to a higher J and asks for as much more torque.
+        """
+        ct, cq = self.thrust, self.torque
+        return Propeller(
+            self.diameter * diameter,
+            (blades * ct[0], blades * ct[1] / pitch, blades * ct[2] / pitch**2),
+            (blades * pitch * cq[0], blades * cq[1], blades * cq[2] / pitch),
+        )
+
+    def thrust_at(self, w: float, airspeed: float, rho: float) -> float:
+        """Thrust, N, at a speed of the propeller (rad/s) and an airspeed (m/s)."""
+        n, d = w / (2.0 * math.pi), self.diameter
+        c0, c1, c2 = self.thrust
+        return rho * (c0 * n**2 * d**4 + c1 * n * airspeed * d**3 + c2 * airspeed**2 * d**2)
+
+    def torque_parabola(self, airspeed: float, rho: float) -> tuple[float, float, float]:
+        """Torque (N m) as a parabola in the propeller's speed (rad/s): coefficients of its square, itself, and 1."""
+        c0, c1, c2 = self.torque
+        d, turn = self.diameter, 2.0 * math.pi
+        return rho * d**5 * c0 / turn**2, rho * d**4 * airspeed * c1 / turn, rho * d**3 * airspeed**2 * c2
+
+    @property
+    def zero_thrust_ratio(self) -> float:
+        """The advance ratio J at which it pulls no more."""
+        c0, c1, c2 = self.thrust
+        return (-c1 - math.sqrt(c1**2 - 4.0 * c2 * c0)) / (2.0 * c2)
+
+
+# The Aerosonde's: D 0.508 m (Beard and McLain, appendix E.2).
+BOOK_PROPELLER = Propeller(0.508, (0.09357, -0.06044, -0.1079), (0.00523, 0.00497, -0.01664))
+# Diameter by the Aerosonde's, and what of its full power the motor loses.
+_TURN = 2.0 * math.pi
+
+
+def root(square: float, linear: float, constant: float) -> float:
+    """The larger root of a parabola, as if its discriminant were 0 where that is negative."""
+    return (math.sqrt(max(0.0, linear**2 - 4.0 * square * constant)) - linear) / (2.0 * square)
+
+
+@dataclass(frozen=True, slots=True)
+class ElectricMotor:
+    """A brushless motor on a battery: volts, back-emf constant (V s/rad), resistance (ohm), no-load current (A).
+
+    Beard and McLain, section 4.3, with a current that does not brake (`aircraft/aerosonde/README.md`).
+    windmill: share of the negative thrust of an idle propeller that counts.
+    """
+
+    propeller: Propeller
+    volts: float
+    emf: float
+    resistance: float
+    idle_current: float
+    windmill: float = 1.0
+    direction: Place = (1.0, 0.0, 0.0)
+    place: Place = (0.0, 0.0, 0.0)
+
+    def speed(self, throttle: float, airspeed: float, rho: float) -> float:
+        """Speed of the propeller, rad/s."""
+        square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
+        k, r = self.emf, self.resistance
+        driven = root(square, linear + k * k / r, constant + k * self.idle_current - k * self.volts * throttle / r)
+        return max(0.0, driven, root(square, linear, constant + k * self.idle_current))
+
+    def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
+        """Thrust, N."""
+        found = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
+        return found if found > 0.0 else self.windmill * found
+
+    def power(self, throttle: float, airspeed: float, rho: float) -> float:
+        """Power from the battery, W."""
+        volts = self.volts * throttle
+        return volts * max(0.0, (volts - self.emf * self.speed(throttle, airspeed, rho)) / self.resistance)
+
+    def functions(self, factors: tuple[str, ...]) -> str:
+        """JSBSim functions."""
+        factor = _of(factors)
+        k, r, i0 = self.emf, self.resistance, self.idle_current
+        by_speed = factor("motor-speed")
+        linear = f"<quotient> <v> {number(k * k / r)} </v> {product(by_speed, by_speed)} </quotient>"
+        losses = f"<quotient> <v> {number(k * i0)} </v> {by_speed} </quotient>"
+        driving = f"<quotient> {scaled(-k / r, 'motor/input-v')} {by_speed} </quotient>"
+        back = f"<quotient> {scaled(k, 'motor/propeller-rad_sec')} {by_speed} </quotient>"
+        return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
+    <function name="motor/input-v"> {product("<p> motor/battery-v </p>", "<p> motor/throttle-norm </p>")} </function>
+{_parabola(self.propeller)}
+    <!-- Propeller speed with current flowing, and at none: the root of Q = KQ ((V - w KV) / R - i0), and of Q = -KQ i0.
+         The current does not brake: of the two speeds the larger. -->
+    <function name="motor/loss-n_m"> {losses} </function>
+    <function name="motor/b"> {total("<p> motor/q1 </p>", linear)} </function>
+    <function name="motor/driven-rad_sec">
+      {_root_xml("motor/b", total("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>", driving))}
+    </function>
+    <function name="motor/windmill-rad_sec">
+      {_root_xml("motor/q1", total("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>"))}
+    </function>
+    <function name="motor/propeller-rad_sec">
+      <max>
+        <v> 0 </v> <p> motor/driven-rad_sec </p>
+        <difference> <p> motor/windmill-rad_sec </p> {scaled(1e9, "motor/braking")} </difference>
+      </max>
+    </function>
+    <function name="motor/current-a">
+      <max>
+        {scaled(-1e6, "motor/braking")}
+        <quotient> <difference> <p> motor/input-v </p> {back} </difference> <v> {number(r)} </v> </quotient>
+      </max>
+    </function>
+    <function name="motor/battery-power-w"> {product("<p> motor/input-v </p>", "<p> motor/current-a </p>")} </function>
+    <function name="motor/battery-current-a">
+      {product("<p> motor/throttle-norm </p>", "<p> motor/current-a </p>")}
+    </function>
+{_thrust_and_torque(self.propeller, self.windmill, factor)}"""
+
+
+@dataclass(frozen=True, slots=True)
+class FuelEngine:
+    """A piston engine on the propeller's shaft, whose torque is the throttle's share of its largest.
+
+    torque: largest, at sea level, N m; it falls with the air's density.  friction: N m, what turns it when it idles.
+    efficiency: shaft work by the fuel's heat.  windmill: as of `ElectricMotor`.
+    """
+
+    propeller: Propeller
+    torque: float
+    friction: float
+    efficiency: float = 0.2
+    windmill: float = 1.0
+    direction: Place = (1.0, 0.0, 0.0)
+    place: Place = (0.0, 0.0, 0.0)
+
+    def speed(self, throttle: float, airspeed: float, rho: float) -> float:
+        """Speed of the propeller, rad/s."""
+        square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
+        driving = throttle * self.torque * rho / _SEA_LEVEL
+        return max(0.0, root(square, linear, constant + self.friction - driving))
+
+    def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
+        """Thrust, N."""
+        found = self.propeller.thrust_at(self.speed(throttle, airspeed, rho), airspeed, rho)
+        return found if found > 0.0 else self.windmill * found
+
+    def power(self, throttle: float, airspeed: float, rho: float) -> float:
+        """Heat of the fuel, W."""
+        work = throttle * self.torque * rho / _SEA_LEVEL * self.speed(throttle, airspeed, rho)
+        return work / self.efficiency
+
+    def functions(self, factors: tuple[str, ...]) -> str:
+        """JSBSim functions."""
+        factor = _of(factors)
+        speed = factor("motor-speed")
+        parts = (speed, speed, "<p> motor/throttle-norm </p>", "<p> motor/rho-kg_m3 </p>")
+        rest = total("<p> motor/q0 </p>", f"<v> {number(self.friction)} </v>", scaled(-1.0, "motor/drive-n_m"))
+        heat = scaled(1.0 / self.efficiency, "motor/drive-n_m", "motor/propeller-rad_sec")
+        return f"""    <!-- The engine's torque at this throttle and density; the air turns an idle one. -->
+    <function name="motor/drive-n_m">
+      {product(f"<v> {number(self.torque / _SEA_LEVEL)} </v>", *parts)}
+    </function>
+{_parabola(self.propeller)}
+    <function name="motor/driven-rad_sec">
+      {_root_xml("motor/q1", rest)}
+    </function>
+    <function name="motor/propeller-rad_sec"> <max> <v> 0 </v> <p> motor/driven-rad_sec </p> </max> </function>
+    <!-- Heat of the fuel, not electric power: there is no battery. -->
+    <function name="motor/battery-power-w"> {heat} </function>
+    <function name="motor/battery-current-a"> <product> <v> 0 </v> <p> motor/throttle-norm </p> </product> </function>
+{_thrust_and_torque(self.propeller, self.windmill, factor)}"""
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorDisc:
+    """A propeller as a disc that speeds the air up, without a motor of its own (Beard and McLain, first edition, 4.3).
+
+    area: of the disc, m^2.  coefficient: C_prop.  exit_speed: of the air behind it at full throttle, m/s.
+    ducted: whether the exit speed goes from the airspeed up (`krisgry/x8`, after Fitzpatrick), or from 0.
+    efficiency: of motor and propeller beyond the disc's own loss: power of the air by that of the battery.  volts: V.
+
+    The thrust is 0.5 rho S C (v_e^2 - V^2), of a ducted one 0.5 rho S C v_e (v_e - V); it does not brake.
+    """
+
+    area: float
+    coefficient: float
+    exit_speed: float
+    volts: float
+    efficiency: float
+    ducted: bool = False
+    direction: Place = (1.0, 0.0, 0.0)
+    place: Place = (0.0, 0.0, 0.0)
+
+    def functions(self, factors: tuple[str, ...]) -> str:
+        """JSBSim functions."""
+        factor = _of(factors)
+        speed = product(f"<v> {number(self.exit_speed)} </v>", factor("motor-speed"))
+        air = "<p> motor/airspeed-mps </p>"
+        exit_speed = (
+            total(air, product("<p> motor/throttle-norm </p>", f"<difference> {speed} {air} </difference>"))
+            if self.ducted
+            else product(speed, "<p> motor/throttle-norm </p>")
+        )
+        out = "<p> motor/exit-mps </p>"
+        first = out if self.ducted else total(out, air)
+        half = number(0.5 * self.area * self.coefficient)
+        pull = product(
+            f"<v> {half} </v>", factor("thrust"), "<p> motor/rho-kg_m3 </p>", first,
+            f"<difference> {out} {air} </difference>",
+        )  # fmt: skip
+        power = product(f"<v> {number(0.5 / self.efficiency)} </v>", "<p> motor/thrust-n </p>", total(out, air))
+        return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
+    <function name="motor/exit-mps"> {exit_speed} </function>
+    <function name="motor/thrust-n"> <max> <v> 0 </v> {pull} </max> </function>
+    <function name="motor/torque-n_m"> <product> <v> 0 </v> <p> motor/throttle-norm </p> </product> </function>
+    <!-- Power of the air, T (V + v_e) / 2, by the efficiency. -->
+    <function name="motor/battery-power-w"> {power} </function>
+    <function name="motor/battery-current-a">
+      <quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>
+    </function>"""
+
+
+@dataclass(frozen=True, slots=True)
+class ShaftPower:
+    """A propeller whose shaft power follows the throttle, with coefficients of thrust and power as polynomials in J.
+
+    diameter: m.  thrust, power: coefficients of CT and CP by rising power of J.
+    shaft: coefficients of the shaft's power, W, by rising power of the throttle; never below 0.
+    efficiency: of the motor, shaft power by battery power.  volts: V.
+    """
+
+    diameter: float
+    thrust: tuple[float, ...]
+    power: tuple[float, ...]
+    shaft: tuple[float, ...]
+    volts: float
+    efficiency: float
+    direction: Place = (1.0, 0.0, 0.0)
+    place: Place = (0.0, 0.0, 0.0)
+
+    def functions(self, factors: tuple[str, ...]) -> str:
+        """JSBSim functions.  J follows from P / (rho D^2 V^3) = CP(J) / J^3, whose cube root is tabulated."""
+        factor = _of(factors)
+        d = self.diameter
+        speed = factor("motor-speed")
+        shaft = product(
+            speed, speed, speed,
+            f"<max> <v> 0 </v> {_polynomial(self.shaft, '<p> motor/throttle-norm </p>')} </max>",
+        )  # fmt: skip
+        pull = product(
+            f"<v> {number(d**4)} </v>", factor("thrust"), "<p> motor/rho-kg_m3 </p>",
+            "<p> motor/turns-1_s </p>", "<p> motor/turns-1_s </p>",
+            _polynomial(self.thrust, "<p> motor/advance </p>"),
+        )  # fmt: skip
+        return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
+    <function name="motor/shaft-power-w"> {shaft} </function>
+    <function name="motor/flow-mps"> <max> <v> 1 </v> <p> motor/airspeed-mps </p> </max> </function>
+    <function name="motor/loading">
+      <pow>
+        <quotient>
+          <p> motor/shaft-power-w </p>
+          {scaled(d * d, "motor/rho-kg_m3", "motor/flow-mps", "motor/flow-mps", "motor/flow-mps")}
+        </quotient>
+        <v> 0.333333333333333 </v>
+      </pow>
+    </function>
+    <!-- Advance ratio J; without power the propeller turns freely. -->
+    <function name="motor/advance">
+      <table>
+        <independentVar lookup="row"> motor/loading </independentVar>
+        <tableData>
+{self._advance_table()}
+        </tableData>
+      </table>
+    </function>
+    <function name="motor/turns-1_s">
+      <quotient> <p> motor/flow-mps </p> {scaled(d, "motor/advance")} </quotient>
+    </function>
+    <function name="motor/propeller-rad_sec"> {scaled(_TURN, "motor/turns-1_s")} </function>
+    <function name="motor/thrust-n"> {pull} </function>
+    <function name="motor/torque-n_m">
+      <quotient> <p> motor/shaft-power-w </p> <p> motor/propeller-rad_sec </p> </quotient>
+    </function>
+    <function name="motor/battery-power-w"> {scaled(1.0 / self.efficiency, "motor/shaft-power-w")} </function>
+    <function name="motor/battery-current-a">
+      <quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>
+    </function>"""
+
+    def _advance_table(self) -> str:
+        """Rows of the cube root of CP(J) / J^3, rising, and of J, from where CP is 0 down to a standing aircraft."""
+        high = next(k / 1000.0 for k in range(50, 3000) if _value(self.power, k / 1000.0) <= 0.0)
+        rows = [(0.0, high)]
+        # Where the power falls away, the root is steep: finer towards it.
+        for k in range(1, 201):
+            j = high * (1.0 - (k / 200.0) ** 2 * 0.99)
+            loading = max(0.0, _value(self.power, j)) ** (1.0 / 3.0) / j
+            if loading > rows[-1][0]:
+                rows.append((loading, j))
+        return "\n".join(f"          {loading:.9f}  {j:.9f}" for loading, j in rows)
+
+
+_SEA_LEVEL = 1.225
+
+
+def _of(factors: tuple[str, ...]) -> Callable[[str], str]:
+    """The element of a factor of the model, or 1 for one that it has not."""
+    return lambda name: f"<p> ident/{name} </p>" if name in factors else "<v> 1 </v>"
+
+
+def _value(coefficients: tuple[float, ...], x: float) -> float:
+    return sum(value * x**k for k, value in enumerate(coefficients))
+
+
+def _polynomial(coefficients: tuple[float, ...], x: str) -> str:
+    """A polynomial in an element, by Horner."""
+    *rest, last = coefficients
+    text = f"<v> {number(last)} </v>"
+    for value in reversed(rest):
+        text = total(f"<v> {number(value)} </v>", product(x, text))
+    return text
+
+
+def _parabola(propeller: Propeller) -> str:
+    """The propeller's torque Q = q2 w^2 + q1 w + q0 at its speed w, rad/s."""
+    square, linear, constant = propeller.torque_parabola(1.0, 1.0)
+    rho, air = "motor/rho-kg_m3", "motor/airspeed-mps"
+    return f"""    <!-- Torque of the propeller of {number(propeller.diameter)} m, q2 w^2 + q1 w + q0 at w rad/s. -->
+    <function name="motor/q2"> {scaled(square, rho)} </function>
+    <function name="motor/q1"> {scaled(linear, rho, air)} </function>
+    <function name="motor/q0"> {scaled(constant, rho, air, air)} </function>"""
+
+
+def _root_xml(linear: str, constant: str) -> str:
+    """The larger root of ``motor/q2`` w^2 + linear w + constant, without a complex one."""
+    inside = f"""<difference>
+              {product(f"<p> {linear} </p>", f"<p> {linear} </p>")}
+              {product("<v> 4 </v>", "<p> motor/q2 </p>", constant)}
+            </difference>"""
+    return f"""<quotient>
+        <difference>
+          <sqrt> <max> <v> 0 </v>
+            {inside}
+          </max> </sqrt>
+          <p> {linear} </p>
+        </difference>
+        {scaled(2.0, "motor/q2")}
+      </quotient>"""
+
+
+def _thrust_and_torque(propeller: Propeller, windmill: float, factor: Callable[[str], str]) -> str:
+    d, (c0, c1, c2) = propeller.diameter, propeller.thrust
+    braking = "<min> <v> 0 </v> <p> motor/pull-n </p> </min>"
+    w, air = "motor/propeller-rad_sec", "motor/airspeed-mps"
+    pull = total(scaled(c0 * d**4 / _TURN**2, w, w), scaled(c1 * d**3 / _TURN, air, w), scaled(c2 * d**2, air, air))
+    return f"""    <!-- T = rho n^2 D^4 CT(V / n D); below zero the idle propeller's drag. -->
+    <function name="motor/pull-n"> {product("<p> motor/rho-kg_m3 </p>", factor("thrust"), pull)} </function>
+    <function name="motor/thrust-n">
+      <sum>
+        <max> <v> 0 </v> <p> motor/pull-n </p> </max>
+        {product(f"<v> {number(windmill)} </v>", factor("windmill-drag"), braking)}
+      </sum>
+    </function>
+    <function name="motor/torque-n_m">
+      <sum> {scaled(1.0, "motor/q2", w, w)} {scaled(1.0, "motor/q1", w)} <p> motor/q0 </p> </sum>
+    </function>"""

@@ -1,0 +1,200 @@
+"""What is not known of an aircraft: the factors of its model, each with a standard deviation, and draws of them all.
+
+Beside the model stands ``uncertainty.toml`` (of a data sheet) or ``posterior.toml`` (of flight logs), and
+``draws.csv``, a row a draw: the columns are the model's properties, such as ``ident/thrust``.
+"""
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.errors import FlightError
+from world.files import read_small_file, read_toml, utf8_text
+
+Floats = NDArray[np.float64]
+
+# The first that is there counts.
+FILES = ("posterior.toml", "uncertainty.toml")
+DRAWS_FILE = "draws.csv"
+DRAWS = 512
+MAX_BYTES = 4 * 2**20
+_PREFIX = "ident/"
+
+
+@dataclass(frozen=True, slots=True)
+class UncertainQuantity:
+    """One property of the model that is not known for certain.
+
+    name: of the property.  unit: "factor", or that of an offset.  estimate, sd: mean and standard deviation.
+    reason: where the deviation is from, for a person.
+    """
+
+    name: str
+    unit: str
+    estimate: float
+    sd: float
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """What is not known of an aircraft.
+
+    source: what it was made from: "a data sheet", "flight logs".
+    climb, descent: standard deviations of the steepest climb and descent at cruise, rad.
+    quantities: of the model.
+    """
+
+    source: str
+    climb: float
+    descent: float
+    quantities: tuple[UncertainQuantity, ...] = ()
+
+
+def read_uncertainty(folder: Path) -> Uncertainty | None:
+    """What stands beside the model in an aircraft's folder; None where nothing does.
+
+    Raises FlightError, in one line, for a file that cannot be read or used.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> read_uncertainty(load_aircraft("aerosonde").folder) is None
+    True
+    """
+    file = next((folder / name for name in FILES if (folder / name).is_file()), None)
+    if file is None:
+        return None
+    try:
+        table = read_toml(file, "uncertainty")
+    except OSError as error:
+        raise FlightError(f"{file}: {error.strerror}", file=file) from None
+    except ValueError as error:
+        raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
+    source = table.get("source", "flight logs" if file.name == FILES[0] else "a data sheet")
+    if not isinstance(source, str) or not source.strip():
+        raise FlightError.at(str(file), "source", source, "a text is expected", shown=repr(source))
+    climb, descent = (math.radians(_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg"))
+    entries = [entry for value in table.values() if isinstance(value, list) for entry in value]
+    quantities = tuple(_quantity(entry, file) for entry in entries if isinstance(entry, dict) and "property" in entry)
+    return Uncertainty(source, climb, descent, quantities)
+
+
+def _number(table: dict[str, Any], key: str, file: Path, low: float, high: float) -> float:
+    """A number of a table, 0 where it is not stated.  Raises FlightError."""
+    value = table.get(key, 0.0)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise FlightError.at(str(file), key, value, f"a number from {low:g} to {high:g} is expected", shown=repr(value))
+    return float(value)
+
+
+def _quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
+    name = entry["property"]
+    _check_name(name, str(file), "property")
+    estimate, sd = (_number(entry, key, file, low, 1e6) for key, low in (("estimate", -1e6), ("sd", 0.0)))
+    return UncertainQuantity(name, str(entry.get("unit", "factor")), estimate, sd, str(entry.get("reason", "")))
+
+
+def _check_name(name: object, file: str, field: str) -> None:
+    # JSBSim aborts the process over a name with a space in it.
+    if not isinstance(name, str) or not name.startswith(_PREFIX) or not name.isascii() or len(name.split()) != 1:
+        raise FlightError.at(file, field, name, f"a property {_PREFIX}NAME is expected", shown=repr(name))
+
+
+def uncertainty_text(known: Uncertainty) -> str:
+    """The text of an ``uncertainty.toml``."""
+    lines = [
+        "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
+        "",
+        f'source = "{known.source}"',
+        f"climb_sd_deg = {math.degrees(known.climb):.2f}    # of the steepest climb at cruise, one standard deviation",
+        f"descent_sd_deg = {math.degrees(known.descent):.2f}  # of the steepest descent",
+    ]
+    for one in known.quantities:
+        reason = one.reason.replace("\\", "/").replace('"', "'")
+        lines += [
+            "",
+            "[[quantity]]",
+            f'property = "{one.name}"',
+            f'unit = "{one.unit}"',
+            f"estimate = {one.estimate:.6g}",
+            f"sd = {one.sd:.4g}",
+            f'reason = "{reason}"',
+        ]
+    return "\n".join(lines) + "\n"
+
+
+# ----------------------------------------------------------------------
+# Draws: whole aircraft, each a row of values.
+
+
+@dataclass(frozen=True, slots=True)
+class Draws:
+    """Draws of an aircraft's properties.
+
+    names: (p,) of the properties.  values: (n, p).  source: the file.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    source: str = ""
+
+    def row(self, seed: int) -> int:
+        """Which row a flight with this seed has."""
+        return seed % len(self.values)
+
+    def properties(self, seed: int) -> tuple[tuple[str, float], ...]:
+        """The properties of a flight with this seed, by name."""
+        return tuple(zip(self.names, self.values[self.row(seed)].tolist(), strict=True))
+
+
+def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAWS, seed: int = 1) -> Draws:
+    """Draw each quantity by itself: a factor log-normally, so that it stays positive, anything else normally.
+
+    >>> one = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2)
+    >>> drawn = draw_quantities((one,)).values
+    >>> bool(drawn.min() > 0.0), round(float(drawn.mean()), 1), round(float(drawn.std()), 1)
+    (True, 1.0, 0.2)
+    """
+    normal = np.random.default_rng(seed).standard_normal((count, len(quantities)))
+    values = np.empty_like(normal)
+    for k, one in enumerate(quantities):
+        if one.unit == "factor":
+            spread = math.sqrt(math.log1p((one.sd / one.estimate) ** 2))
+            values[:, k] = one.estimate * np.exp(spread * normal[:, k] - 0.5 * spread**2)
+        else:
+            values[:, k] = one.estimate + one.sd * normal[:, k]
+    return Draws(tuple(one.name for one in quantities), values.round(6))
+
+
+def draws_text(draws: Draws) -> str:
+    """The text of a ``draws.csv``."""
+    lines = [",".join(draws.names), *(",".join(f"{value:.9g}" for value in row) for row in draws.values.tolist())]
+    return "\n".join(lines) + "\n"
+
+
+def read_draws(path: Path, error: type[FlightError] = FlightError) -> Draws:
+    """Read a ``draws.csv``.  Raises FlightError, with the line, for one that cannot be read or used."""
+    text = utf8_text(read_small_file(path, MAX_BYTES, "draws", error), path, error)
+    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    if len(rows) < 2:
+        message = f"{path}: a line of properties and at least one of values are expected"
+        raise error(message, file=path)
+    names = tuple(name.strip() for name in rows[0])
+    for name in names:
+        _check_name(name, f"{path}:1", "property")
+    values = []
+    for number, row in enumerate(rows[1:], 2):
+        try:
+            line = [float(value) for value in row]
+        except ValueError:
+            line = []
+        if len(line) != len(names) or not all(map(math.isfinite, line)):
+            allowed = f"{len(names)} finite numbers are expected"
+            raise error(f"{path}:{number}: {','.join(row)[:60]}: {allowed}", file=path, value=row, allowed=allowed)
+        values.append(line)
+    return Draws(names, np.array(values), str(path))

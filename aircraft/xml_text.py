@@ -1,0 +1,37 @@
+"""Small pieces of JSBSim's XML for functions: numbers, products, sums."""
+
+
+def number(value: float) -> str:
+    """A number with all the digits that matter.
+
+    >>> number(0.1), number(2.0), number(-1 / 3)
+    ('0.1', '2', '-0.333333333333')
+    """
+    return f"{value + 0.0:.12g}"
+
+
+def product(*parts: str) -> str:
+    """A product of these elements.
+
+    >>> product("<p> a </p>", "<v> 2 </v>")
+    '<product> <p> a </p> <v> 2 </v> </product>'
+    """
+    return f"<product> {' '.join(parts)} </product>"
+
+
+def scaled(value: float, *properties: str) -> str:
+    """A number times properties.
+
+    >>> scaled(2.0, "x", "y")
+    '<product> <v> 2 </v> <p> x </p> <p> y </p> </product>'
+    """
+    return product(f"<v> {number(value)} </v>", *(f"<p> {name} </p>" for name in properties))
+
+
+def total(*parts: str) -> str:
+    """A sum of these elements.
+
+    >>> total("<v> 1 </v>", "<p> a </p>")
+    '<sum> <v> 1 </v> <p> a </p> </sum>'
+    """
+    return f"<sum> {' '.join(parts)} </sum>"

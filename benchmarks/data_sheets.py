@@ -1,0 +1,167 @@
+"""Aircraft from data sheets: whether random ones fly, and whether their intervals hold what published aircraft do.
+
+``python -m benchmarks.data_sheets [--sheets N] [--seed S]``.  Random sheets of all classes (0.5 to 25 kg; tail, V-tail,
+flying wing; battery, fuel) are made into aircraft, each of which flies 5 km with turns, climbs and descents in wind and
+light turbulence, by planfly's guidance and by ArduPlane's law.  Then the data sheets of published aircraft: whether the
+stated intervals hold the published model's climb, sink and cruise power.
+"""
+
+import argparse
+import math
+import tempfile
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from aircraft.data_sheet import DataSheet, check_sheet
+from benchmarks.flight import errors_of
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import load_parameters
+from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.trim import full_throttle, idle, straight
+from flight.simulation.simulate import simulate
+from planfly.data_sheets import make_data_sheet_folder
+from tests.setups import setup_maker
+from world.errors import FlightError
+
+Floats = NDArray[np.float64]
+
+SHEETS = 20
+LENGTH = 5000.0
+AMSL = 500.0
+# Wind as a share of the cruise speed, up to; slopes as shares of the steepest climb and descent, up to.
+WIND, SLOPE = 0.3, 0.5
+
+
+def random_sheet(random: np.random.Generator) -> DataSheet:
+    """A sheet of a small aircraft: its mass log-uniform, speeds and span of the size that such a mass has.
+
+    Wing loading and span are those of aircraft of this mass within a factor of 1.5.
+    """
+    mass = math.exp(random.uniform(math.log(0.5), math.log(25.0)))
+    layout = ("tail", "wing", "vtail")[int(random.integers(3))]
+    span = 1.25 * mass**0.38 * math.exp(random.uniform(-0.25, 0.25))
+    loading = 6.0 * mass**0.4 * math.exp(random.uniform(-0.4, 0.4))  # kg/m^2
+    stall = math.sqrt(loading * 9.81 / (0.5 * 1.225 * (1.05 if layout == "wing" else 1.25)))
+    cruise = stall * random.uniform(1.3, 1.7)
+    fuelled = mass > 6.0 and random.random() < 0.5
+    more: dict[str, float] = {}
+    if random.random() < 0.5:
+        more["top"] = cruise * random.uniform(1.25, 1.6)
+        more["climb"] = math.radians(random.uniform(8.0, 16.0))
+    return DataSheet(
+        mass=round(mass, 2), span=round(span, 2), cruise=round(cruise, 1), stall=round(stall, 1), layout=layout,
+        fuel=round(0.15 * mass, 2) if fuelled else 0.0, **more,
+    )  # fmt: skip
+
+
+def sheets(count: int, seed: int) -> list[DataSheet]:
+    """So many random sheets; one that is no aircraft is drawn anew."""
+    random = np.random.default_rng(seed)
+    found: list[DataSheet] = []
+    while len(found) < count:
+        sheet = random_sheet(random)
+        try:
+            check_sheet(sheet)
+        except FlightError:
+            continue
+        found.append(sheet)
+    return found
+
+
+def route(aircraft: Aircraft, random: np.random.Generator, climb: float, descent: float) -> Floats:
+    """(w, 3) waypoints, 5 km in all: turns of 20 to 90 degrees, slopes up to half of what the aircraft can."""
+    legs = 7
+    runs = random.uniform(0.6, 1.4, legs)
+    runs *= LENGTH / runs.sum()
+    turns = random.uniform(math.radians(20.0), math.radians(90.0), legs) * random.choice((-1.0, 1.0), legs)
+    courses = random.uniform(0.0, 2.0 * math.pi) + np.cumsum(turns)
+    slopes = random.uniform(-SLOPE * descent, SLOPE * climb, legs)
+    steps = np.column_stack([runs * np.sin(courses), runs * np.cos(courses), runs * np.tan(slopes)])
+    way: Floats = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]) + np.array([0.0, 0.0, AMSL])
+    return way
+
+
+def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float]]:
+    """How the flight ended by each law, and its largest errors across and in height, m."""
+    random = np.random.default_rng([seed, 7])
+    make = setup_maker(aircraft)
+    climb, descent = make(np.array([[0.0, 0.0, AMSL], [0.0, 500.0, AMSL]])).envelope.air_angles(aircraft.airspeed, AMSL)
+    wind = (float(random.uniform(0.0, WIND * aircraft.airspeed)), float(random.uniform(0.0, 360.0)))
+    setup = make(
+        route(aircraft, random, climb, descent), wind=wind, turbulence="light", seed=seed, speeds=aircraft.airspeed,
+        bank_deg=math.degrees(aircraft.max_bank),
+    )  # fmt: skip
+    setup = replace(setup, battery=aircraft.battery_energy / 3600.0)
+    found = {}
+    for name, flown_by in (("planfly", setup.autopilot), ("arduplane", ArduPlane(load_parameters(aircraft)))):
+        flown = simulate(replace(setup, autopilot=flown_by), aircraft)
+        errors = errors_of(flown)
+        found[name] = (flown.ended, errors.cross_max, errors.height_max)
+    return found
+
+
+def fly_random_sheets(count: int, seed: int) -> dict[str, int]:
+    """How many of the random sheets complete their mission by each law."""
+    done = {"planfly": 0, "arduplane": 0}
+    print(f"{count} random data sheets (seed {seed}), {LENGTH / 1000.0:g} km each:")
+    with tempfile.TemporaryDirectory() as place:
+        for k, sheet in enumerate(sheets(count, seed)):
+            began = time.perf_counter()
+            made = make_data_sheet_folder(Path(place) / f"sheet{k}", sheet)
+            seconds = time.perf_counter() - began
+            found = fly_both(made, k)
+            what = f"{sheet.mass:5.2f} kg {sheet.span:.2f} m {sheet.cruise:4.1f} m/s {sheet.layout:5}"
+            what += " fuel    " if sheet.fuelled else " electric"
+            flights = []
+            for name, (ended, across, height) in found.items():
+                done[name] += ended == "completed"
+                flights.append(f"{name} {ended}, off by {across:.1f} m across, {height:.1f} m in height")
+            print(f"  {k:2} {what} ({seconds:.1f} s): {'; '.join(flights)}", flush=True)
+    print(f"  completed: {done['planfly']} and {done['arduplane']} of {count}")
+    return done
+
+
+# ----------------------------------------------------------------------
+# Data sheets of published aircraft.
+
+
+@dataclass(frozen=True, slots=True)
+class Performance:
+    """Steepest climb at cruise, rad; sink without power, m/s; power in level flight, W; all at 500 m."""
+
+    climb: float
+    sink: float
+    power: float
+
+
+def performance(aircraft: Aircraft, variation: Variation | None = None) -> Performance:
+    """What a model does at its cruise speed; NaN where it has no such flight."""
+    fdm = Fdm(aircraft, variation=variation, tried=True)
+    speed = aircraft.airspeed
+    level = straight(fdm, speed, AMSL)
+    power = math.nan
+    if level is not None:
+        fdm.balance(level.vector())
+        power = float(fdm.read().power)
+    up, down = full_throttle(fdm, speed, AMSL, level), idle(fdm, speed, AMSL, level)
+    return Performance(
+        math.nan if up is None else up.climb, math.nan if down is None else -speed * math.sin(down.climb), power
+    )
+
+
+def main() -> None:
+    """Print both parts."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.data_sheets")
+    parser.add_argument("--sheets", type=int, default=SHEETS)
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    fly_random_sheets(args.sheets, args.seed)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,173 @@
+"""Gains that follow from an aircraft's model by a rule, in a second: its linear model, and round figures for the rest.
+
+The airframe's own gains are read off a linear model in level flight at cruise (500 m); the loops about roll and pitch
+are placed by its control power, as fast as its servos and its airspeed allow.
+"""
+
+import math
+from dataclasses import fields
+
+import numpy as np
+
+from aircraft.catalog import Aircraft
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import Floats, linearise, straight
+from flight.guidance.gains import Gains
+from world.errors import FlightError
+
+# Height that the model is linearised at, m.
+AMSL = 500.0
+# Round figures at an airspeed of 25 m/s, of the size that searches of the Aerosonde found
+# (`benchmarks.tuning.tune_gains`): an aircraft that is slower does all of it sooner, one that is faster later.
+ROUND_FIGURES = {
+    "cross_track_frequency": 1.0,
+    "cross_track_damping": 0.8,
+    "cross_track_integral": 0.05,
+    "turn_lead": 0.2,
+    "turn_smoothing": 0.2,
+    "aside_frequency": 1.0,
+    "side_gain": 0.5,
+    "side_lag": 0.1,
+    "push_lead": 0.05,
+    "push_smoothing": 0.1,
+    "roll_frequency": 6.0,
+    "roll_gain": 1.0,
+    "roll_rate_gain": 0.1,
+    "roll_disturbance_lag": 0.1,
+    "aileron_lead": 0.03,
+    "yaw_rate_gain": 0.2,
+    "sideslip_gain": 0.5,
+    "height_frequency": 1.0,
+    "height_damping": 1.0,
+    "height_integral": 0.1,
+    "slope_lead": 0.2,
+    "load_lead": 0.1,
+    "pitch_rate_gain": 0.2,
+    "speed_gain": 0.1,
+    "speed_integral": 0.01,
+    "throttle_per_slope": 2.0,
+}
+_POWERS = {"frequency": -1, "lead": 1, "smoothing": 1, "lag": 1, "cross_track_integral": -3, "height_integral": -3}
+# A loop about roll closes at this phase of the servo's lag, rad; its damping.
+_SERVO_PHASE, _DAMPING = 0.4, 0.8
+# What does not follow from the model.
+_LIMITS = {
+    "intercept": math.radians(35.0),
+    "roll_rate_max": math.radians(80.0),
+    "roll_acceleration_max": math.radians(400.0),
+    "sideslip_max": 0.0,
+    "arc_slowing_time": 5.0,
+}
+
+
+def at_airspeed(airspeed: float) -> dict[str, float]:
+    """`ROUND_FIGURES` for an airspeed, m/s.  Gains on surfaces are per airspeed's own effect on them, and stay."""
+    ratio = airspeed / 25.0
+    found: dict[str, float] = {}
+    for name, value in ROUND_FIGURES.items():
+        power = next((power for end, power in _POWERS.items() if name.endswith(end)), 0)
+        found[name] = value * ratio**power
+    return found
+
+
+def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, float]:
+    """The gains that are the airframe's own, off its linearisation in level cruise.
+
+    Raises FlightError for an aircraft that holds no level flight at cruise.
+    """
+    return _airframe_gains(aircraft, *_linear(aircraft, fdm))
+
+
+def _linear(aircraft: Aircraft, fdm: Fdm | None) -> tuple[Floats, Floats]:
+    fdm = Fdm(aircraft) if fdm is None else fdm
+    level = straight(fdm, aircraft.airspeed, AMSL)
+    if level is None:
+        message = f"{aircraft.name} holds no level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
+        raise FlightError(message, file=aircraft.model_file, field="airspeed", value=aircraft.airspeed)
+    return linearise(fdm, level)
+
+
+def _airframe_gains(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
+    speed = aircraft.airspeed
+    _, v, w, p, q, r = range(6)
+    elevator, aileron, rudder = range(3)
+    # Steady yaw rate without sideslip: ailerons and rudder balance its rolling and yawing moments.
+    steered = abs(b[r, rudder]) > 1e-6
+    hold = np.linalg.solve(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])[1] if steered else 0.0
+    return {
+        "reference_airspeed": speed,
+        "alpha_per_g": -9.80665 / (a[w, w] * speed),
+        "elevator_per_alpha": -a[q, w] * speed / b[q, elevator],
+        "elevator_per_pitch_rate": -a[q, q] / b[q, elevator],
+        "aileron_per_roll_rate": -a[p, p] / b[p, aileron],
+        "aileron_per_roll_acceleration": 1.0 / b[p, aileron],
+        "rudder_per_yaw_rate": -float(hold),
+        "side_per_sideslip": -a[v, v] * speed,
+        "side_per_aileron": b[v, aileron],
+    }
+
+
+def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
+    """All gains of an aircraft, by the rule of this file.
+
+    fdm: of the aircraft, with an engine at rest; None makes one.
+    Raises FlightError as `airframe_gains` does.
+    """
+    a, b = _linear(aircraft, fdm)
+    own = _airframe_gains(aircraft, a, b)
+    placed = at_airspeed(aircraft.airspeed) | own | _LIMITS
+    _, _, _, p, q, r = range(6)
+    elevator, aileron, rudder = range(3)
+    # Roll: two poles as fast as the servo lets them be.
+    fastest = _SERVO_PHASE / aircraft.surface_lag
+    frequency = min(fastest, placed["roll_frequency"])
+    power, damping = b[p, aileron], -a[p, p]
+    placed["roll_frequency"] = frequency
+    placed["roll_gain"] = frequency**2 / power
+    placed["roll_rate_gain"] = max(0.2 * frequency, 2.0 * _DAMPING * frequency - damping) / power
+    placed["roll_rate_max"] = min(placed["roll_rate_max"], 0.6 * aircraft.max_aileron * power / damping)
+    placed["roll_acceleration_max"] = min(placed["roll_acceleration_max"], 0.5 * aircraft.max_aileron * power)
+    # Pitch: damping for the short period, as far as the servo's lag leaves it damping.
+    stiffness = max(1.0, -a[q, 2] * aircraft.airspeed)
+    missing = 2.0 * _DAMPING * math.sqrt(stiffness) + a[q, q] + a[2, 2]
+    placed["pitch_rate_gain"] = min(max(0.0, missing), fastest) / -b[q, elevator]
+    steering = -b[r, rudder]
+    if steering > 1e-6:
+        placed["yaw_rate_gain"] = 1.5 * placed["cross_track_frequency"] / steering
+        placed["sideslip_gain"] = 0.5
+        placed["sideslip_max"] = math.radians(3.0)
+    else:
+        placed["yaw_rate_gain"] = placed["sideslip_gain"] = placed["side_gain"] = 0.0
+    placed["slow_margin"] = 0.16 * aircraft.airspeed
+    placed["arc_slowing_max"] = 0.08 * aircraft.airspeed
+    return Gains(**placed)
+
+
+# Units of the keys in a file, by the gains' names; those without one are plain numbers.
+_UNITS = {
+    "reference_airspeed": "_mps", "cross_track_frequency": "_rad_s", "cross_track_integral": "_1_s3",
+    "turn_lead": "_s", "turn_smoothing": "_s", "aside_frequency": "_rad_s", "side_lag": "_s", "push_lead": "_s",
+    "push_smoothing": "_s", "height_frequency": "_rad_s", "height_integral": "_1_s3", "slope_lead": "_s",
+    "load_lead": "_s", "speed_gain": "_1_s", "speed_integral": "_1_s2", "roll_frequency": "_rad_s",
+    "roll_rate_gain": "_s", "roll_disturbance_lag": "_s", "aileron_lead": "_s", "pitch_rate_gain": "_s",
+    "yaw_rate_gain": "_s", "elevator_per_pitch_rate": "_s", "aileron_per_roll_rate": "_s",
+    "aileron_per_roll_acceleration": "_s2", "rudder_per_yaw_rate": "_s", "side_per_sideslip": "_mps2",
+    "side_per_aileron": "_mps2", "intercept": "_deg", "slow_margin": "_mps", "roll_rate_max": "_deg_s",
+    "roll_acceleration_max": "_deg_s2", "sideslip_max": "_deg", "arc_slowing_time": "_s", "arc_slowing_max": "_mps",
+}  # fmt: skip
+
+
+def gains_text(gains: Gains) -> str:
+    """The text of a ``gains.toml``; what has its default is left out."""
+    usual = {item.name: item.default for item in fields(Gains)}
+    lines = [
+        "# Gains of the guidance and inner loops; flight/guidance/gains.py says what each means.",
+        "# They follow from the linear model in level cruise by the rule of flight/guidance/model_gains.py.",
+        "",
+    ]
+    for item in fields(Gains):
+        value, unit = getattr(gains, item.name), _UNITS.get(item.name, "")
+        if value != usual[item.name]:
+            shown = math.degrees(value) if "_deg" in unit else value
+            lines.append(f"{item.name}{unit} = {float(f'{shown:.4g}')!r}")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,516 @@
+"""A whole aircraft's folder from a data sheet: model, metadata, gains, ArduPlane's parameters, what is not known."""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from aircraft.catalog import Aircraft, check_new_folder, read_aircraft
+from aircraft.data_sheet import (
+    FUEL_HEAT,
+    RANGES,
+    SEA_LEVEL,
+    SHEET_DENSITY,
+    DataSheet,
+    SizedAircraft,
+    check_sheet,
+    size_aircraft,
+)
+from aircraft.envelope import GRAVITY, turn_radius
+from aircraft.model_writer import FACTORS, Layout, model_xml
+from aircraft.uncertainty import (
+    DRAWS,
+    DRAWS_FILE,
+    UncertainQuantity,
+    Uncertainty,
+    draw_quantities,
+    draws_text,
+    uncertainty_text,
+)
+from flight.autopilots.arduplane.parameters import DEFINITIONS, Entry, read_parameter_file
+from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.trim import Simulator, Trim, fastest, full_throttle, idle, linearise, slowest, straight
+from flight.guidance.model_gains import AMSL, gains_of_model, gains_text
+from world.errors import FlightError
+from world.files import temporary_folder, write_folder
+
+# ----------------------------------------------------------------------
+# A file of ArduPlane's parameters says what its owner measured, where it differs from ArduPlane's own value.
+
+# What is taken of it; speeds are equivalent airspeeds, and read as the sheet's.
+_TAKEN = (
+    *("AIRSPEED_CRUISE", "AIRSPEED_MIN", "AIRSPEED_MAX", "TRIM_THROTTLE"),
+    *("TECS_CLMB_MAX", "TECS_SINK_MIN", "ROLL_LIMIT_DEG"),
+)
+_STALL_BY_LEAST = 1.2
+
+
+def stated_parameters(file: Path) -> dict[str, float]:
+    """Of a parameter file what says something of the aircraft: by present names, where they differ from ArduPlane's.
+
+    Raises ParameterError for a file that cannot be read.
+    """
+    entries = read_parameter_file(file)
+    found = {}
+    for definition in DEFINITIONS.values():
+        if definition.name not in _TAKEN:
+            continue
+        value = _stated(entries, definition.name, definition.old)
+        if value is not None and abs(value - definition.default) > 1e-6 * max(1.0, abs(definition.default)):
+            found[definition.name] = value
+    return found
+
+
+def _stated(entries: Mapping[str, Entry], name: str, old: tuple[str, float] | None) -> float | None:
+    if name in entries:
+        return entries[name].value
+    return entries[old[0]].value * old[1] if old is not None and old[0] in entries else None
+
+
+def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
+    """A sheet with what parameters add to it; what the sheet states itself stays.
+
+    >>> sheet = DataSheet(2.1, 1.6, 0.0, 0.0)
+    >>> filled = with_parameters(sheet, {"AIRSPEED_CRUISE": 15.0, "AIRSPEED_MIN": 12.0, "TECS_CLMB_MAX": 3.0})
+    >>> filled.cruise, filled.stall, round(math.degrees(filled.climb), 2)
+    (15.0, 10.0, 11.54)
+    """
+    made = replace(
+        sheet,
+        cruise=sheet.cruise or stated.get("AIRSPEED_CRUISE", 0.0),
+        stall=sheet.stall or stated.get("AIRSPEED_MIN", 0.0) / _STALL_BY_LEAST,
+        bank=sheet.bank or math.radians(stated.get("ROLL_LIMIT_DEG", 0.0)),
+        trim_throttle=sheet.trim_throttle or 0.01 * stated.get("TRIM_THROTTLE", 0.0),
+        sink=sheet.sink or stated.get("TECS_SINK_MIN", 0.0),
+    )
+    climb = stated.get("TECS_CLMB_MAX", 0.0)
+    if not made.climb and climb and made.cruise > climb:
+        made = replace(made, climb=math.asin(climb / made.cruise))
+    return made
+
+
+# ----------------------------------------------------------------------
+# A sheet from what a person types: degrees, inches, volts and ampere hours.
+
+_INCH = 0.0254
+_BATTERY = re.compile(r"([0-9.]+)\s*V\s*,\s*([0-9.]+)\s*(Ah|Wh|mAh)", re.IGNORECASE)
+_PROPELLER = re.compile(r"([0-9.]+)\s*[xX]\s*([0-9.]+)")
+_VOLTS, _HOURS, _INCHES = (3.0, 60.0), (0.5, 5000.0), (3.0, 40.0)
+
+
+def parse_sheet(
+    numbers: Mapping[str, float | None], *, battery: str | None, prop: str | None, layout: str | None
+) -> DataSheet:
+    """The sheet of these options; angles in degrees.  Raises FlightError, in one line, for what cannot be read.
+
+    >>> sheet = parse_sheet({"mass": 2.1, "climb": 10.0}, battery="14.8V,5Ah", prop="12x6", layout="wing")
+    >>> round(sheet.climb, 4), sheet.volts, round(sheet.energy / 3600.0), round(sheet.propeller[0], 4)
+    (0.1745, 14.8, 74, 0.3048)
+    """
+    values = {}
+    for name, value in numbers.items():
+        if value is None:
+            continue
+        _, unit, low, high, factor = RANGES[name]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            allowed = f"allowed {low:g}..{high:g} {unit}"
+            raise FlightError.of_argument(name, value, allowed, shown=f"{value} {unit}")
+        values[name] = value * factor
+    volts, energy = _read_battery(battery) if battery is not None else (0.0, 0.0)
+    propeller = _read_propeller(prop) if prop is not None else (0.0, 0.0)
+    kinds: dict[str, Layout] = {"tail": "tail", "wing": "wing", "vtail": "vtail"}
+    if layout is not None and layout not in kinds:
+        raise FlightError.of_argument("layout", layout, f"{', '.join(kinds)} is expected")
+    known = {"mass": 0.0, "span": 0.0, "cruise": 0.0, "stall": 0.0} | values
+    return DataSheet(**known, volts=volts, energy=energy, propeller=propeller, layout=kinds[layout or "tail"])
+
+
+def _read_battery(text: str) -> tuple[float, float]:
+    match = _BATTERY.fullmatch(text.strip())
+    volts, amount = (_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
+    unit = match[3].lower() if match else ""
+    hours = amount if unit == "wh" else volts * amount * (0.001 if unit == "mah" else 1.0)
+    if not (_VOLTS[0] <= volts <= _VOLTS[1] and _HOURS[0] <= hours <= _HOURS[1]):
+        allowed = (
+            f"volts and capacity are expected, such as 14.8V,5Ah: {_VOLTS[0]:g}..{_VOLTS[1]:g} V,"
+            f" {_HOURS[0]:g}..{_HOURS[1]:g} Wh"
+        )
+        raise FlightError.of_argument("battery", text, allowed)
+    return volts, 3600.0 * hours
+
+
+def _read_propeller(text: str) -> tuple[float, float]:
+    match = _PROPELLER.fullmatch(text.strip())
+    diameter, pitch = (_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
+    if not (_INCHES[0] <= diameter <= _INCHES[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
+        allowed = (
+            f"inches of diameter and pitch are expected, such as 12x6: {_INCHES[0]:g}..{_INCHES[1]:g},"
+            " and a quarter to one and a half of that"
+        )
+        raise FlightError.of_argument("prop", text, allowed)
+    return diameter * _INCH, pitch * _INCH
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+# ----------------------------------------------------------------------
+# What is not known: standard deviations of the model's factors.
+
+# Of what is guessed, as a share, and why.
+_SPREADS = {
+    "zero-lift-drag": (0.25, "least drag from published aircraft of the class"),
+    "induced-drag": (0.20, "span efficiency from published aircraft of the class"),
+    "thrust": (0.20, "propeller scaled to the climb"),
+    "motor-speed": (0.07, "motor scaled to the climb and the top speed"),
+    "windmill-drag": (0.50, "what an idle propeller brakes depends on hub and controller"),
+    "lift-slope": (0.10, "lift curve slope from published aircraft of the class"),
+    "pitch-stiffness": (0.25, "where the centre of gravity is"),
+    "pitch-damping": (0.25, "pitch damping from published aircraft of the class"),
+    "elevator-power": (0.15, "elevator scaled to the stall"),
+    "roll-damping": (0.20, "roll damping from published aircraft of the class"),
+    "aileron-power": (0.20, "ailerons from published aircraft of the class"),
+}
+# Of the steepest climb, rad: guessed, and stated.  Measured on three aircraft of known truth, a scaled model was off by
+# 4.8 degrees on average (docs/measured.md).
+GUESSED_CLIMB, STATED_CLIMB = math.radians(5.0), math.radians(3.0)
+# Of the least drag where a sink without power is stated.
+STATED_DRAG = 0.15
+_PROPULSION = ("thrust", "motor-speed")
+
+
+def _uncertainty(made: SizedAircraft, aircraft: Aircraft, climb: float) -> Uncertainty:
+    """Standard deviations such that the steepest climb has the one that it is to have (rad)."""
+    spreads = {name: sd for name, (sd, _) in _SPREADS.items()}
+    if made.sheet.sink:
+        spreads["zero-lift-drag"] = STATED_DRAG
+    moved = {name: _moved(aircraft, name, spreads[name]) for name in spreads}
+    driven = math.hypot(*(moved[name][0] for name in _PROPULSION))
+    other = math.hypot(*(change for name, (change, _) in moved.items() if name not in _PROPULSION))
+    wanted = math.sqrt(max((0.3 * climb) ** 2, climb**2 - other**2))
+    share = min(2.0, max(0.1, wanted / driven if driven > 0.0 else 1.0))
+    spreads |= {name: share * spreads[name] for name in _PROPULSION}
+    descent = math.hypot(*(change for _, change in moved.values()))
+    quantities = tuple(
+        UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
+    )
+    return Uncertainty("a data sheet", math.hypot(other, share * driven), descent, quantities)
+
+
+def _moved(aircraft: Aircraft, name: str, sd: float) -> tuple[float, float]:
+    """How far one standard deviation of a factor moves the steepest climb and descent at cruise, rad."""
+    angles = []
+    for sign in (1.0, -1.0):
+        fdm = Fdm(aircraft, tried=True, variation=Variation(properties=((f"ident/{name}", 1.0 + sign * sd),)))
+        found = (steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle))
+        angles.append([math.nan if trim is None else trim.climb for trim in found])
+    changes = 0.5 * np.abs(np.array(angles[0]) - np.array(angles[1]))
+    climb, descent = np.nan_to_num(changes, nan=0.0).tolist()
+    return climb, descent
+
+
+# ----------------------------------------------------------------------
+# The folder.
+
+# Least airspeed that guidance may use, by the stall's, and the largest by level flight's fastest.
+LEAST_SPEED, MOST_SPEED = 1.12, 0.95
+_CURRENT = 0.02
+_MAX_PITCH_DEG = 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Performance:
+    """Trims of the model at cruise speed and `AMSL`: level, steepest climb, idle; slowest and fastest level flight."""
+
+    level: Trim
+    climb: Trim
+    idle: Trim
+    slowest: Trim
+    fastest: Trim
+
+
+def make_data_sheet_folder(
+    folder: Path, sheet: DataSheet, parameters: Path | None = None, made: SizedAircraft | None = None
+) -> Aircraft:
+    """Make the folder of an aircraft from its data sheet, completely or not at all.
+
+    parameters: a file of ArduPlane's parameters, whose values add to the sheet where it leaves them open.
+    made: a sized aircraft, for one of another class than its layout's.
+    Raises FlightError, in one line with the allowed range, for a sheet of no small aircraft, a folder that exists, and
+    an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
+    """
+    target = check_new_folder(folder)
+    stated = {} if parameters is None else stated_parameters(parameters)
+    if made is None:
+        sheet = with_parameters(sheet, stated)
+        _refuse_missing(sheet)
+        made = size_aircraft(check_sheet(sheet))
+    with temporary_folder("planfly-sheet-") as place:
+        files = _files(made, target.name, place, stated)
+    write_folder(target, {name: text.encode() for name, text in files.items()})
+    return read_aircraft(target)
+
+
+def _refuse_missing(sheet: DataSheet) -> None:
+    for name in ("mass", "span", "cruise", "stall"):
+        if not getattr(sheet, name):
+            low, high, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
+            allowed = f"a data sheet needs it: {low:g}..{high:g} {unit}"
+            raise FlightError.of_argument(name, None, allowed, shown="")
+
+
+def _files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, float]) -> dict[str, str]:
+    """The folder's files, worked out on a draft of it."""
+    draft = place / name
+    draft.mkdir()
+    model = model_xml(name, made.numbers)
+    (draft / f"{name}.xml").write_text(model, encoding="utf-8")
+    sheet = made.sheet
+    (draft / f"{name}.toml").write_text(_metadata(made, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
+    aircraft = read_aircraft(draft)
+    flown = _performance(Fdm(aircraft, tried=True), aircraft)
+    # The propeller carries a little at the stall; the sheet's counts where the model could fly slower.
+    slow = max(sheet.stall, math.ceil(10.0 * flown.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0)
+    least = min(max(slow, LEAST_SPEED * slow), sheet.cruise)
+    most = max(sheet.cruise, MOST_SPEED * flown.fastest.airspeed)
+    metadata = _metadata(made, slow, round(least, 1), math.floor(10.0 * most) / 10.0)
+    (draft / f"{name}.toml").write_text(metadata, encoding="utf-8")
+    aircraft = read_aircraft(draft)
+    fdm = Fdm(aircraft, tried=True)
+    guessed = "climb" in made.guessed
+    known = _uncertainty(made, aircraft, GUESSED_CLIMB if guessed else STATED_CLIMB)
+    return {
+        f"{name}.xml": model,
+        f"{name}.toml": metadata,
+        "gains.toml": gains_text(gains_of_model(aircraft, fdm)),
+        "ardupilot.parm": _parameters(aircraft, flown, fdm, stated),
+        "ardupilot.toml": _servos(aircraft, flown),
+        "uncertainty.toml": uncertainty_text(known),
+        DRAWS_FILE: draws_text(draw_quantities(known.quantities)),
+        "README.md": _readme(name, made, flown, known, stated),
+    }
+
+
+def _performance(fdm: Simulator, aircraft: Aircraft) -> _Performance:
+    """What it flies like.  Raises FlightError where one of these flights does not exist."""
+    cruise = aircraft.airspeed
+    level = straight(fdm, cruise, AMSL)
+    if level is None:
+        raise FlightError.of_argument("cruise", cruise, "no level flight there", shown=f"{cruise:g} m/s")
+    found = {
+        "climb": full_throttle(fdm, cruise, AMSL, level),
+        "idle": idle(fdm, cruise, AMSL, level),
+        "slowest": slowest(fdm, AMSL, level),
+        "fastest": fastest(fdm, AMSL, level),
+    }
+    for name, trim in found.items():
+        if trim is None:
+            argument = {"climb": "climb", "idle": "cruise", "slowest": "stall", "fastest": "top"}[name]
+            allowed = f"the model holds no such flight ({name}); numbers nearer to those of other aircraft are expected"
+            raise FlightError.of_argument(argument, None, allowed, shown="")
+    return _Performance(level, **{name: trim for name, trim in found.items() if trim is not None})
+
+
+def _metadata(made: SizedAircraft, stall: float, least: float, most: float) -> str:
+    numbers, sheet = made.numbers, made.sheet
+    elevator, aileron, rudder = (math.degrees(value) for value in numbers.throw)
+    energy = (
+        f"fuel_kg = {sheet.fuel:.6g}\nfuel_mj_per_kg = {FUEL_HEAT / 1e6:g}"
+        if sheet.fuelled
+        else f"battery_v = {sheet.volts:.6g}\nbattery_wh = {sheet.energy / 3600.0:.6g}"
+    )
+    return f"""# What planner, guidance and verdict need to know of the aircraft; README.md says what was guessed of it.
+
+title = "{numbers.title.replace(chr(34), "'")}, from a data sheet"
+
+mass_kg = {numbers.mass:.6g}
+wing_area_m2 = {numbers.area:.6g}
+wing_span_m = {numbers.span:.6g}
+
+airspeed_mps = {sheet.cruise:.6g}
+airspeed_min_mps = {least:.6g}
+airspeed_max_mps = {most:.6g}
+stall_speed_mps = {stall:.6g}
+
+max_bank_deg = {math.degrees(sheet.bank):.6g}
+max_pitch_deg = {_MAX_PITCH_DEG:.6g}
+
+max_elevator_deg = {elevator:.6g}
+max_aileron_deg = {aileron:.6g}
+max_rudder_deg = {rudder:.6g}
+surface_rate_deg_s = {math.degrees(numbers.rate):.6g}
+surface_lag_s = {numbers.lag[0]:.6g}
+motor_lag_s = {numbers.lag[1]:.6g}
+
+{energy}
+"""
+
+
+# ----------------------------------------------------------------------
+# ArduPlane's parameters and servos.
+
+
+def _parameters(aircraft: Aircraft, flown: _Performance, fdm: Fdm, stated: Mapping[str, float]) -> str:
+    """The text of ``ardupilot.parm``; what a file of parameters states of the aircraft stays as it is there."""
+    a, b = linearise(fdm, flown.level)
+    cruise, bank = aircraft.airspeed, aircraft.max_bank
+    p, q, elevator, aileron = 3, 4, 0, 1
+    # Feed-forward of a rate: 45 degrees by the rate that the full surface gives.
+    roll_rate = abs(b[p, aileron] / a[p, p]) * aircraft.max_aileron
+    pitch_rate = abs(b[q, elevator] / a[q, q]) * aircraft.max_elevator
+    roll, pitch = (min(3.0, max(0.05, math.radians(45.0) / rate)) for rate in (roll_rate, pitch_rate))
+    climb, sink = cruise * math.sin(flown.climb.climb), -cruise * math.sin(flown.idle.climb)
+    radius = turn_radius(cruise, bank)
+    # Below this the motor gives no thrust at cruise: the throttle at which its current begins to flow.
+    fdm.move_to(AMSL)
+    least = 0.0
+    for throttle in np.arange(0.0, flown.level.throttle, _CURRENT).tolist():
+        fdm.balance(replace(flown.level, throttle=throttle).vector())
+        if float(fdm.read().power) > 0.0 and aircraft.battery_voltage:
+            least = max(0.0, throttle - _CURRENT)
+            break
+    values = {
+        "AIRSPEED_CRUISE": round(cruise, 1),
+        "AIRSPEED_MIN": round(aircraft.airspeed_min, 1),
+        "AIRSPEED_MAX": round(aircraft.airspeed_max, 1),
+        "SCALING_SPEED": round(cruise, 1),
+        "ROLL_LIMIT_DEG": round(math.degrees(bank)),
+        "PTCH_LIM_MAX_DEG": round(_MAX_PITCH_DEG),
+        "PTCH_LIM_MIN_DEG": -20,
+        "PTCH_TRIM_DEG": round(math.degrees(flown.level.alpha), 1),
+        "WP_RADIUS": max(15, 5 * round(0.8 * radius / 5.0)),
+        "WP_LOITER_RAD": max(40, 5 * round(1.3 * radius / 5.0)),
+        "TRIM_THROTTLE": round(100.0 * flown.level.throttle),
+        "THR_MIN": math.floor(100.0 * least),
+        "THR_MAX": 100,
+        "TECS_CLMB_MAX": round(max(0.5, 0.95 * climb), 1),
+        "TECS_SINK_MIN": round(max(0.3, sink), 1),
+        "TECS_SINK_MAX": round(max(1.0, 1.5 * sink), 1),
+        "RLL_RATE_FF": round(roll, 3),
+        "RLL_RATE_P": round(0.4 * roll, 3),
+        "RLL_RATE_I": round(0.8 * roll, 3),
+        "RLL_RATE_D": 0,
+        "PTCH_RATE_FF": round(pitch, 3),
+        "PTCH_RATE_P": round(0.15 * pitch, 3),
+        "PTCH_RATE_I": round(0.4 * pitch, 3),
+        "PTCH_RATE_D": 0,
+    }
+    kept = {name: value for name, value in stated.items() if name in values}
+    lines = [
+        "# ArduPlane's parameters for this aircraft, where they differ from ArduPlane's own defaults.",
+        "# Speeds are equivalent airspeeds, m/s; angles in degrees.  A file given with --params comes on top.",
+        *(f"{name} {value:g}" for name, value in (values | kept).items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _servos(aircraft: Aircraft, flown: _Performance) -> str:
+    """The text of ``ardupilot.toml``: controls before any mixer, which the model itself has."""
+    elevator, aileron, rudder = (
+        math.degrees(value) for value in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
+    )
+    middle = math.degrees(flown.level.elevator)
+    return f"""# The servo outputs of an ArduPlane that flies this aircraft, and the control at these pulses.
+# Positive is a trailing edge down (elevator), a roll to the right (ailerons), a yaw to the left (rudder).  Elevons and
+# V-tails are mixed within the model: ArduPlane gives it elevator, aileron and rudder.
+
+[aileron]
+output = 1
+pulse_us = [1100, 1500, 1900]
+value_deg = [{-aileron:.1f}, 0.0, {aileron:.1f}]
+
+# Rigged as somebody trims an aircraft: in the middle it is where level flight at cruise has it.
+[elevator]
+output = 2
+pulse_us = [1100, 1500, 1900]
+value_deg = [{middle + elevator:.1f}, {middle:.1f}, {middle - elevator:.1f}]
+
+[throttle]
+output = 3
+pulse_us = [1000, 2000]
+value = [0.0, 1.0]
+
+[rudder]
+output = 4
+pulse_us = [1100, 1500, 1900]
+value_deg = [{rudder:.1f}, 0.0, {-rudder:.1f}]
+"""
+
+
+# ----------------------------------------------------------------------
+# What a person reads.
+
+_SHOWN = (
+    ("mass", "mass", "kg", 1.0),
+    ("span", "wing span", "m", 1.0),
+    ("area", "wing area", "m2", 1.0),
+    ("cruise", "cruise", "m/s", 1.0),
+    ("stall", "stall", "m/s", 1.0),
+    ("top", "fastest level flight", "m/s", 1.0),
+    ("bank", "bank in turns", "degrees", 180.0 / math.pi),
+    ("climb", "steepest climb at cruise", "degrees", 180.0 / math.pi),
+    ("volts", "battery", "V", 1.0),
+    ("energy", "energy", "Wh", 1.0 / 3600.0),
+    ("fuel", "fuel", "kg", 1.0),
+)
+
+
+def _readme(
+    name: str, made: SizedAircraft, flown: _Performance, known: Uncertainty, stated: Mapping[str, float]
+) -> str:  # fmt: skip
+    sheet = made.sheet
+    drive = "burns fuel; its mass stays the same" if sheet.fuelled else "is electric"
+    climb, sink = math.degrees(flown.climb.climb), -math.degrees(flown.idle.climb)
+    lines = [
+        f"# {name}",
+        "",
+        f"{made.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {drive}.",
+        "What the sheet does not say was taken from published aircraft of its class, which `aircraft/data_sheet.py` of",
+        "planfly names. Where a slope comes near to what the model can do, no verdict of it is to be had.",
+        "",
+        "| | | |",
+        "|---|---|---|",
+    ]
+    for field, title, unit, factor in _SHOWN:
+        if value := factor * getattr(sheet, field):
+            lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in made.guessed else 'stated'} |")
+    if stated:
+        lines += ["", f"Of the parameter file: {', '.join(f'{key} {value:g}' for key, value in stated.items())}."]
+    lines += [
+        "",
+        f"The model weighs {sheet.mass * GRAVITY:.1f} N, flies level at {sheet.cruise:g} m/s with"
+        f" {100.0 * flown.level.throttle:.0f} % throttle, climbs {climb:.1f} degrees at",
+        f"full throttle and sinks {sink:.1f} degrees without (at {AMSL:g} m). Its elevator comes to its stop at"
+        f" {flown.slowest.airspeed:.1f} m/s.",
+        "",
+        "## What is not known",
+        "",
+        f"Standard deviations; the steepest climb's is {math.degrees(known.climb):.1f} degrees, the steepest descent's"
+        f" {math.degrees(known.descent):.1f} degrees.",
+        "",
+        "| property of the model | factor on | deviation | because |",
+        "|---|---|---|---|",
+    ]
+    for one in known.quantities:
+        what = FACTORS[one.name.removeprefix("ident/")]
+        lines.append(f"| `{one.name}` | {what} | {100.0 * one.sd:.0f} % | {one.reason} |")
+    lines += [
+        "",
+        f"`{DRAWS_FILE}` has {DRAWS} aircraft drawn from them; campaigns fly one a flight.",
+        "",
+        "| file | content |",
+        "|---|---|",
+        f"| `{name}.xml` | the JSBSim model |",
+        f"| `{name}.toml` | mass, speeds, limits, energy |",
+        "| `gains.toml` | guidance gains, from the model's linearisation |",
+        "| `ardupilot.parm`, `ardupilot.toml` | ArduPlane's parameters, and its servos |",
+        f"| `uncertainty.toml`, `{DRAWS_FILE}` | what is not known, and draws of it |",
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,129 @@
+"""What a data sheet is made into, against plain sums, and what is refused."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from aircraft.data_sheet import DataSheet, check_sheet, elliptic_slope, size_aircraft
+from aircraft.propulsion import ElectricMotor, FuelEngine
+from world.errors import FlightError
+
+FOAM = DataSheet(mass=2.1, span=1.6, cruise=15.0, stall=10.0)
+G = 9.80665
+
+
+def test_the_wing_carries_the_mass_at_the_stall() -> None:
+    for layout, lift in (("tail", 1.25), ("wing", 1.05)):
+        made = size_aircraft(replace(FOAM, layout=layout))
+        assert made.numbers.area == pytest.approx(2.1 * G / (0.5 * 1.225 * 100.0 * lift), rel=1e-9)
+        aero = made.numbers.aero
+        # With the elevator at 22 degrees up the lift is that, and the moment 0.
+        alpha = (lift - aero.lift_0 + aero.lift_elevator * math.radians(22.0)) / aero.lift_alpha
+        moment = aero.pitch_0 + aero.pitch_alpha * alpha - aero.pitch_elevator * math.radians(22.0)
+        assert moment == pytest.approx(0.0, abs=1e-9)
+        assert aero.stall_alpha > alpha
+
+
+def test_level_at_cruise_it_stands_as_it_is_rigged() -> None:
+    aero = size_aircraft(FOAM).numbers.aero
+    lift = 2.1 * G / (0.5 * 1.1673 * 225.0 * size_aircraft(FOAM).numbers.area)
+    assert aero.lift_0 + 0.05 * aero.lift_alpha - 0.035 * aero.lift_elevator == pytest.approx(lift)
+    assert aero.pitch_0 + 0.05 * aero.pitch_alpha - 0.035 * aero.pitch_elevator == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "sheet",
+    [
+        FOAM,
+        replace(FOAM, layout="wing", climb=math.radians(9.0), top=19.0),
+        replace(FOAM, propeller=(0.28, 0.15)),
+        replace(FOAM, volts=14.8, motor=900.0),
+        replace(FOAM, fuel=0.3, top=22.0),
+    ],
+)
+def test_thrust_is_what_climb_and_top_speed_take(sheet: DataSheet) -> None:
+    made = size_aircraft(check_sheet(sheet))
+    numbers, motor = made.numbers, made.numbers.propulsion
+    assert isinstance(motor, ElectricMotor | FuelEngine)
+
+    def drag(speed: float) -> float:
+        pressure = 0.5 * 1.1673 * speed**2 * numbers.area
+        lift = 2.1 * G / pressure
+        return pressure * (numbers.aero.drag_min + numbers.aero.drag_lift * lift**2)
+
+    climb = sheet.climb or math.radians(12.0)
+    assert motor.thrust(1.0, 15.0, 1.1673) == pytest.approx(drag(15.0) + 2.1 * G * math.sin(climb), rel=1e-6)
+    top = sheet.top or 21.0
+    assert motor.thrust(1.0, top, 1.1673) == pytest.approx(drag(top), rel=1e-6)
+
+
+def test_a_stated_motor_and_propeller_stay() -> None:
+    made = size_aircraft(replace(FOAM, volts=11.1, motor=1000.0, propeller=(0.254, 0.127)))
+    motor = made.numbers.propulsion
+    assert isinstance(motor, ElectricMotor)
+    assert motor.propeller.diameter == pytest.approx(0.254)
+    assert motor.emf == pytest.approx(60.0 / (2.0 * math.pi * 1000.0))
+    # It pulls no more where its pitch by its turns is the airspeed: at J of 5 by 10 inches.
+    assert motor.propeller.zero_thrust_ratio == pytest.approx(0.5)
+    pull = motor.thrust(1.0, 15.0, 1.1673)
+    pressure = 0.5 * 1.1673 * 225.0 * made.numbers.area
+    spare = pull - pressure * (made.numbers.aero.drag_min + made.numbers.aero.drag_lift * (2.1 * G / pressure) ** 2)
+    assert made.sheet.climb == pytest.approx(math.asin(spare / (2.1 * G)), rel=1e-9)
+
+
+def test_a_throttle_at_cruise_is_met() -> None:
+    made = size_aircraft(replace(FOAM, trim_throttle=0.65))
+    motor = made.numbers.propulsion
+    assert isinstance(motor, ElectricMotor)
+    pressure = 0.5 * 1.1673 * 225.0 * made.numbers.area
+    drag = pressure * (made.numbers.aero.drag_min + made.numbers.aero.drag_lift * (2.1 * G / pressure) ** 2)
+    assert motor.thrust(0.65, 15.0, 1.1673) == pytest.approx(drag, rel=1e-6)
+
+
+def test_a_sink_sets_the_drag() -> None:
+    made = size_aircraft(replace(FOAM, sink=1.5))
+    pressure, angle = 0.5 * 1.1673 * 225.0 * made.numbers.area, math.asin(0.1)
+    lift = 2.1 * G * math.cos(angle) / pressure
+    drag = pressure * (made.numbers.aero.drag_min + made.numbers.aero.drag_lift * lift**2)
+    assert drag == pytest.approx(2.1 * G * 0.1, rel=1e-9)
+
+
+def test_drag_falls_with_the_reynolds_number() -> None:
+    small, large = (size_aircraft(replace(FOAM, mass=m, span=s, cruise=v, stall=v / 1.5)).numbers for m, s, v in (
+        (1.0, 1.2, 15.0), (20.0, 3.5, 25.0)))  # fmt: skip
+    ratio = (25.0 * large.chord) / (15.0 * small.chord)
+    assert large.aero.drag_min / small.aero.drag_min == pytest.approx(ratio**-0.2)
+
+
+def test_the_slope_of_an_elliptic_wing() -> None:
+    # Helmbold at an aspect ratio of 6: 2 pi 6 / (2 + sqrt(40)).
+    assert elliptic_slope(6.0) == pytest.approx(37.6991 / 8.32456, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"mass": 0.49}, "mass 0.49 kg: allowed 0.5..25 kg"),
+        ({"mass": 25.01}, "mass 25.01 kg: allowed 0.5..25 kg"),
+        ({"cruise": 7.9}, "cruise 7.9 m/s: allowed 8..45 m/s"),
+        ({"stall": 13.06}, "stall 13.06 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s"),
+        ({"top": 15.7}, "top 15.7 m/s: allowed 15.75..37.5 m/s at a cruise speed of 15 m/s"),
+        ({"climb": math.radians(36.0)}, "climb 36 degrees: allowed 2..35 degrees"),
+        ({"area": 0.8}, "area 0.8 m2: allowed 0.14..0.672 m2"),
+        ({"span": 0.8}, "span 0.8 m: allowed 0.82..2.59 m with a wing of 0.269 m2"),
+        ({"fuel": 1.3}, "fuel 1.3 kg: allowed up to 60 % of the mass, 1.26 kg"),
+        ({"fuel": 0.3, "motor": 900.0}, "fuel 0.3 kg: goes without --battery and --motor"),
+        ({"top": 15.9, "climb": math.radians(30.0)}, "no propeller gives it at 15 m/s with a top speed of 15.9 m/s"),
+        (
+            {"motor": 120.0, "volts": 7.4, "propeller": (0.2, 0.1)},
+            "motor 120 rpm a volt: with this propeller and 7.4 V",
+        ),
+    ],
+)
+def test_what_is_no_small_aircraft_is_refused(changed: dict[str, float], told: str) -> None:
+    with pytest.raises(FlightError) as caught:
+        size_aircraft(check_sheet(replace(FOAM, **changed)))  # type: ignore[arg-type]
+    assert told in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert caught.value.field

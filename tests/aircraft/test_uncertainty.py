@@ -1,0 +1,92 @@
+"""What is not known of an aircraft, written and read, its draws, and files that are refused."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.uncertainty import (
+    UncertainQuantity,
+    Uncertainty,
+    draw_quantities,
+    draws_text,
+    read_draws,
+    read_uncertainty,
+    uncertainty_text,
+)
+from world.errors import FlightError
+
+THRUST = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2, "a guess")
+LEVEL = UncertainQuantity("ident/level", "rad", -0.1, 0.02)
+
+
+def test_it_is_read_as_written(tmp_path: Path) -> None:
+    known = Uncertainty("a data sheet", math.radians(5.0), math.radians(1.25), (THRUST, LEVEL))
+    (tmp_path / "uncertainty.toml").write_text(uncertainty_text(known), encoding="utf-8")
+    found = read_uncertainty(tmp_path)
+    assert found is not None
+    assert found.source == "a data sheet"
+    assert (found.climb, found.descent) == pytest.approx((known.climb, known.descent))
+    assert found.quantities == (THRUST, LEVEL)
+    assert read_uncertainty(tmp_path.parent) is None
+
+
+def test_a_posterior_comes_first(tmp_path: Path) -> None:
+    (tmp_path / "uncertainty.toml").write_text('source = "a data sheet"\n', encoding="utf-8")
+    text = '[[parameter]]\nproperty = "ident/thrust"\nunit = "factor"\nestimate = 0.9\nsd = 0.1\n'
+    (tmp_path / "posterior.toml").write_text(text, encoding="utf-8")
+    found = read_uncertainty(tmp_path)
+    assert found == Uncertainty("flight logs", 0.0, 0.0, (UncertainQuantity("ident/thrust", "factor", 0.9, 0.1),))
+
+
+def test_draws_have_mean_and_deviation_and_are_the_same_again(tmp_path: Path) -> None:
+    drawn = draw_quantities((THRUST, LEVEL))
+    assert drawn.values.shape == (512, 2)
+    # Of 512 draws the mean is off by 3 sd / sqrt(512) = 0.13 sd at most, the deviation by a tenth.
+    assert drawn.values.mean(axis=0) == pytest.approx([1.0, -0.1], abs=0.027)
+    assert drawn.values.std(axis=0) == pytest.approx([0.2, 0.02], rel=0.12)
+    assert drawn.values[:, 0].min() > 0.0
+    assert np.array_equal(drawn.values, draw_quantities((THRUST, LEVEL)).values)
+    file = tmp_path / "draws.csv"
+    file.write_text(draws_text(drawn), encoding="utf-8")
+    again = read_draws(file)
+    assert again.names == ("ident/thrust", "ident/level")
+    assert again.values == pytest.approx(drawn.values)
+    # One row a seed.
+    assert again.properties(513) == tuple(zip(again.names, again.values[1].tolist(), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "a line of properties and at least one of values are expected"),
+        ("ident/thrust\n", "a line of properties and at least one of values are expected"),
+        ("thrust\n1\n", "a property ident/NAME is expected"),
+        ("ident/a b\n1\n", "a property ident/NAME is expected"),
+        ("ident/thrust\n1\nnan\n", ":3: nan: 1 finite numbers are expected"),
+        ("ident/thrust,ident/b\n1\n", ":2: 1: 2 finite numbers are expected"),
+    ],
+)
+def test_bad_draws_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    file = tmp_path / "draws.csv"
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(FlightError, match=r"draws\.csv") as caught:
+        read_draws(file)
+    assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("climb_sd_deg = -1", "climb_sd_deg: -1: a number from 0 to 45 is expected"),
+        ("source = 3", "source: 3: a text is expected"),
+        ('[[quantity]]\nproperty = "x"\n', "a property ident/NAME is expected"),
+        ("x = ", "uncertainty.toml"),
+    ],
+)
+def test_bad_files_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "uncertainty.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(FlightError) as caught:
+        read_uncertainty(tmp_path)
+    assert told in str(caught.value)
