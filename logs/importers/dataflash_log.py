@@ -111,6 +111,22 @@ def read_dataflash(path: Path) -> RawLog:
     return _Reader(index, str(path)).read()
 
 
+def program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, VehicleKind]:
+    """What flew, by the texts of MSG, or by VER where they do not say.
+
+    >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
+    >>> program_and_vehicle(["ArduCopter V4.5.7"], none), program_and_vehicle([], none)
+    (('ArduCopter V4.5.7', 'copter'), ('', 'unknown'))
+    """
+    for text in texts:
+        if match := _PROGRAM.match(text):
+            return text, _PROGRAMS[match.group(1)]
+    if version.has("BT") and len(version):
+        text = version.texts("FWS")[0] if version.has("FWS") else ""
+        return text, _BUILDS.get(int(version.column("BT")[0]), "unknown")
+    return "", "unknown"
+
+
 class _Reader:
     """One log; the parts of it that `RawLog` has."""
 
@@ -321,15 +337,7 @@ class _Reader:
             yield from zip(self._time(found).tolist(), found.texts("Message"), strict=True)
 
     def _program(self) -> tuple[str, VehicleKind]:
-        named = next((text for _, text in self._events() if _PROGRAM.match(text)), "")
-        match = _PROGRAM.match(named)
-        if match:
-            return named, _PROGRAMS[match.group(1)]
-        version = self._messages("VER")
-        if version.has("BT") and len(version):
-            text = version.texts("FWS")[0] if version.has("FWS") else ""
-            return text, _BUILDS.get(int(version.column("BT")[0]), "unknown")
-        return "", "unknown"
+        return program_and_vehicle([text for _, text in self._events()], self._messages("VER"))
 
     def _utc_start(self) -> float:
         found = self._messages("GPS")

@@ -1,0 +1,163 @@
+"""The clocks of a log: how far the accelerometers run behind the gyros, and the surfaces behind what was commanded.
+
+A specific force 0.1 s late explains a moment badly however good the model is; so the delays come first.  The
+accelerometers' lag and delay and the servos' lag are those with which pitch, roll and yaw are explained best.
+Everything else is then made as late as the accelerometers.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.flight_record import GRID_HZ, FlightRecord, derivative, lagged, low_pass, shifted
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Clocks:
+    """Of one log, s: the accelerometers' first-order lag and delay behind the gyros, and the servos' lag."""
+
+    lag: float = 0.0
+    delay: float = 0.0
+    servo_lag: float = 0.05
+
+    @property
+    def behind(self) -> float:
+        """How far the accelerometers run behind the gyros in all, s."""
+        return self.lag + self.delay
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """All stretches of some logs behind each other, all of it as late as the accelerometers.
+
+    Fields as of `FlightRecord`, (n,) or (n, k); rate_changes: (n, 3) of p, q and r, rad/s^2.
+    throttle: (n,) behind the motor's lag.  surfaces: (n, 3) elevator, aileron, rudder behind the servos', rad.
+    edges: rows at which each stretch begins, and the end.  block: (n,) number of the block of time of each row.
+    """
+
+    acceleration: Floats
+    rates: Floats
+    rate_changes: Floats
+    attitude: Floats
+    velocity: Floats
+    wind: Floats
+    airspeed: Floats
+    density: Floats
+    surfaces: Floats
+    throttle: Floats
+    current: Floats
+    voltage: Floats
+    edges: tuple[int, ...]
+    block: Ints
+    hertz: float = GRID_HZ
+    extra: Mapping[str, Floats] = field(default_factory=dict)
+
+    def smooth(self, values: Floats, cutoff: float) -> Floats:
+        """Low-passed (n,) or (n, k), each stretch for itself; cutoff: Hz."""
+        made = np.empty_like(values)
+        for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
+            made[first:last] = low_pass(values[first:last], cutoff, self.hertz)
+        return made
+
+    def thinned(self, every: int, extra: Mapping[str, Floats]) -> "Signals":
+        """Of so many rows one, low-passed before; extra: (n,) more columns that are thinned alike."""
+        made: dict[str, list[Floats]] = {}
+        edges, blocks = [0], []
+        columns = {name: getattr(self, name) for name in _SAMPLED} | dict(extra)
+        for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
+            for name, values in columns.items():
+                smooth = low_pass(values[first:last], 0.3 * self.hertz / every, self.hertz)
+                made.setdefault(name, []).append(smooth[::every])
+            blocks.append(self.block[first:last:every])
+            edges.append(edges[-1] + len(blocks[-1]))
+        joined: dict[str, Any] = {name: np.concatenate(values) for name, values in made.items()}
+        more = {name: joined.pop(name) for name in extra}
+        return replace(
+            self, **joined, edges=tuple(edges), block=np.concatenate(blocks), hertz=self.hertz / every, extra=more
+        )
+
+    def delayed(self, values: Floats, delay: float) -> Floats:
+        """Behind by so many s, each stretch for itself."""
+        made = np.empty_like(values)
+        for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
+            made[first:last] = shifted(values[first:last], delay)
+        return made
+
+
+# Fields of `Signals` with a row a sample.
+_SAMPLED = (
+    "acceleration", "rates", "rate_changes", "attitude", "velocity", "wind", "airspeed", "density", "surfaces",
+    "throttle", "current", "voltage",
+)  # fmt: skip
+# Length of a block of time within which residuals may hang together, s.
+BLOCK_SECONDS = 20.0
+# Airspeed sensors are read 10 times a second; faster than this, Hz, is their noise.
+_AIRSPEED_BAND = 2.0
+
+
+def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: float) -> Signals:
+    """Put stretches behind each other, each on the clock of its accelerometers; motor_lag: s."""
+    parts: dict[str, list[Floats]] = {}
+    edges, blocks, number = [0], [], 0
+    for record, clock in zip(records, clocks, strict=True):
+
+        def late(values: Floats, clock: Clocks = clock) -> Floats:
+            return shifted(lagged(values, clock.lag), clock.delay)
+
+        rates = late(record.rates)
+        made = {
+            "acceleration": record.acceleration,
+            "rates": rates,
+            "rate_changes": derivative(rates),
+            "attitude": np.column_stack([late(np.unwrap(angle)) for angle in record.attitude.T]),
+            "velocity": late(record.velocity),
+            "wind": record.wind,
+            "airspeed": late(low_pass(record.airspeed, _AIRSPEED_BAND)),
+            "density": record.density,
+            "surfaces": late(lagged(record.controls[:, :3], clock.servo_lag)),
+            "throttle": late(lagged(record.controls[:, 3], motor_lag)),
+            "current": record.current,
+            "voltage": record.voltage,
+        }
+        for name, values in made.items():
+            parts.setdefault(name, []).append(values)
+        edges.append(edges[-1] + len(record.time))
+        own = ((record.time - record.time[0]) // BLOCK_SECONDS).astype(np.int64)
+        blocks.append(own + number)
+        number += int(own[-1]) + 1
+    joined: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
+    return Signals(**joined, edges=tuple(edges), block=np.concatenate(blocks))
+
+
+# Where the search begins, its steps and its limits, s: lag and delay of the accelerometers, lag of the servos.
+_START = np.array([0.03, 0.02, 0.06])
+_LIMITS = np.array([[0.0, -0.04, 0.0], [0.12, 0.1, 0.25]])
+
+
+def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
+    """The clocks with the least misfit: a search along each axis with shrinking steps.
+
+    >>> found = find_clocks(lambda clock: (clock.lag - 0.05) ** 2 + (clock.delay - 0.03) ** 2 + clock.servo_lag)
+    >>> round(found.lag, 2), round(found.delay, 2), found.servo_lag
+    (0.05, 0.03, 0.0)
+    """
+    from scipy.optimize import minimize
+
+    def cost(values: Floats) -> float:
+        inside = np.clip(values, *_LIMITS)
+        return misfit(Clocks(*inside.tolist())) * (1.0 + 100.0 * float(np.abs(values - inside).sum()))
+
+    simplex = np.vstack([_START, *(_START + step for step in np.diag([0.03, 0.03, 0.05]))])
+    found = minimize(
+        cost,
+        _START,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-6, "maxfev": 90},
+    )
+    return Clocks(*np.clip(found.x, *_LIMITS).tolist())

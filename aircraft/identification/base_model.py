@@ -1,0 +1,65 @@
+"""The model that an identification begins with, as numbers: mass, geometry, inertia, coefficients and motor."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.electric_motor import ElectricMotor
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficients:
+    """Dimensionless coefficients about steady flight, per rad and per rad of rate x length / (2 V).
+
+    Signs of the controls: trailing edge down, roll to the right, yaw to the left are positive.
+    drag_zero, drag_induced: CD = drag_zero + drag_induced CL^2 + drag_elevator elevator, CL of the angle of attack.
+    lift_...: of lift.  side_...: of side force.  roll_..., pitch_..., yaw_...: of the moments.
+    """
+
+    drag_zero: float
+    drag_induced: float
+    drag_elevator: float
+    lift_zero: float
+    lift_alpha: float
+    lift_rate: float
+    lift_elevator: float
+    side_beta: float
+    side_aileron: float
+    side_rudder: float
+    roll_beta: float
+    roll_roll: float
+    roll_yaw: float
+    roll_aileron: float
+    roll_rudder: float
+    pitch_zero: float
+    pitch_alpha: float
+    pitch_rate: float
+    pitch_elevator: float
+    yaw_beta: float
+    yaw_roll: float
+    yaw_yaw: float
+    yaw_aileron: float
+    yaw_rudder: float
+
+
+@dataclass(frozen=True, slots=True)
+class BaseModel:
+    """The aircraft before its logs are read.
+
+    mass: kg.  area: m^2.  span, chord: m.
+    inertia: (4,) Ixx, Iyy, Izz and Ixz (the integral of x z dm), kg m^2.
+    servo_lag, motor_lag: first-order time constants, s.
+    """
+
+    mass: float
+    area: float
+    span: float
+    chord: float
+    inertia: tuple[float, float, float, float]
+    servo_lag: float
+    motor_lag: float
+    coefficients: Coefficients
+    motor: ElectricMotor

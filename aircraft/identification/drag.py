@@ -1,0 +1,123 @@
+"""Drag and thrust together, from the forward acceleration, and from the battery's current where it is logged.
+
+Level flight alone tells only their difference; climbs, glides and other speeds tell more, and the current tells most.
+What else is not known about motor and accelerometer is estimated with them, within what it can be.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.flow import Flow, lift_curve, other_lift, pressure_of, voltage_of
+from aircraft.identification.parameters import PARAMETERS, prior_means, prior_sds
+from aircraft.identification.regression import Fit, fit_with_prior
+
+Floats = NDArray[np.float64]
+
+# Below which forces are compared, Hz, and of so many samples one.
+FORCE_BAND, FORCE_THINNING = 1.0, 10
+# Not known either, and estimated with drag and thrust, of which the log says little: (what, standard deviation).
+NUISANCES = {
+    "forward accelerometer, m/s2": 0.01,
+    "resistance of the motor": 0.2,
+    "idle current of the motor": 0.3,
+    "voltage of the battery": 0.02,
+    "drag of the elevator": 1.0,
+}
+# Where the battery's voltage is logged it is known this much better.
+_LOGGED_VOLTAGE = 0.25
+# What no model gets right, m/s^2 and A, and over how long it hangs together, s.
+_FORCE_FLOOR, _CURRENT_FLOOR, _FLOOR_SECONDS = 0.015, 0.3, 5.0
+_OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
+_ROUNDS, _STEP = 4, 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class _Forces:
+    """Thinned signals, and what of the forward force each unknown makes.
+
+    known: (n,) N, of lift.  drags: (2, n) N, of zero-lift and induced drag.  elevator: (n,) N, of its drag.
+    """
+
+    signals: Signals
+    base: BaseModel
+    known: Floats
+    drags: Floats
+    elevator: Floats
+    volts: Floats | float
+
+    def predicted(self, unknown: Floats) -> tuple[Floats, Floats]:
+        """Forward acceleration (n,), m/s^2, and current (n,), A, low-passed; unknown: parameters, then nuisances."""
+        zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, of_elevator = unknown
+        motor = self.base.motor.changed(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
+        signals = self.signals
+        pull, current = motor.thrust_and_current(
+            signals.airspeed, signals.throttle, signals.density, self.volts * (1.0 + voltage)
+        )
+        force = self.known + np.array([zero_lift, induced]) @ self.drags + (1.0 + of_elevator) * self.elevator + pull
+        return signals.smooth(force / self.base.mass + bias, FORCE_BAND), signals.smooth(current, FORCE_BAND)
+
+    def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
+        """(n, p) of both, by each of what is not known."""
+        force, current = self.predicted(unknown)
+        forces, currents = [], []
+        for step in _STEP * np.eye(len(unknown)):
+            more = self.predicted(unknown + step)
+            forces.append((more[0] - force) / _STEP)
+            currents.append((more[1] - current) / _STEP)
+        return np.column_stack(forces), np.column_stack(currents)
+
+
+def fit_drag(signals: Signals, base: BaseModel, values: Floats, flow: Flow) -> tuple[Fit, Floats, Floats]:
+    """Fit, values (5,) of the parameters of drag and motor, and their covariance (5, 5).
+
+    values: (n,) of all parameters, of which those of lift count.
+    """
+    forces = _forces(signals, base, values, flow)
+    thin = forces.signals
+    with_current = bool(np.isfinite(thin.current).all())
+    nuisances = np.array(list(NUISANCES.values()))
+    nuisances[list(NUISANCES).index("voltage of the battery")] *= _LOGGED_VOLTAGE if with_current else 1.0
+    means = np.concatenate([prior_means()[_OWN], np.zeros(len(nuisances))])
+    sds = np.concatenate([prior_sds()[_OWN], nuisances])
+    goal, goal_current = thin.smooth(thin.acceleration[:, 0], FORCE_BAND), thin.current
+    if with_current:
+        goal_current = thin.smooth(thin.current, FORCE_BAND)
+    floor = _FORCE_FLOOR**2 * _FLOOR_SECONDS * thin.hertz
+    now = means.copy()
+    for _ in range(_ROUNDS):
+        force, current = forces.predicted(now)
+        rows, second = forces.slopes(now)
+        goals, blocks = goal - force + rows @ now, thin.block
+        if with_current:
+            # Both count by the scatter of their residuals.
+            off = max(_CURRENT_FLOOR, float((goal_current - current).std()))
+            scale = max(_FORCE_FLOOR, float((goal - force).std())) / off
+            rows = np.vstack([rows, scale * second])
+            goals = np.concatenate([goals, scale * (goal_current - current + second @ now)])
+            blocks = np.concatenate([blocks, blocks])
+        fit = fit_with_prior(rows, goals, means, sds, blocks, floor)
+        now = fit.estimate
+    force, _ = forces.predicted(now)
+    explained = 1.0 - float((goal - force).var() / goal.var())
+    own = int(_OWN.sum())
+    return Fit(now, fit.covariance, force, goal - force, explained), now[:own], fit.covariance[:own, :own]
+
+
+def _forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow) -> _Forces:
+    c, (slope, zero) = base.coefficients, lift_curve(base, values)
+    thin = signals.thinned(FORCE_THINNING, {"alpha": flow.alpha})
+    alpha, pressure = thin.extra["alpha"], pressure_of(thin, base)
+    lift = slope * alpha + zero
+    ahead = -pressure * np.cos(alpha)
+    return _Forces(
+        signals=thin,
+        base=base,
+        known=pressure * (lift + other_lift(thin, base)) * np.sin(alpha),
+        drags=ahead * np.vstack([np.full(len(alpha), c.drag_zero), c.drag_induced * np.square(lift)]),
+        elevator=ahead * c.drag_elevator * thin.surfaces[:, 0],
+        volts=voltage_of(thin, base),
+    )

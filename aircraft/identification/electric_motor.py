@@ -1,0 +1,89 @@
+"""An electric motor with a fixed propeller: thrust and current at an airspeed, a throttle and a density.
+
+Beard and McLain, Small Unmanned Aircraft, second edition, section 4.3: the motor's torque KQ ((V_in - KV w) / R - i0)
+equals the propeller's q2 w^2 + q1 w + q0.  A motor that does not brake windmills at zero current.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ElectricMotor:
+    """Constants of a motor and its propeller, SI.
+
+    torque: (3,) of rho w^2, rho V w and rho V^2 in the propeller's torque.
+    thrust: (3,) of the same in its thrust.
+    back_voltage: KV, V s/rad, which is also the torque constant KQ.
+    resistance: ohm.  idle_current: i0, A.  voltage: of the battery, V.
+    """
+
+    torque: tuple[float, float, float]
+    thrust: tuple[float, float, float]
+    back_voltage: float
+    resistance: float
+    idle_current: float
+    voltage: float
+
+    def changed(
+        self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
+    ) -> "ElectricMotor":
+        """With factors on thrust, motor speed per volt, the propeller's torque, resistance and idle current."""
+        return replace(
+            self,
+            thrust=_times(thrust, self.thrust),
+            torque=_times(torque, self.torque),
+            back_voltage=self.back_voltage / speed,
+            resistance=self.resistance * resistance,
+            idle_current=self.idle_current * idle,
+        )
+
+    def speed(self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float) -> Floats:
+        """Speed of the propeller (n,), rad/s; throttle 0..1, voltage of the battery, V."""
+        q2, q1, q0 = self._torques(airspeed, density)
+        kv = self.back_voltage
+        driving = kv * voltage * throttle / self.resistance
+        driven = _larger_root(q2, q1 + kv * kv / self.resistance, q0 - driving + kv * self.idle_current)
+        windmill = _larger_root(q2, q1, q0 + kv * self.idle_current)
+        return np.maximum(0.0, np.maximum(driven, windmill))
+
+    def thrust_and_current(
+        self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float | None = None
+    ) -> tuple[Floats, Floats]:
+        """Thrust (n,), N, and current from the battery (n,), A.
+
+        >>> motor = ElectricMotor((4.48e-6, 5.27e-5, -2.18e-3), (1.58e-4, -1.26e-3, -2.78e-2), 0.0659, 0.042, 1.5, 44.4)
+        >>> still, full, sea = np.zeros(1), np.ones(1), np.full(1, 1.225)
+        >>> thrust, current = motor.thrust_and_current(still + 25.0, full, sea)
+        >>> round(float(thrust[0])), round(float(current[0]))
+        (37, 28)
+        """
+        volts = self.voltage if voltage is None else voltage
+        speed = self.speed(airspeed, throttle, density, volts)
+        a, b, c = self.thrust
+        thrust = density * (a * speed * speed + b * airspeed * speed + c * airspeed * airspeed)
+        current = np.maximum(0.0, (volts * throttle - self.back_voltage * speed) / self.resistance)
+        return thrust, throttle * current
+
+    def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
+        """Torque of the propeller (n,), N m, whose reaction rolls the aircraft left."""
+        speed = self.speed(airspeed, throttle, density, self.voltage)
+        q2, q1, q0 = self._torques(airspeed, density)
+        return np.asarray(q2 * speed * speed + q1 * speed + q0)
+
+    def _torques(self, airspeed: Floats, density: Floats) -> tuple[Floats, Floats, Floats]:
+        a, b, c = self.torque
+        return density * a, density * b * airspeed, density * c * airspeed * airspeed
+
+
+def _times(factor: float, three: tuple[float, float, float]) -> tuple[float, float, float]:
+    return factor * three[0], factor * three[1], factor * three[2]
+
+
+def _larger_root(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Of a x^2 + b x + c = 0; where there is none, where the parabola is lowest."""
+    return np.asarray((np.sqrt(np.maximum(0.0, b * b - 4.0 * a * c)) - b) / (2.0 * a))

@@ -1,0 +1,194 @@
+"""The estimate: lift curve, drag with thrust, and the moments, one after the other, with what is not known of each.
+
+The order matters.  The accelerometer is the vane: lift over the lift curve's slope is the angle of attack, gusts
+included, and sideslip is side force likewise.  The lift curve itself comes from frequencies at which the aircraft
+heaves with the gusts; drag and thrust come from the forward acceleration, the moments from the gyros' changes.
+
+What is held fixed and is not known either (`aircraft.identification.held_fixed`) is changed by its standard deviation,
+one after the other, and everything estimated anew: these shifts are part of the covariance.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.alignment import Clocks, Signals, align, find_clocks
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.drag import FORCE_THINNING, fit_drag
+from aircraft.identification.flight_record import GRID_HZ, FlightRecord
+from aircraft.identification.flow import motor_of, vane
+from aircraft.identification.held_fixed import HELD_FIXED
+from aircraft.identification.level import levelled
+from aircraft.identification.lift import fit_lift
+from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
+from aircraft.identification.parameters import PARAMETERS, Group, prior_means, prior_sds
+from aircraft.identification.regression import Fit, correlation_samples
+
+Floats = NDArray[np.float64]
+
+# As much of a log as its clocks are found by, s.
+ALIGNED_SECONDS = 200.0
+# Rounds of lift curve and drag, each with the angle of attack of the last.
+_ROUNDS = 2
+# How much wider than computed the interval of a fast motion is.
+FAST_WIDENING = 2.0
+# Title, unit and samples a second of each equation.
+_EQUATIONS: Mapping[Group, tuple[str, str, float]] = {
+    "lift": ("angle of attack", "rad", GRID_HZ),
+    "drag": ("forward acceleration", "m/s2", GRID_HZ / FORCE_THINNING),
+    "pitch": ("pitch acceleration", "rad/s2", GRID_HZ / MOMENT_THINNING),
+    "roll": ("roll acceleration", "rad/s2", GRID_HZ / MOMENT_THINNING),
+    "yaw": ("yaw acceleration", "rad/s2", GRID_HZ / MOMENT_THINNING),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """One equation of motion as it was fitted.
+
+    name: for people.  unit: of both.  hertz: samples a second.
+    measured, predicted: (n,), low-passed, all stretches behind each other.
+    explained: R^2.  correlation: s over which residuals hang together.
+    """
+
+    name: str
+    unit: str
+    hertz: float
+    measured: Floats
+    predicted: Floats
+    explained: float
+    correlation: float
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What logs say of an aircraft.
+
+    values: (n,) of `PARAMETERS`.  covariance: (n, n).
+    clocks: of each stretch.  equations: as fitted.
+    shifts: by what is held fixed, (n,): how far the estimate moves with one standard deviation of it.
+    with_current: whether the battery's current was used.
+    seconds: of flight that were used.
+    """
+
+    values: Floats
+    covariance: Floats
+    clocks: tuple[Clocks, ...]
+    equations: tuple[Equation, ...]
+    shifts: Mapping[str, Floats] = field(default_factory=dict)
+    with_current: bool = False
+    seconds: float = 0.0
+
+    @property
+    def sds(self) -> Floats:
+        """(n,) standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def of_log(self) -> Floats:
+        """(n,) share of each interval that is the log's: 1 less the variance that is left of the prior's."""
+        return np.clip(1.0 - np.square(self.sds / prior_sds()), 0.0, 1.0)
+
+
+def estimate_model(records: Sequence[FlightRecord], base: BaseModel) -> Estimate:
+    """Estimate all parameters from stretches of flight."""
+    clocks = align_clocks(records, base)
+    signals = levelled(align(records, clocks, base.motor_lag))
+    nominal = fit_all(signals, base)
+    shifts = {}
+    for held in HELD_FIXED:
+        if held.applies(with_current=nominal.with_current):
+            changed, model = held.change(signals, base)
+            shifts[held.name] = fit_all(changed, model, level=held.level).values - nominal.values
+    shifts |= _lift_shifts(signals, base, nominal)
+    return replace(
+        nominal,
+        covariance=total_covariance(nominal.covariance, shifts),
+        clocks=clocks,
+        shifts=shifts,
+        seconds=sum(record.seconds for record in records),
+    )
+
+
+def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
+    """The covariance (n, n) of fits and shifts (n,) together, the fast motions' wider, none wider than the prior.
+
+    >>> side = np.zeros(len(PARAMETERS))
+    >>> side[0] = 0.04
+    >>> total = total_covariance(np.diag(np.full(len(PARAMETERS), 0.03**2)), {"anything": side})
+    >>> round(float(np.sqrt(total[0, 0])), 6), round(float(np.sqrt(total[1, 1])), 6)
+    (0.05, 0.03)
+    """
+    covariance = fitted + sum(np.outer(shift, shift) for shift in shifts.values())
+    widening = np.array([FAST_WIDENING if parameter.fast else 1.0 for parameter in PARAMETERS])
+    sds = np.sqrt(np.diag(covariance)) * widening
+    # Correlations stay where an interval is cut to the prior's.
+    factor = widening * np.minimum(1.0, prior_sds() / sds)
+    return np.asarray(covariance * np.outer(factor, factor))
+
+
+def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Clocks, ...]:
+    """The clocks of the stretches, those of one log together: by `ALIGNED_SECONDS` of its longest stretch."""
+    found: dict[str, Clocks] = {}
+    for source in {record.source: None for record in records}:
+        longest = max((record for record in records if record.source == source), key=lambda record: record.seconds)
+        part = longest.part(ALIGNED_SECONDS)
+
+        def misfit(clock: Clocks, part: FlightRecord = part) -> float:
+            signals = align([part], [clock], base.motor_lag)
+            alpha, beta, _ = vane(signals, base, prior_means())
+            fits = fit_moments(signals, base, alpha, beta)
+            return sum(float(np.log(1.0 - fits[axis].explained + 1e-6)) for axis in AXES)
+
+        found[source] = find_clocks(misfit)
+    return tuple(found[record.source] for record in records)
+
+
+def fit_all(signals: Signals, base: BaseModel, lift: Floats | None = None, level: float = 0.0) -> Estimate:
+    """Estimate all parameters from aligned signals, everything else held where it is; without shifts.
+
+    lift: (2,) values of its slope and offset that are held, too.  level: by which the autopilot's is off, rad.
+    """
+    values, covariance = prior_means(), np.diag(np.square(prior_sds()))
+    fits: dict[Group, Fit] = {}
+
+    def take(group: Group, estimate: Floats, spread: Floats) -> None:
+        own = np.array([parameter.group == group for parameter in PARAMETERS])
+        values[own] = estimate
+        covariance[np.ix_(own, own)] = spread
+
+    if lift is not None:
+        take("lift", lift, np.zeros((2, 2)))
+    for _ in range(_ROUNDS):
+        flow = vane(signals, base, values)
+        if lift is None:
+            fits["lift"], curve, spread = fit_lift(signals, base, flow.lift, level)
+            take("lift", curve, spread)
+            flow = vane(signals, base, values)
+        fits["drag"], five, spread = fit_drag(signals, base, values, flow)
+        take("drag", five, spread)
+    for axis, fit in fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values)).items():
+        fits[axis] = fit
+        count = sum(parameter.group == axis for parameter in PARAMETERS)
+        take(axis, fit.estimate[:count], fit.covariance[:count, :count])
+    equations = tuple(_equation(group, fit) for group, fit in fits.items())
+    return Estimate(values, covariance, (), equations, with_current=bool(np.isfinite(signals.current).all()))
+
+
+def _equation(group: Group, fit: Fit) -> Equation:
+    title, unit, hertz = _EQUATIONS[group]
+    together = correlation_samples(fit.residual) / hertz
+    return Equation(title, unit, hertz, fit.predicted + fit.residual, fit.predicted, fit.explained, together)
+
+
+def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[str, Floats]:
+    """How the rest moves with the lift curve, along the two axes of its own uncertainty, which counts already."""
+    sizes, axes = np.linalg.eigh(nominal.covariance[:2, :2])
+    made = {}
+    for k in range(2):
+        lift = nominal.values[:2] + np.sqrt(max(0.0, float(sizes[k]))) * axes[:, k]
+        shift = fit_all(signals, base, lift=lift).values - nominal.values
+        nominal.covariance[:2, :2] -= np.outer(shift[:2], shift[:2])
+        made[f"lift curve, axis {k + 1}"] = shift
+    return made

@@ -1,0 +1,123 @@
+"""What an identification reads: the sensors and controls of one flight, on one clock and one grid of times."""
+
+from dataclasses import dataclass, fields, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# Samples a second of the grid.
+GRID_HZ = 50.0
+
+
+@dataclass(frozen=True, slots=True)
+class FlightRecord:
+    """One stretch of flight without a gap, as its log has it: nothing is shifted yet.  SI and radians.
+
+    time: (n,) s, `GRID_HZ` a second.
+    acceleration: (n, 3) specific force that the accelerometers read, body axes forward, right, down, m/s^2.
+    rates: (n, 3) p, q, r of the gyros, rad/s.
+    attitude: (n, 3) roll, pitch, yaw, rad.
+    velocity: (n, 3) north, east, down over the ground, m/s.
+    wind: (n, 2) north, east, the way the air moves, as the autopilot estimates it, m/s.
+    airspeed: (n,) true, m/s.
+    density: (n,) kg/m^3.
+    height: (n,) m above sea level.
+    controls: (n, 4) elevator, aileron, rudder (rad, positive as in the model) and throttle (0..1) as commanded.
+    current: (n,) A from the battery; NaN of a log without.
+    voltage: (n,) V of the battery; NaN of a log without.
+    source: the log, for people.
+    """
+
+    time: Floats
+    acceleration: Floats
+    rates: Floats
+    attitude: Floats
+    velocity: Floats
+    wind: Floats
+    airspeed: Floats
+    density: Floats
+    height: Floats
+    controls: Floats
+    current: Floats
+    voltage: Floats
+    source: str = ""
+
+    @property
+    def seconds(self) -> float:
+        """Its length, s."""
+        return len(self.time) / GRID_HZ
+
+    def part(self, seconds: float) -> "FlightRecord":
+        """Its middle, at most so long."""
+        rows = round(seconds * GRID_HZ)
+        first = max(0, (len(self.time) - rows) // 2)
+        cut = {one.name: getattr(self, one.name)[first : first + rows] for one in fields(self) if one.name != "source"}
+        return replace(self, **cut)
+
+    @property
+    def has_current(self) -> bool:
+        """Whether the battery's current is known throughout."""
+        return bool(np.isfinite(self.current).all())
+
+
+@cache
+def _sections(cutoff: float, hertz: float) -> Floats:
+    return np.asarray(butter(2, cutoff, fs=hertz, output="sos"))
+
+
+def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
+    """Smooth (n,) or (n, k) forwards and backwards, so that nothing is delayed.
+
+    cutoff: Hz, of a Butterworth filter of the second order.  hertz: samples a second.
+
+    >>> steady = low_pass(np.full(200, 3.0), 0.5)
+    >>> bool(np.allclose(steady, 3.0))
+    True
+    """
+    sections = _sections(cutoff, hertz)
+    # The ends are mirrored over one period of the cutoff, or what there is.
+    length = min(len(values) - 1, round(hertz / cutoff))
+    return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=length))
+
+
+def shifted(values: Floats, delay: float) -> Floats:
+    """Delay (n,) or (n, k) by s seconds, between samples by a straight line; negative takes it earlier.
+
+    >>> shifted(np.arange(5.0), 0.02)
+    array([0., 0., 1., 2., 3.])
+    """
+    rows = np.arange(len(values)) - delay * GRID_HZ
+    first = np.clip(np.floor(rows).astype(np.intp), 0, len(values) - 1)
+    second = np.clip(first + 1, 0, len(values) - 1)
+    share = np.clip(rows - first, 0.0, 1.0)
+    share = share[:, np.newaxis] if values.ndim == 2 else share
+    return np.asarray(values[first] * (1.0 - share) + values[second] * share)
+
+
+def lagged(values: Floats, time_constant: float) -> Floats:
+    """(n,) or (n, k) behind a first-order lag with this time constant, s; exact for values held over a sample.
+
+    >>> lagged(np.array([0.0, 1.0, 1.0]), 0.0)
+    array([0., 1., 1.])
+    """
+    if time_constant <= 1e-4:
+        return values.copy()
+    from scipy.signal import lfilter
+
+    decay = float(np.exp(-1.0 / (GRID_HZ * time_constant)))
+    # The input holds its mean over a sample: half of the last and half of this value.
+    gain = 0.5 * (1.0 - decay)
+    numerator, denominator = [gain, gain], [1.0, -decay]
+    start = values[:1] * (1.0 - gain)
+    made, _ = lfilter(numerator, denominator, values, axis=0, zi=start)
+    return np.asarray(made)
+
+
+def derivative(values: Floats) -> Floats:
+    """Rate of change of (n,) or (n, k), a second, by central differences."""
+    return np.asarray(np.gradient(values, 1.0 / GRID_HZ, axis=0))

@@ -1,0 +1,97 @@
+"""Angle of attack and sideslip without vanes: from the accelerometers, and from attitude and velocity.
+
+Lift over its curve's slope is the angle of attack, whatever gusts there are; side force is sideslip likewise.  Attitude
+and velocity give the angle of attack in air without a vertical part, which holds at low frequencies alone.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.electric_motor import ElectricMotor
+from aircraft.identification.parameters import INDEX
+
+Floats = NDArray[np.float64]
+
+# The vane is smoothed below this, Hz.
+VANE_BAND = 8.0
+
+
+class Flow(NamedTuple):
+    """Angle of attack and sideslip, rad, and the coefficient of lift of the angle of attack alone, (n,) each."""
+
+    alpha: Floats
+    beta: Floats
+    lift: Floats
+
+
+def lift_curve(base: BaseModel, values: Floats) -> tuple[float, float]:
+    """Slope (per rad) and coefficient at zero, of values (n,) of `aircraft.identification.parameters.PARAMETERS`."""
+    c = base.coefficients
+    return c.lift_alpha * float(values[INDEX["lift-slope"]]), c.lift_zero + float(values[INDEX["lift-offset"]])
+
+
+def motor_of(base: BaseModel, values: Floats) -> ElectricMotor:
+    """The motor with one set of values (n,)."""
+    thrust, speed, torque = (float(values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
+    return base.motor.changed(thrust, speed, torque)
+
+
+def voltage_of(signals: Signals, base: BaseModel) -> Floats | float:
+    """Of the battery, V: as logged, or the base's."""
+    return signals.voltage if np.isfinite(signals.voltage).all() else base.motor.voltage
+
+
+def pressure_of(signals: Signals, base: BaseModel) -> Floats:
+    """Dynamic pressure times wing area (n,), N."""
+    return np.asarray(0.5 * signals.density * np.square(signals.airspeed) * base.area)
+
+
+def other_lift(signals: Signals, base: BaseModel) -> Floats:
+    """Coefficient of lift (n,) of pitch rate and elevator, which are held as the base has them."""
+    c = base.coefficients
+    pitching = signals.rates[:, 1] * base.chord / (2.0 * signals.airspeed)
+    return np.asarray(c.lift_rate * pitching + c.lift_elevator * signals.surfaces[:, 0])
+
+
+def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
+    """The flow that the accelerometers tell of.
+
+    values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which those of lift and motor count.
+    """
+    c, (slope, zero) = base.coefficients, lift_curve(base, values)
+    pressure, other = pressure_of(signals, base), other_lift(signals, base)
+    thrust, _ = motor_of(base, values).thrust_and_current(
+        signals.airspeed, signals.throttle, signals.density, voltage_of(signals, base)
+    )
+    x = base.mass * signals.acceleration[:, 0] - thrust
+    z = base.mass * signals.acceleration[:, 2]
+    alpha = (-z / pressure - zero - other) / slope
+    for _ in range(2):
+        lift = (x * np.sin(alpha) - z * np.cos(alpha)) / pressure - other
+        alpha = (lift - zero) / slope
+    _, aileron, rudder = signals.surfaces.T
+    side = base.mass * signals.acceleration[:, 1] / pressure
+    beta = (side - c.side_aileron * aileron - c.side_rudder * rudder) / c.side_beta
+    return Flow(*(signals.smooth(values, VANE_BAND) for values in (alpha, beta, lift)))
+
+
+def attitude_alpha(signals: Signals, level: float = 0.0) -> Floats:
+    """Angle of attack (n,), rad, of attitude, velocity over the ground and the estimated wind, which is level.
+
+    level: by how much the autopilot's level is above the model's, rad.
+    """
+    roll, pitch, yaw = signals.attitude.T
+    pitch = pitch + level
+    north = signals.velocity[:, 0] - signals.wind[:, 0]
+    east = signals.velocity[:, 1] - signals.wind[:, 1]
+    down = signals.velocity[:, 2]
+    ahead = north * np.cos(yaw) + east * np.sin(yaw)
+    right = east * np.cos(yaw) - north * np.sin(yaw)
+    u = ahead * np.cos(pitch) - down * np.sin(pitch)
+    below = ahead * np.sin(pitch) + down * np.cos(pitch)
+    w = below * np.cos(roll) - right * np.sin(roll)
+    return np.asarray(np.arctan2(w, u))

@@ -1,0 +1,111 @@
+"""What an identification holds fixed and does not know: each with the standard deviation by which it is changed."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.base_model import BaseModel
+
+Floats = NDArray[np.float64]
+Changed = tuple[Signals, BaseModel]
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """One thing that is held fixed.
+
+    name: for people, with its standard deviation.
+    change: signals and model with it one standard deviation further.
+    level: rad, by which the autopilot's level is changed.
+    of_current: whether it only counts where the battery's current was logged.
+    """
+
+    name: str
+    change: Callable[[Signals, BaseModel], Changed]
+    level: float = 0.0
+    of_current: bool = False
+
+    def applies(self, *, with_current: bool) -> bool:
+        """Whether it counts for logs with or without the battery's current."""
+        return with_current or not self.of_current
+
+
+def _coefficient(name: str, factor: float) -> Callable[[Signals, BaseModel], Changed]:
+    def change(signals: Signals, base: BaseModel) -> Changed:
+        value = getattr(base.coefficients, name) * factor
+        return signals, replace(base, coefficients=replace(base.coefficients, **{name: value}))
+
+    return change
+
+
+def _inertia(row: int, factor: float) -> Callable[[Signals, BaseModel], Changed]:
+    def change(signals: Signals, base: BaseModel) -> Changed:
+        values = list(base.inertia)
+        values[row] *= factor
+        return signals, replace(base, inertia=(values[0], values[1], values[2], values[3]))
+
+    return change
+
+
+def _airspeed(factor: float) -> Callable[[Signals, BaseModel], Changed]:
+    return lambda signals, base: (replace(signals, airspeed=signals.airspeed * factor), base)
+
+
+def _acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel], Changed]:
+    def change(signals: Signals, base: BaseModel) -> Changed:
+        return replace(signals, acceleration=signals.acceleration + bias * np.eye(3)[axis]), base
+
+    return change
+
+
+def _late_force(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+    return lambda signals, base: (
+        replace(signals, acceleration=signals.delayed(signals.acceleration, seconds)),
+        base,
+    )
+
+
+def _late_surfaces(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+    return lambda signals, base: (replace(signals, surfaces=signals.delayed(signals.surfaces, seconds)), base)
+
+
+def _motor(**factors: float) -> Callable[[Signals, BaseModel], Changed]:
+    return lambda signals, base: (signals, replace(base, motor=base.motor.changed(**factors)))
+
+
+def _volts(factor: float) -> Callable[[Signals, BaseModel], Changed]:
+    return lambda signals, base: (
+        signals,
+        replace(base, motor=replace(base.motor, voltage=base.motor.voltage * factor)),
+    )
+
+
+def _current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
+    return lambda signals, base: (replace(signals, current=signals.current * factor), base)
+
+
+def _same(signals: Signals, base: BaseModel) -> Changed:
+    return signals, base
+
+
+_LEVEL = float(np.radians(0.2))
+HELD_FIXED = (
+    Held("lift of the elevator (50 %)", _coefficient("lift_elevator", 1.5)),
+    Held("lift of the pitch rate (50 %)", _coefficient("lift_rate", 1.5)),
+    Held("side force of sideslip (30 %)", _coefficient("side_beta", 1.3)),
+    Held("side force of the rudder (50 %)", _coefficient("side_rudder", 1.5)),
+    Held("side force of the ailerons (100 %)", _coefficient("side_aileron", 2.0)),
+    Held("roll of the rudder (100 %)", _coefficient("roll_rudder", 2.0)),
+    Held("product of inertia (50 %)", _inertia(3, 1.5)),
+    Held("clock of the accelerometers (15 ms)", _late_force(0.015)),
+    Held("clock of the servos (15 ms)", _late_surfaces(0.015)),
+    Held("airspeed (1 %)", _airspeed(1.01)),
+    # A level that is off shows as a bias of the forward accelerometer as well, which is taken off.
+    Held("level of the autopilot (0.2 deg)", _acceleration(0, _LEVEL * 9.80665), level=_LEVEL),
+    Held("mean vertical air (0.1 deg)", _same, level=0.5 * _LEVEL),
+    Held("downward accelerometer (0.03 m/s2)", _acceleration(2, 0.03)),
+    Held("scale of the current (2 %)", _current(1.02), of_current=True),
+)

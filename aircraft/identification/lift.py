@@ -1,0 +1,38 @@
+"""The lift curve, by the reverse regression: the angle of attack of the attitude on the coefficient of lift.
+
+At low frequencies an aircraft heaves with the gusts: its lift does not know of them, the angle of attack that
+attitude and velocity give does.  So lift is the regressor without errors, and the angle of attack has them.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.flow import attitude_alpha
+from aircraft.identification.parameters import prior_sds
+from aircraft.identification.regression import Fit, fit_with_prior
+
+Floats = NDArray[np.float64]
+
+# Below which lift and angle of attack are compared, Hz.
+LIFT_BAND = 0.15
+
+
+def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0) -> tuple[Fit, Floats, Floats]:
+    """Fit, values (2,) of slope and offset, and their covariance (2, 2); lift: (n,) coefficient; level: rad."""
+    measured = signals.smooth(attitude_alpha(signals, level), LIFT_BAND)
+    smooth = signals.smooth(lift, LIFT_BAND)
+    c = base.coefficients
+    slope_sd, offset_sd = prior_sds()[:2]
+    # About the mean lift, where slope and angle do not depend on each other.
+    middle = float(smooth.mean())
+    columns = np.column_stack([smooth - middle, np.ones(len(smooth))])
+    inverse = 1.0 / c.lift_alpha
+    mean = np.array([inverse, (middle - c.lift_zero) * inverse])
+    fit = fit_with_prior(columns, measured, mean, np.array([slope_sd * inverse, offset_sd * inverse]), signals.block)
+    steep, angle = fit.estimate
+    slope = 1.0 / steep
+    made = np.array([slope / c.lift_alpha, middle - slope * angle - c.lift_zero])
+    turn = np.array([[-slope * slope / c.lift_alpha, 0.0], [slope * slope * angle, -slope]])
+    return fit, made, turn @ fit.covariance @ turn.T

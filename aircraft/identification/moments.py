@@ -1,0 +1,84 @@
+"""Pitch, roll and yaw: the equations of rotation fitted to the gyros' rates of change.
+
+Euler's equations with a product of inertia (Etkin and Reid, Dynamics of Flight, third edition, section 4.6).  Only
+moments over the moments of inertia are seen.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.electric_motor import ElectricMotor
+from aircraft.identification.flow import pressure_of
+from aircraft.identification.parameters import PARAMETERS, Group
+from aircraft.identification.regression import Fit, fit_with_prior
+
+Floats = NDArray[np.float64]
+AXES: tuple[Group, ...] = ("pitch", "roll", "yaw")
+
+# Below which moments are compared, Hz, and of so many samples one.
+MOMENT_BAND, MOMENT_THINNING = 4.0, 2
+# Coefficient of the moment by which an aircraft is not quite symmetrical, standard deviation.
+_ASYMMETRY = 0.01
+
+
+def fit_moments(
+    signals: Signals, base: BaseModel, alpha: Floats, beta: Floats, motor: ElectricMotor | None = None
+) -> dict[Group, Fit]:
+    """The three fits by their axis; roll and yaw have a constant behind their parameters that is not kept.
+
+    alpha, beta: (n,) rad.  motor: whose torque rolls; None for the base's.
+    """
+    thin = signals.thinned(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
+    pressure = pressure_of(thin, base)
+    turning = _turning(thin, base, base.motor if motor is None else motor)
+    terms = _terms(thin, base)
+    fits = {}
+    ixx, iyy, izz, _ = base.inertia
+    for axis, inertia, length in zip(AXES, (iyy, ixx, izz), (base.chord, base.span, base.span), strict=True):
+        known, *columns = terms[axis]
+        chosen = [parameter for parameter in PARAMETERS if parameter.group == axis]
+        means, sds = [parameter.prior for parameter in chosen], [parameter.sd for parameter in chosen]
+        if axis != "pitch":
+            columns, means, sds = [*columns, np.ones(len(known))], [*means, 0.0], [*sds, _ASYMMETRY]
+        scale = pressure * length / inertia
+        table = thin.smooth(np.column_stack([scale * column for column in columns]), MOMENT_BAND)
+        goal = thin.smooth(turning[axis] / inertia - scale * known, MOMENT_BAND)
+        fits[axis] = fit_with_prior(table, goal, np.array(means), np.array(sds), thin.block)
+    return fits
+
+
+def _turning(signals: Signals, base: BaseModel, motor: ElectricMotor) -> dict[Group, Floats]:
+    """Aerodynamic moments (n,), N m, that the motion needs; the propeller's torque rolls to the left."""
+    ixx, iyy, izz, ixz = base.inertia
+    p, q, r = signals.rates.T
+    dp, dq, dr = signals.rate_changes.T
+    torque = motor.reaction(signals.airspeed, signals.throttle, signals.density)
+    return {
+        "pitch": iyy * dq + (ixx - izz) * p * r + ixz * (p * p - r * r),
+        "roll": ixx * dp - ixz * (dr + p * q) + (izz - iyy) * q * r + torque,
+        "yaw": izz * dr - ixz * (dp - q * r) + (iyy - ixx) * p * q,
+    }
+
+
+def _terms(signals: Signals, base: BaseModel) -> dict[Group, list[Floats]]:
+    """Coefficients (n,) of each axis as the base has them: what is held, then a term a parameter."""
+    c = base.coefficients
+    alpha, beta = signals.extra["alpha"], signals.extra["beta"]
+    elevator, aileron, rudder = signals.surfaces.T
+    across, along = base.span / (2.0 * signals.airspeed), base.chord / (2.0 * signals.airspeed)
+    roll, pitch, yaw = signals.rates[:, 0] * across, signals.rates[:, 1] * along, signals.rates[:, 2] * across
+    one = np.ones(len(alpha))
+    return {
+        "pitch": [
+            c.pitch_zero * one, one, c.pitch_alpha * alpha, c.pitch_rate * pitch, c.pitch_elevator * elevator,
+        ],
+        "roll": [
+            c.roll_rudder * rudder, c.roll_beta * beta, c.roll_roll * roll, c.roll_yaw * yaw, c.roll_aileron * aileron,
+        ],
+        "yaw": [
+            0.0 * one, c.yaw_beta * beta, c.yaw_roll * roll, c.yaw_yaw * yaw, c.yaw_aileron * aileron,
+            c.yaw_rudder * rudder,
+        ],
+    }  # fmt: skip

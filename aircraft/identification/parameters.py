@@ -1,0 +1,89 @@
+"""What is estimated: each parameter with the model's property that carries it, its prior and its bounds.
+
+A parameter is a factor on a coefficient of the base model, 1 before any log, or an offset to it, 0.  Forces count as
+they are; moments count over the moment of inertia, which no log tells apart from them.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Group = Literal["lift", "drag", "pitch", "roll", "yaw"]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One quantity that is not known.
+
+    name: after ``ident/`` in the model.  title: for people.
+    kind: "factor" on the base's coefficient, or "offset" to it.
+    sd: of the prior, 1 standard deviation, about 1 or 0.
+    group: the equation that it is estimated in.
+    bounds: beyond which no aircraft of this kind is.
+    fast: of a motion as fast as the servos, whose interval is widened by 2: lag and damping look alike.
+    show: the manoeuvre that would show it.
+    """
+
+    name: str
+    title: str
+    kind: Literal["factor", "offset"]
+    sd: float
+    group: Group
+    bounds: tuple[float, float]
+    fast: bool = False
+    show: str = ""
+
+    @property
+    def property_name(self) -> str:
+        """Of JSBSim."""
+        return f"ident/{self.name}"
+
+    @property
+    def prior(self) -> float:
+        """Value before any log."""
+        return 1.0 if self.kind == "factor" else 0.0
+
+
+_SPEEDS = "level runs of 20 s at several speeds"
+_PULLS = "elevator doublets of 1 s"
+_ROLLS = "aileron doublets of 1 s, or an AUTOTUNE flight"
+_YAWS = "rudder doublets of 1 s"
+
+# Priors: 1 sd, of an aircraft scaled from another of its class (docs/your-aircraft.md says what they were tried on).
+PARAMETERS = (
+    Parameter("lift-slope", "lift slope", "factor", 0.12, "lift", (0.5, 1.6), show=_SPEEDS),
+    Parameter("lift-offset", "lift at zero angle of attack", "offset", 0.15, "lift", (-0.6, 0.6), show=_SPEEDS),
+    Parameter("zero-lift-drag", "zero-lift drag", "factor", 0.4, "drag", (0.2, 3.0), show=_SPEEDS),
+    Parameter("induced-drag", "induced drag", "factor", 0.3, "drag", (0.2, 3.0), show=_SPEEDS),
+    Parameter("thrust", "thrust", "factor", 0.2, "drag", (0.3, 2.0), show="climbs at full throttle and glides at idle"),
+    Parameter("motor-speed", "motor speed per volt", "factor", 0.07, "drag", (0.7, 1.35), show="steps of throttle"),
+    Parameter("propeller-torque", "propeller torque", "factor", 0.1, "drag", (0.4, 2.0), show="battery current (BAT)"),
+    Parameter("pitch-offset", "pitching moment at zero", "offset", 0.06, "pitch", (-0.4, 0.4), show=_SPEEDS),
+    Parameter("pitch-stiffness", "pitch stiffness", "factor", 0.5, "pitch", (0.05, 3.5), show=_PULLS),
+    Parameter("pitch-damping", "pitch damping", "factor", 0.4, "pitch", (-0.5, 4.0), fast=True, show=_PULLS),
+    Parameter("elevator-power", "elevator power", "factor", 0.4, "pitch", (0.1, 3.0), fast=True, show=_PULLS),
+    Parameter("dihedral-effect", "roll from sideslip", "factor", 0.5, "roll", (-1.5, 4.0), show=_YAWS),
+    Parameter("roll-damping", "roll damping", "factor", 0.4, "roll", (0.1, 3.0), fast=True, show=_ROLLS),
+    Parameter("roll-from-yaw", "roll from yaw rate", "factor", 0.4, "roll", (-1.0, 3.5), fast=True, show=_YAWS),
+    Parameter("aileron-power", "aileron power", "factor", 0.4, "roll", (0.1, 3.0), fast=True, show=_ROLLS),
+    Parameter("weathercock", "weathercock stability", "factor", 0.4, "yaw", (0.0, 3.0), show=_YAWS),
+    Parameter("yaw-from-roll", "yaw from roll rate", "factor", 0.6, "yaw", (-3.0, 4.5), fast=True, show=_ROLLS),
+    Parameter("yaw-damping", "yaw damping", "factor", 0.4, "yaw", (-1.0, 3.5), fast=True, show=_YAWS),
+    Parameter("adverse-yaw", "yaw from ailerons", "factor", 0.6, "yaw", (-3.0, 4.5), fast=True, show=_ROLLS),
+    Parameter("rudder-power", "rudder power", "factor", 0.4, "yaw", (0.1, 3.0), fast=True, show=_YAWS),
+)
+NAMES = tuple(parameter.name for parameter in PARAMETERS)
+INDEX = {name: k for k, name in enumerate(NAMES)}
+
+
+def prior_means() -> Floats:
+    """(n,) of `PARAMETERS`."""
+    return np.array([parameter.prior for parameter in PARAMETERS])
+
+
+def prior_sds() -> Floats:
+    """(n,) of `PARAMETERS`."""
+    return np.array([parameter.sd for parameter in PARAMETERS])

@@ -1,0 +1,170 @@
+"""The base aircraft of an identification as numbers, taken off its JSBSim model about level flight at cruise."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from aircraft.identification.base_model import BaseModel, Coefficients
+from aircraft.identification.electric_motor import ElectricMotor
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import straight
+from world.errors import FlightError
+
+Floats = NDArray[np.float64]
+
+# Height at which it is taken, m; steps of angles (rad), of rates (rad/s) and of surfaces (rad).
+_AMSL, _ANGLE, _RATE, _SURFACE = 500.0, 1e-3, 1e-3, 1e-3
+_SLUG_FT2 = 1.3558179483314004
+
+
+def base_model(aircraft: Aircraft) -> BaseModel:
+    """Numbers of an aircraft.
+
+    Raises FlightError for one without steady flight at cruise, and for one whose motor is not in the form of the
+    Aerosonde's, which cannot be told from logs.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> numbers = base_model(load_aircraft("aerosonde")).coefficients
+    >>> round(numbers.lift_alpha, 2), round(numbers.pitch_elevator, 2), round(numbers.drag_zero, 3)
+    (5.61, -0.99, 0.043)
+    """
+    motor = read_motor(aircraft)
+    probe = _Probe(aircraft)
+    return BaseModel(
+        mass=probe.mass,
+        area=aircraft.wing_area,
+        span=aircraft.wing_span,
+        chord=probe.chord,
+        inertia=probe.inertia,
+        servo_lag=aircraft.surface_lag,
+        motor_lag=aircraft.motor_lag,
+        coefficients=probe.coefficients(),
+        motor=motor,
+    )
+
+
+class _Probe:
+    """Forces and moments of a model at chosen flows, rates and surfaces, as coefficients."""
+
+    def __init__(self, aircraft: Aircraft) -> None:
+        self._fdm = fdm = Fdm(aircraft)
+        read = fdm.properties.getter
+        self.chord = read("metrics/cbarw-ft")() * 0.3048
+        self._span, self._area = aircraft.wing_span, aircraft.wing_area
+        found = straight(fdm, aircraft.airspeed, _AMSL)
+        if found is None:
+            raise FlightError(f"{aircraft.name}: no level flight at cruise to begin with", file=aircraft.name)
+        self._airspeed = aircraft.airspeed
+        fdm.balance(found.vector())
+        self.mass = read("inertia/mass-slugs")() * 14.593902937206364
+        ixx, iyy, izz, ixz = (read(f"inertia/i{axes}-slugs_ft2")() * _SLUG_FT2 for axes in ("xx", "yy", "zz", "xz"))
+        # JSBSim's product of inertia has the other sign.
+        self.inertia = (ixx, iyy, izz, -ixz)
+        self._pressure = read("aero/qbar-psf")() * 47.88025898033584 * self._area
+
+    def coefficients(self) -> Coefficients:
+        """Central differences about the trim, the throttle closed but for what windmills."""
+        zero = self._at(0.0)
+        # Drag against lift over the straight part of the curve.
+        angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])
+        table = np.array([self._at(angle)[:2] for angle in angles])
+        induced, drag = np.polyfit(np.square(table[:, 1]), table[:, 0], 1)
+        alpha = self._slope(self._at, _ANGLE)
+        beta = self._slope(lambda step: self._at(0.0, beta=step), _ANGLE)
+        elevator, aileron, rudder = (self._slope(partial(self._surface, k), _SURFACE) for k in range(3))
+        across, along = self._span / (2.0 * self._airspeed), self.chord / (2.0 * self._airspeed)
+        roll, pitch, yaw = (
+            self._slope(partial(self._rate, k), _RATE) / size for k, size in enumerate((across, along, across))
+        )
+        return Coefficients(
+            drag_zero=float(drag), drag_induced=float(induced), drag_elevator=float(elevator[0]),
+            lift_zero=float(zero[1]), lift_alpha=float(alpha[1]), lift_rate=float(pitch[1]),
+            lift_elevator=float(elevator[1]), side_beta=float(beta[2]), side_aileron=float(aileron[2]),
+            side_rudder=float(rudder[2]), roll_beta=float(beta[3]), roll_roll=float(roll[3]), roll_yaw=float(yaw[3]),
+            roll_aileron=float(aileron[3]), roll_rudder=float(rudder[3]), pitch_zero=float(zero[4]),
+            pitch_alpha=float(alpha[4]), pitch_rate=float(pitch[4]), pitch_elevator=float(elevator[4]),
+            yaw_beta=float(beta[5]), yaw_roll=float(roll[5]), yaw_yaw=float(yaw[5]), yaw_aileron=float(aileron[5]),
+            yaw_rudder=float(rudder[5]),
+        )  # fmt: skip
+
+    def _surface(self, k: int, step: float) -> Floats:
+        return self._at(0.0, surfaces=step * np.eye(3)[k])
+
+    def _rate(self, k: int, step: float) -> Floats:
+        return self._at(0.0, rates=step * np.eye(3)[k])
+
+    def _slope(self, at: Callable[[float], Floats], step: float) -> Floats:
+        return np.asarray((at(step) - at(-step)) / (2.0 * step))
+
+    def _at(
+        self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
+    ) -> Floats:
+        """(6,) coefficients of drag, lift and side force, and of the moments, aerodynamic alone, throttle closed."""
+        turning = np.zeros(3) if rates is None else rates
+        deflections = np.zeros(3) if surfaces is None else surfaces
+        speed = self._airspeed
+        flow = speed * np.array([math.cos(alpha) * math.cos(beta), math.sin(beta), math.sin(alpha) * math.cos(beta)])
+        states = np.array([*flow, *turning, 0.0, 0.0])
+        self._fdm.derivatives(states, np.array([*deflections, 0.0]))
+        read = self._fdm.properties.getter
+        x, y, z = (read(f"forces/fb{axis}-aero-lbs")() * 4.4482216152605 for axis in "xyz")
+        moments = [read(f"moments/{axis}-aero-lbsft")() * 1.3558179483314004 for axis in "lmn"]
+        sine, cosine = math.sin(alpha), math.cos(alpha)
+        forces = np.array([-x * cosine - z * sine, x * sine - z * cosine, y])
+        lengths = np.array([self._span, self.chord, self._span])
+        return np.concatenate([forces, np.array(moments) / lengths]) / self._pressure
+
+
+def read_motor(aircraft: Aircraft) -> ElectricMotor:
+    """Constants of a motor in the Aerosonde's form, from its model.  Raises FlightError for any other."""
+    try:
+        root = ElementTree.parse(aircraft.model_file).getroot()
+        functions = {one.get("name", ""): one for one in root.iter("function")}
+
+        def numbers(name: str) -> list[float]:
+            return [float(one.text or "nan") for one in functions[name].iter("v")]
+
+        (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))
+        (damping,) = numbers("motor/b")
+        idle, per_volt = (
+            next(value for value in numbers("motor/driven-rad_sec") if 0.0 < value < 4.0 and value != 2.0),
+            -next(value for value in numbers("motor/driven-rad_sec") if value < 0.0),
+        )
+        back = damping / per_volt
+        thrust = numbers("motor/thrust-n")
+    except (KeyError, ValueError, StopIteration, OSError, ElementTree.ParseError):
+        allowed = "a motor in the form of aircraft/aerosonde/aerosonde.xml is expected"
+        raise FlightError(
+            f"{aircraft.model_file}: its motor cannot be identified: {allowed}",
+            file=aircraft.model_file,
+            allowed=allowed,
+        ) from None
+    return ElectricMotor(
+        torque=(q2, q1, q0),
+        thrust=(thrust[0], thrust[1], thrust[2]),
+        back_voltage=back,
+        resistance=back / per_volt,
+        idle_current=idle / back,
+        voltage=aircraft.battery_voltage,
+    )
+
+
+def scaled(base: BaseModel, mass: float, span: float, area: float) -> BaseModel:
+    """The same kind of aircraft with another mass (kg), span (m) and area (m^2).
+
+    Inertia goes with mass and span squared.  The chord keeps its share of the mean chord; coefficients and motor stay.
+    """
+    weight, wide = mass / base.mass, span / base.span
+    chord = base.chord * (area / span) / (base.area / base.span)
+    ixx, iyy, izz, ixz = base.inertia
+    factor = weight * wide * wide
+    return replace(
+        base, mass=mass, span=span, area=area, chord=chord,
+        inertia=(ixx * factor, iyy * factor, izz * factor, ixz * factor),
+    )  # fmt: skip

@@ -1,0 +1,83 @@
+"""The mission that shows an aircraft to its identification: climbs, glides, level runs at several speeds, and turns.
+
+It is flown in AUTO.  Doublets of the controls are no items of a mission: they are flown by hand in
+FBWA, or by AUTOTUNE.
+"""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from aircraft.catalog import Aircraft
+from aircraft.envelope import Envelope
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from world.frames import GeoOrigin, to_geo
+
+# Share of the steepest climb and descent that its slopes ask for: a little less than full throttle, so that the mission
+# itself can be flown in the wind there may be.
+_SHARE = 0.85
+# Seconds of a run, and of a climb or a glide.
+_RUN, _SLOPE = 25.0, 25.0
+# Height above home that it begins at, m.
+_UP = 150.0
+
+
+def identification_mission(
+    aircraft: Aircraft, envelope: Envelope, lat_deg: float, lon_deg: float, ground: float, repeats: int = 1
+) -> Mission:
+    """The mission about a place.
+
+    lat_deg, lon_deg, ground: of home, degrees and m above sea level.  repeats: how often all of it is flown.
+
+    Square after square, so that every manoeuvre is flown with the wind and against it.
+    """
+    places = list(_places(aircraft, envelope, ground + _UP, repeats))
+    east, north = np.array([place[:2] for place in places]).T
+    lats, lons = to_geo(GeoOrigin(lat_deg, lon_deg), east, north)
+    items: list[MissionItem] = []
+
+    def add(
+        command: int, frame: int, params: tuple[float, float, float, float], lat: float, lon: float, up: float
+    ) -> None:
+        number = len(items) + 1
+        items.append(MissionItem(number, command, frame, params, on_grid(lat), on_grid(lon), round(up, 2)))
+
+    speed = math.nan
+    for (_, _, up, asked), lat, lon in zip(places, lats.tolist(), lons.tolist(), strict=True):
+        if asked != speed and items:
+            add(int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), (0.0, asked, -1.0, 0.0), 0.0, 0.0, 0.0)
+        speed = asked
+        add(int(Command.NAV_WAYPOINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0, 0.0, 0.0, 0.0), lat, lon, up - ground)
+    return Mission(Home(on_grid(lat_deg), on_grid(lon_deg), ground), tuple(items), source="identify.waypoints")
+
+
+def _places(
+    aircraft: Aircraft, envelope: Envelope, base: float, repeats: int
+) -> Iterator[tuple[float, float, float, float]]:
+    """East, north and height (m), and the airspeed (m/s) towards each."""
+    cruise = aircraft.airspeed
+    slow = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
+    fast = cruise + 0.6 * (aircraft.airspeed_max - cruise)
+    between = 0.5 * (slow + cruise)
+    # Speed, seconds, and -1, 0 or 1 for down, level and up.
+    figure = (
+        (cruise, _RUN, 0), (cruise, _SLOPE, 1), (slow, _RUN, 0), (cruise, _SLOPE, -1), (fast, _RUN, 0),
+        (between, _SLOPE, 1), (cruise, _RUN, 0), (fast, _SLOPE, -1), (between, _RUN, 0), (cruise, _SLOPE, 1),
+        (0.5 * (cruise + fast), _RUN, 0), (cruise, _SLOPE, -1),
+    )  # fmt: skip
+    east = north = 0.0
+    up, heading = base, 0.0
+    yield east, north, up, cruise
+    for _ in range(repeats):
+        for number, (speed, seconds, way) in enumerate(figure):
+            # Turns take the ends of a leg.
+            length = speed * seconds + 2.0 * speed * speed / 9.81
+            climb, descent = envelope.air_angles(speed, up)
+            angle = (climb if way > 0 else descent) * _SHARE if way else 0.0
+            up = max(base - 60.0, up + way * length * math.tan(max(0.0, angle) if math.isfinite(angle) else 0.0))
+            east += length * math.sin(heading)
+            north += length * math.cos(heading)
+            yield east, north, up, speed
+            # Four corners to the right, then four to the left.
+            heading += 0.5 * math.pi if number // 4 % 2 == 0 else -0.5 * math.pi

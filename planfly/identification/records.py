@@ -1,0 +1,269 @@
+"""From a log's motion to stretches of flight on one grid of times: what can be used, or why not."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from aircraft.identification.flight_record import GRID_HZ, FlightRecord
+from logs.importers.motion_log import MotionLog, Samples
+from planfly.identification.servos import ServoOutput
+from world.errors import LogError
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# Rows a second that inertial sensors and outputs need for an estimate of the moments.
+LEAST_HZ = 10.0
+# Flight that a log must have after what cannot be used is cut, s; and a stretch, s.
+LEAST_SECONDS, LEAST_STRETCH = 180.0, 30.0
+# A pause between rows that parts two stretches, s.
+_GAP = 0.5
+# After taking off or being let go, s.
+_SETTLING = 15.0
+# Flight: faster than this share of AIRSPEED_MIN.
+_FLYING = 0.8
+# ArduPlane's modes of a quadplane (QSTABILIZE 17 to QACRO 23, QAUTOTUNE 22, LOITER_ALT_QLAND 25), and those without
+# surfaces under control: INITIALISING 16.
+_VTOL_MODES = frozenset({17, 18, 19, 20, 21, 22, 23, 25})
+# SERVOn_FUNCTION (ArduPilot's parameter list).
+_AILERON, _ELEVATOR, _RUDDER, _THROTTLE = 4, 19, 21, 70
+_ELEVON_LEFT, _ELEVON_RIGHT, _VTAIL_LEFT, _VTAIL_RIGHT = 77, 78, 79, 80
+_FLAPS = {
+    2: "flap",
+    3: "automatic flap",
+    16: "spoiler",
+    17: "spoiler",
+    24: "flaperon",
+    25: "flaperon",
+    86: "spoiler",
+    87: "spoiler",
+}
+_LIFT_MOTORS = frozenset(range(33, 41))
+# ArduPlane's default LOG_BITMASK, which has both.
+_BITMASK = 65535
+
+
+def flight_records(
+    log: MotionLog, aircraft: Aircraft, servos: Mapping[str, ServoOutput] | None = None
+) -> list[FlightRecord]:
+    """The stretches of a log that an identification can use, as flown by wings alone.
+
+    servos: which output moves what, where it is known better than the log's SERVOn_* say.
+    Raises LogError, in one line, for a log that cannot be used.
+    """
+    _refuse(log)
+    grid = _grid(log)
+    outputs = servos or log_outputs(log, aircraft)
+    pulses = _held(log.outputs, grid)
+    controls = np.column_stack(
+        [
+            outputs[name].control(pulses[:, outputs[name].output - 1]) if name in outputs else np.zeros(len(grid))
+            for name in ("elevator", "aileron", "rudder", "throttle")
+        ]
+    )
+    if log.parameters.get(f"SERVO{_first(log, _ELEVON_LEFT)}_FUNCTION") == _ELEVON_LEFT and servos is None:
+        controls[:, :2] = _elevons(log, aircraft, pulses)
+    ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
+    height = _at(log.height, grid)[:, 0]
+    velocity, wind = _at(log.velocity, grid), _wind(log, grid)
+    if len(log.airspeed.time):
+        airspeed = _at(log.airspeed, grid)[:, 0] * ratio
+    else:
+        airspeed = np.linalg.norm(velocity - np.column_stack([wind, np.zeros(len(grid))]), axis=1)
+    inertial = _at(log.inertial, grid)
+    attitude = np.column_stack([np.interp(grid, log.attitude.time, np.unwrap(a)) for a in log.attitude.values.T])
+    unknown = np.full(len(grid), np.nan)
+    battery = _at(log.battery, grid) if _has_current(log) else np.column_stack([unknown, unknown])
+    usable = _usable(log, grid, airspeed / ratio, pulses)
+    made = []
+    for first, last in _stretches(usable):
+        rows = slice(first, last)
+        made.append(
+            FlightRecord(
+                time=grid[rows],
+                acceleration=inertial[rows, :3],
+                rates=inertial[rows, 3:],
+                attitude=attitude[rows],
+                velocity=velocity[rows],
+                wind=wind[rows],
+                airspeed=airspeed[rows],
+                density=1.225 / np.square(ratio[rows]),
+                height=height[rows],
+                controls=controls[rows],
+                current=battery[rows, 1],
+                voltage=battery[rows, 0],
+                source=log.source,
+            )
+        )
+    seconds = sum(record.seconds for record in made)
+    if seconds < LEAST_SECONDS:
+        cut = "; flight on its lifting motors is cut" if _vtol_rows(log, grid, pulses).any() else ""
+        message = f"{seconds / 60.0:.1f} min of it are flight on the wing that can be used{cut}"
+        raise LogError(f"{log.source}: {message}: at least {LEAST_SECONDS / 60.0:g} min are needed", file=log.source)
+    return made
+
+
+def _refuse(log: MotionLog) -> None:
+    """Refuse what no identification can use.  Raises LogError."""
+    if log.vehicle not in ("plane", "unknown"):
+        raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): a plane is expected", file=log.source)
+    for samples, message, what in (
+        (log.inertial, "IMU", "inertial sensors"),
+        (log.outputs, "RCOU", "servo outputs"),
+    ):
+        if len(samples.time) < 2:
+            mask = log.parameters.get("LOG_BITMASK")
+            now = "" if mask is None else f" (it is {mask:.0f})"
+            raise LogError(
+                f"{log.source}: no {message}, the {what}: LOG_BITMASK {_BITMASK} records them{now}", file=log.source
+            )
+    for samples, what in (
+        (log.attitude, "ATT, the attitude"),
+        (log.velocity, "XKF1, the velocity"),
+        (log.height, "POS, the height"),
+    ):
+        if len(samples.time) < 2:
+            raise LogError(f"{log.source}: no {what}", file=log.source)
+    for number, kind in _functions(log).items():
+        if kind in _FLAPS:
+            lowest, highest = _range(log, number)
+            if highest - lowest > 20.0:
+                message = f"output {number} (SERVO{number}_FUNCTION {kind}, {_FLAPS[kind]}) moves in flight"
+                raise LogError(f"{log.source}: {message}, and no model of it is estimated", file=log.source)
+
+
+def _range(log: MotionLog, number: int) -> tuple[float, float]:
+    used = log.outputs.values[:, number - 1]
+    used = used[used > 0.0]
+    return (float(used.min()), float(used.max())) if len(used) else (0.0, 0.0)
+
+
+def _functions(log: MotionLog) -> dict[int, int]:
+    """SERVOn_FUNCTION by output; ArduPlane's own where the log has none."""
+    found = {
+        k: int(log.parameters[f"SERVO{k}_FUNCTION"])
+        for k in range(1, log.outputs.values.shape[1] + 1)
+        if f"SERVO{k}_FUNCTION" in log.parameters
+    }
+    return found or {1: _AILERON, 2: _ELEVATOR, 3: _THROTTLE, 4: _RUDDER}
+
+
+def _first(log: MotionLog, function: int) -> int:
+    return next((number for number, kind in _functions(log).items() if kind == function), 0)
+
+
+def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
+    """Which output moves what, by SERVOn_*: full travel is the base's largest deflection.
+
+    More microseconds are roll to the right, nose up and yaw to the right in ArduPlane; the model's elevator and rudder
+    count the other way.  Raises LogError for mixes that no model of is estimated.
+    """
+    functions = _functions(log)
+    for number, kind in functions.items():
+        if kind in (_VTAIL_LEFT, _VTAIL_RIGHT):
+            message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of a V-tail"
+            raise LogError(f"{log.source}: {message}: its mix is not modelled", file=log.source)
+    made = {}
+    for name, function, largest in (
+        ("elevator", _ELEVATOR, -aircraft.max_elevator),
+        ("aileron", _AILERON, aircraft.max_aileron),
+        ("rudder", _RUDDER, -aircraft.max_rudder),
+    ):
+        number = _first(log, function)
+        if number:
+            lowest, middle, highest, sign = _travel(log, number)
+            made[name] = ServoOutput(number, (lowest, middle, highest), (-largest * sign, 0.0, largest * sign))
+    number = _first(log, _THROTTLE)
+    if number:
+        lowest, _, highest, _ = _travel(log, number)
+        made["throttle"] = ServoOutput(number, (lowest, highest), (0.0, 1.0))
+    elevons = bool(_first(log, _ELEVON_LEFT) and _first(log, _ELEVON_RIGHT))
+    needed = ("throttle",) if elevons else ("elevator", "aileron", "throttle")
+    for name in needed:
+        if name not in made:
+            raise LogError(f"{log.source}: no SERVOn_FUNCTION is the {name}'s", file=log.source)
+    return made
+
+
+def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
+    """Least, middle and largest pulse of an output, us, and its sign."""
+    value = log.parameters.get
+    lowest, highest = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
+    middle = min(max(value(f"SERVO{number}_TRIM", 1500.0), lowest + 1.0), highest - 1.0)
+    return lowest, middle, highest, -1.0 if value(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
+
+
+def _elevons(log: MotionLog, aircraft: Aircraft, pulses: Floats) -> Floats:
+    """Elevator and ailerons (n, 2), rad, of two elevons: half their sum and half their difference."""
+    sides = []
+    for function in (_ELEVON_LEFT, _ELEVON_RIGHT):
+        number = _first(log, function)
+        lowest, middle, highest, sign = _travel(log, number)
+        sides.append(sign * np.interp(pulses[:, number - 1], (lowest, middle, highest), (-1.0, 0.0, 1.0)))
+    left, right = sides
+    # ArduPlane: left is elevator less ailerons, right is their sum; its elevator is up positive.
+    return np.column_stack([-0.5 * (left + right) * aircraft.max_elevator, 0.5 * (right - left) * aircraft.max_aileron])
+
+
+def _grid(log: MotionLog) -> Floats:
+    """Times that all series cover."""
+    series = (log.inertial, log.outputs, log.attitude, log.velocity, log.height)
+    first, last = max(one.time[0] for one in series), min(one.time[-1] for one in series)
+    return np.arange(first, last, 1.0 / GRID_HZ)
+
+
+def _at(samples: Samples, grid: Floats) -> Floats:
+    return np.column_stack([np.interp(grid, samples.time, column) for column in samples.values.T])
+
+
+def _held(samples: Samples, grid: Floats) -> Floats:
+    """ServoOutput keep their value until the next."""
+    rows = np.clip(np.searchsorted(samples.time, grid, side="right") - 1, 0, len(samples.time) - 1)
+    return np.asarray(samples.values[rows])
+
+
+def _wind(log: MotionLog, grid: Floats) -> Floats:
+    return _at(log.wind, grid) if len(log.wind.time) else np.zeros((len(grid), 2))
+
+
+def _ratio_of_height(height: Floats) -> Floats:
+    """True by equivalent airspeed in the standard atmosphere."""
+    return np.asarray((1.0 - 2.25577e-5 * np.clip(height, -500.0, 9000.0)) ** -2.12794)
+
+
+def _has_current(log: MotionLog) -> bool:
+    return len(log.battery.time) > 10 and bool(np.any(log.battery.values[:, 1] > 0.5))
+
+
+def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
+    """Where lifting motors ran or a mode of theirs was set."""
+    rows = np.zeros(len(grid), np.bool_)
+    for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=True):
+        if number in _VTOL_MODES:
+            rows |= (grid >= start) & (grid < end)
+    for number, kind in _functions(log).items():
+        if kind in _LIFT_MOTORS and log.parameters.get("Q_ENABLE", 0.0) > 0.0:
+            rows |= pulses[:, number - 1] > 1100.0
+    return rows
+
+
+def _usable(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) -> Flags:
+    """Rows in free flight on the wing, without a pause of the sensors."""
+    least = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
+    flying = (equivalent > _FLYING * least) & ~_vtol_rows(log, grid, pulses)
+    for samples in (log.inertial, log.outputs, log.attitude, log.velocity):
+        steps = np.diff(samples.time)
+        for k in np.flatnonzero(steps > _GAP):
+            flying &= ~((grid > samples.time[k]) & (grid < samples.time[k + 1]))
+    made = flying.copy()
+    for first, last in _stretches(flying, 0.0):
+        made[first : min(last, first + round(_SETTLING * GRID_HZ))] = False
+    return made
+
+
+def _stretches(flags: Flags, least: float = LEAST_STRETCH) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(first, last) for first, last in pairs if last - first >= least * GRID_HZ]

@@ -1,0 +1,60 @@
+"""Which servo output moves what, as an aircraft's ``ardupilot.toml`` states it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.errors import FlightError
+from world.files import read_toml
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ServoOutput:
+    """An output (from 1), and the control at its pulses (us, rising): rad, or of full throttle."""
+
+    output: int
+    pulse: tuple[float, ...]
+    value: tuple[float, ...]
+
+    def control(self, pulses: Floats) -> Floats:
+        """The control (n,) at pulses (n,), held at its ends.
+
+        >>> ServoOutput(3, (1000.0, 2000.0), (0.0, 1.0)).control(np.array([900.0, 1250.0]))
+        array([0.  , 0.25])
+        """
+        return np.asarray(np.interp(pulses, self.pulse, self.value))
+
+    @property
+    def reversed(self) -> "ServoOutput":
+        """The same output the other way round."""
+        return ServoOutput(self.output, self.pulse, tuple(-value for value in self.value))
+
+
+def read_servos(file: Path) -> Mapping[str, ServoOutput]:
+    """The outputs of a file by control: elevator, aileron, rudder, throttle.  Raises FlightError for a bad file.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> outputs = read_servos(load_aircraft("aerosonde").folder / "ardupilot.toml")
+    >>> outputs["elevator"].output, outputs["throttle"].value
+    (2, (0.0, 1.0))
+    """
+    try:
+        table = read_toml(file, "servo outputs")
+        made = {}
+        for name, entry in table.items():
+            angles = entry.get("value") or [math.radians(angle) for angle in entry["value_deg"]]
+            pulses = [float(pulse) for pulse in entry["pulse_us"]]
+            if len(pulses) != len(angles) or len(pulses) < 2 or any(np.diff(pulses) <= 0.0):
+                raise ValueError("pulse_us must rise, with as many values")
+            made[name] = ServoOutput(int(entry["output"]), tuple(pulses), tuple(float(angle) for angle in angles))
+    except OSError as error:
+        raise FlightError(f"{file}: {error.strerror}", file=file) from None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise FlightError(f"{file}: {' '.join(str(error).split())}: no table of servo outputs", file=file) from None
+    return made

@@ -1,0 +1,87 @@
+"""An aircraft of known truth, flown and sensed, is found within its stated intervals."""
+
+import math
+
+import numpy as np
+import pytest
+
+from aircraft.identification.alignment import align
+from aircraft.identification.estimate import fit_all, total_covariance
+from aircraft.identification.held_fixed import HELD_FIXED
+from aircraft.identification.level import levelled
+from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS
+from aircraft.identification.performance import performance
+from planfly.identification.base_numbers import scaled
+from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
+
+TRUE = np.array([TRUTH.parameters()[name] for name in NAMES])
+DENSITY = 1.1695
+
+
+def test_nearly_all_parameters_lie_within_two_standard_deviations_and_all_within_three() -> None:
+    estimate = flown_truth().estimate
+    off = np.abs(estimate.values - TRUE) / estimate.sds
+    assert (off < 1.96).sum() >= 18, dict(zip(NAMES, off.round(1), strict=True))
+    assert off.max() < 3.0, dict(zip(NAMES, off.round(1), strict=True))
+
+
+def test_what_the_log_shows_is_found_closely() -> None:
+    """Errors that a changed sign of any term, or clocks not aligned, would exceed."""
+    estimate = flown_truth().estimate
+    most = {"lift-slope": 0.15, "thrust": 0.06, "motor-speed": 0.05, "pitch-stiffness": 0.15, "elevator-power": 0.1,
+            "roll-damping": 0.1, "aileron-power": 0.1, "weathercock": 0.15, "yaw-damping": 0.2, "rudder-power": 0.2,
+            "yaw-from-roll": 0.3, "roll-from-yaw": 0.15, "dihedral-effect": 0.2}  # fmt: skip
+    off = {name: abs(float(estimate.values[INDEX[name]] - TRUE[INDEX[name]])) for name in most}
+    assert {name: error for name, error in off.items() if error > most[name]} == {}
+    assert all(equation.explained > 0.9 for equation in estimate.equations[1:])
+
+
+def test_performance_is_found_with_the_batterys_current() -> None:
+    flown = flown_truth()
+    assert flown.estimate.with_current
+    found = performance(flown.base, np.vstack([TRUE, flown.estimate.values]), 25.0, DENSITY)
+    assert math.degrees(abs(found.climb[1] - found.climb[0])) < 0.7
+    assert found.sink[1] == pytest.approx(found.sink[0], rel=0.08)
+    assert found.power[1] == pytest.approx(found.power[0], rel=0.06)
+
+
+def test_each_thing_held_fixed_is_refitted_and_counts() -> None:
+    shifts = flown_truth().estimate.shifts
+    assert {held.name for held in HELD_FIXED} | {"lift curve, axis 1", "lift curve, axis 2"} == set(shifts)
+    assert all(np.abs(shift).max() > 1e-3 for shift in shifts.values()), shifts
+
+
+def test_refits_shift_by_what_plain_sums_say() -> None:
+    """Sideslip is side force over its slope: 30 % more slope is 1 / 1.3 of the sideslip, and 1.3 times the dihedral."""
+    estimate = flown_truth().estimate
+    value, shift = estimate.values, estimate.shifts["side force of sideslip (30 %)"]
+    for name in ("dihedral-effect", "weathercock"):
+        assert shift[INDEX[name]] == pytest.approx(0.3 * value[INDEX[name]], rel=0.25), name
+    # Faster by 1 %: 2 % more pressure, 2 % less of the coefficient of what it makes.
+    faster = estimate.shifts["airspeed (1 %)"]
+    assert faster[INDEX["aileron-power"]] == pytest.approx(-0.02 * value[INDEX["aileron-power"]], rel=0.5)
+    for name in ("dihedral-effect", "weathercock"):
+        assert estimate.sds[INDEX[name]] > 0.25 * value[INDEX[name]]
+
+
+def test_an_interval_is_of_fit_and_shifts_and_none_wider_than_the_prior() -> None:
+    n = len(PARAMETERS)
+    shift = np.zeros(n)
+    shift[INDEX["thrust"]] = 0.04
+    shift[INDEX["adverse-yaw"]] = 9.0
+    shift[INDEX["roll-damping"]] = 0.04
+    sds = np.sqrt(np.diag(total_covariance(np.diag(np.full(n, 0.03**2)), {"one": shift})))
+    assert sds[INDEX["thrust"]] == pytest.approx(0.05)
+    assert sds[INDEX["roll-damping"]] == pytest.approx(0.1)  # a fast motion: twice
+    assert sds[INDEX["adverse-yaw"]] == pytest.approx(0.6)  # the prior's
+    assert sds[INDEX["lift-slope"]] == pytest.approx(0.03)
+
+
+def test_a_mass_that_is_wrong_by_10_percent_leaves_the_climb() -> None:
+    """Only thrust and drag over mass are seen: the angle stays, and the drag in newtons goes with the mass."""
+    flown = flown_truth()
+    heavy = scaled(flown.base, 1.1 * flown.base.mass, flown.base.span, flown.base.area)
+    changed = fit_all(levelled(align(flown.records, flown.estimate.clocks, flown.base.motor_lag)), heavy)
+    before = performance(flown.base, flown.estimate.values, 25.0, DENSITY)
+    after = performance(heavy, changed.values, 25.0, DENSITY)
+    assert math.degrees(abs(float(after.climb[0] - before.climb[0]))) < 0.4

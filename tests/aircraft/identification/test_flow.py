@@ -1,0 +1,37 @@
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.identification.flow import attitude_alpha
+
+
+def signals(
+    roll: float, pitch: float, yaw: float, velocity: tuple[float, ...], wind: tuple[float, ...] = (0.0, 0.0)
+) -> Any:
+    return SimpleNamespace(
+        attitude=np.radians([[roll, pitch, yaw]]), velocity=np.array([velocity]), wind=np.array([wind])
+    )
+
+
+def degrees(one: Any, level: float = 0.0) -> float:
+    return math.degrees(float(attitude_alpha(one, math.radians(level))[0]))
+
+
+def test_level_flight_has_its_pitch_as_angle_of_attack() -> None:
+    assert degrees(signals(0.0, 3.0, 0.0, (25.0, 0.0, 0.0))) == pytest.approx(3.0)
+    assert degrees(signals(0.0, 3.0, 90.0, (0.0, 25.0, 0.0)), level=0.5) == pytest.approx(3.5)
+
+
+def test_a_climb_takes_its_slope_off_and_wind_does_not_count() -> None:
+    rise = 25.0 * math.sin(math.radians(2.0))
+    along = 25.0 * math.cos(math.radians(2.0))
+    assert degrees(signals(0.0, 5.0, 0.0, (along, 0.0, -rise))) == pytest.approx(3.0)
+    assert degrees(signals(0.0, 5.0, 0.0, (along - 8.0, 0.0, -rise), (-8.0, 0.0))) == pytest.approx(3.0)
+
+
+def test_on_its_side_the_flow_from_below_is_the_flow_from_aside() -> None:
+    """Banked 90 degrees to the right and yawed 4 to the right of its way: the wing meets the air at 4 degrees."""
+    assert degrees(signals(90.0, 0.0, 4.0, (25.0, 0.0, 0.0))) == pytest.approx(4.0)

@@ -1,0 +1,45 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logs.importers.motion_log import read_motion
+from tests.instrumented_flights import short_motion, write_motion
+from world.errors import LogError
+
+
+def test_what_was_written_is_read(tmp_path: Path) -> None:
+    written = short_motion()
+    read = read_motion(write_motion(tmp_path / "a.BIN", written))
+    assert (read.vehicle, read.program, read.modes) == ("plane", written.program, written.modes)
+    assert read.parameters == pytest.approx(dict(written.parameters))
+    for name in ("inertial", "outputs", "attitude", "velocity", "wind", "airspeed", "ratio", "height", "battery"):
+        mine, theirs = getattr(read, name), getattr(written, name)
+        assert mine.time == pytest.approx(theirs.time, abs=1e-6), name
+        assert mine.values == pytest.approx(theirs.values, rel=1e-5, abs=1e-5), name
+    assert read.inertial.rate == pytest.approx(50.0, rel=0.01)
+    assert len(read.sha256) == 64
+
+
+def test_other_files_are_refused_in_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "a.gpx"
+    file.write_text("<gpx/>", encoding="utf-8")
+    for path, said in ((file, "an ArduPilot .BIN is expected"), (tmp_path / "no.BIN", "no such file")):
+        with pytest.raises(LogError, match=said) as refused:
+            read_motion(path)
+        assert "\n" not in str(refused.value)
+
+
+def test_rows_out_of_order_doubled_or_no_numbers_are_left_out(tmp_path: Path) -> None:
+    written = short_motion()
+    values = written.height.values.copy()
+    values[3] = np.nan
+    time = written.height.time.copy()
+    time[6] = time[5]
+    from dataclasses import replace
+
+    read = read_motion(
+        write_motion(tmp_path / "a.BIN", replace(written, height=replace(written.height, time=time, values=values)))
+    )
+    assert len(read.height.time) == len(time) - 2
+    assert (np.diff(read.height.time) > 0.0).all()

@@ -1,0 +1,80 @@
+"""What of a log is used, and what is refused by name, in one line each."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import load_aircraft
+from logs.importers.motion_log import MotionLog, Samples
+from planfly.identification.records import flight_records, log_outputs
+from tests.aircraft.identification.flown_truth import flown_truth
+from tests.instrumented_flights import PARAMETERS
+from world.errors import LogError
+
+NONE = Samples(np.zeros(0), np.zeros((0, 1)))
+PRIOR = load_aircraft("aerosonde")
+
+
+def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
+    return replace(flown_truth().log, parameters=PARAMETERS | dict(parameters), **fields)
+
+
+@pytest.mark.parametrize(
+    ("log", "said"),
+    [
+        (lambda: changed(inertial=NONE), "no IMU, the inertial sensors: LOG_BITMASK 65535 records them (it is 65535)"),
+        (lambda: changed(outputs=NONE), "no RCOU, the servo outputs: LOG_BITMASK 65535"),
+        (lambda: changed(attitude=NONE), "no ATT"),
+        (lambda: changed(vehicle="copter", program="ArduCopter V4.5.7"), "flown by a copter (ArduCopter V4.5.7)"),
+        (lambda: changed(vehicle="rover", program="ArduRover V4.5.7"), "flown by a rover"),
+        (lambda: changed({"SERVO1_FUNCTION": 24.0}), "output 1 (SERVO1_FUNCTION 24, flaperon) moves"),
+        (lambda: changed({"SERVO2_FUNCTION": 79.0}), "V-tail"),
+        (lambda: changed({"SERVO2_FUNCTION": 0.0}), "no SERVOn_FUNCTION is the elevator's"),
+        (lambda: changed(modes=((0.0, 10), (120.0, 19))), "flight on its lifting motors is cut"),
+    ],
+)  # fmt: skip
+def test_refusals_are_one_line_each(log: Any, said: str) -> None:
+    with pytest.raises(LogError) as refused:
+        flight_records(log(), PRIOR)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).startswith("v3-3.BIN: ")
+
+
+def test_stretches_of_a_quadplane_are_cut_and_the_rest_is_used() -> None:
+    log = changed(modes=((0.0, 10), (100.0, 19), (140.0, 10)))
+    before, after = flight_records(log, PRIOR)
+    assert before.time[-1] < 100.0
+    assert after.time[0] > 140.0
+
+
+def test_a_pause_of_the_sensors_parts_two_stretches() -> None:
+    log = flown_truth().log
+    keep = (log.inertial.time < 150.0) | (log.inertial.time > 153.0)
+    parts = flight_records(replace(log, inertial=Samples(log.inertial.time[keep], log.inertial.values[keep])), PRIOR)
+    assert [part.time[0] > 150.0 for part in parts] == [False, True]
+
+
+def test_outputs_are_read_off_the_logs_parameters() -> None:
+    """Full travel is the model's largest deflection; more microseconds are nose up, a trailing edge up."""
+    found = log_outputs(changed({"SERVO1_REVERSED": 1.0, "SERVO2_TRIM": 1450.0}), PRIOR)
+    pulses = np.array([1100.0, 1450.0, 1500.0, 1900.0])
+    assert np.degrees(found["aileron"].control(pulses)[[0, 3]]) == pytest.approx([30.0, -30.0])
+    assert np.degrees(found["elevator"].control(pulses)[[0, 1, 3]]) == pytest.approx([30.0, 0.0, -30.0])
+    assert found["throttle"].control(np.array([1000.0, 1770.0])) == pytest.approx([0.0, 0.77])
+
+
+def test_elevons_are_half_sum_and_half_difference() -> None:
+    log = flown_truth().log
+    values = log.outputs.values.copy()
+    # Both up by half their travel, and the right one down by a quarter more: ArduPlane's elevon_left is 77.
+    values[:, 0], values[:, 1] = 1700.0, 1900.0
+    flying = replace(
+        log, outputs=Samples(log.outputs.time, values),
+        parameters=PARAMETERS | {"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0},
+    )  # fmt: skip
+    controls = flight_records(flying, PRIOR)[0].controls[0]
+    assert np.degrees(controls[:2]) == pytest.approx([-22.5, 7.5])
