@@ -1,7 +1,8 @@
-"""How a process that belongs to planfly alone is set up: what collects garbage, threads of linear algebra, stack."""
+"""How a process of planfly's own is set up: what collects garbage, threads of linear algebra, stack, address space."""
 
 import gc
 import os
+import sys
 from collections.abc import Callable
 from types import FunctionType
 from typing import TypeVar
@@ -27,10 +28,38 @@ def prepare_process() -> None:
 def prepare_child() -> None:
     """Collect garbage seldom in a process that one of planfly's own started, a campaign's worker or planner.
 
-    A sixth of what a short campaign takes went into looking for garbage in its processes.
+    A sixth of what a short campaign takes went into looking for garbage in its processes.  Where address space is
+    limited, import nothing without room for it (`world.address_space`).
     """
     if _MARK in os.environ:
         gc.set_threshold(200_000, 50, 50)
+        watch_address_space()
+
+
+def watch_address_space() -> None:
+    """Where this process's address space is limited, import modules only where there is room for them."""
+    limit = limit_of_address_space()
+    if limit is None:
+        return
+    # Imported here: few processes are limited, and `import planfly` in a script loads nothing else.
+    from world.address_space import RoomFinder
+
+    if not any(isinstance(finder, RoomFinder) for finder in sys.meta_path):
+        sys.meta_path.insert(0, RoomFinder(limit))
+
+
+def limit_of_address_space() -> int | None:
+    """Bytes that this process may map; None without a limit, as on Windows.
+
+    >>> limit_of_address_space() is None or limit_of_address_space() > 0
+    True
+    """
+    try:
+        import resource
+    except ImportError:
+        return None
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return None if limit == resource.RLIM_INFINITY else limit
 
 
 def with_large_stack(work: Callable[[], _Given]) -> _Given:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from world.address_space import AddressSpaceError
 from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
 from world.errors import TerrainError
 from world.files import did_you_mean
@@ -196,6 +197,8 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
             heights = np.asarray(data["elevation"])
             return heights, [float(np.asarray(data[key]).item()) for key in edges]
     # RuntimeError and NotImplementedError: an encrypted entry, an unknown compression.
+    except AddressSpaceError:
+        raise
     except MemoryError:
         raise TerrainError(
             f"{name}: elevation: claims more than fits into memory", file=name, field="elevation"

@@ -6,6 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from world.address_space import AddressSpaceError
 from world.errors import LogError
 
 if TYPE_CHECKING:
@@ -83,6 +84,8 @@ def open_log(path: Path) -> "RawLog":
             return read(path)
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
+    except AddressSpaceError:
+        raise
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory", file=path) from None
 

@@ -21,6 +21,7 @@ from flight.simulation.setup import Damage
 from logs.importers.dataflash_frames import MappedFile, pieces
 from logs.importers.logged_missions import px4_items, px4_state, without_gaps
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from world.address_space import AddressSpaceError
 from world.errors import LogError
 from world.kernels import compiled
 
@@ -51,6 +52,8 @@ def read_px4(path: Path) -> RawLog:
         # It complains on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
             found = ULog(_Steps(file), _TOPICS, disable_str_exceptions=True)
+    except AddressSpaceError:
+        raise
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory", file=path) from None
     except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones

@@ -1,12 +1,17 @@
 """A process of planfly's own collects garbage seldom, and so do those that it starts; a script's own does not."""
 
 import os
+import resource
 import subprocess
 import sys
 
 import pytest
 
-from planfly.process_setup import prepare_process, with_large_stack
+from planfly import process_setup
+from planfly.process_setup import limit_of_address_space, prepare_process, watch_address_space, with_large_stack
+from world.address_space import RoomFinder
+
+LIMIT = 480_000 * 1024
 
 CHILD = "import gc, planfly; print(gc.get_threshold()[0])"
 PARENT = f"""
@@ -51,3 +56,21 @@ def test_work_in_a_large_stack_returns_and_raises_as_it_does_alone() -> None:
     assert with_large_stack(lambda: depth(500)) == 500
     with pytest.raises(ZeroDivisionError):
         with_large_stack(lambda: 1 // 0)
+
+
+def test_only_a_process_with_a_limit_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = list(sys.meta_path)
+    monkeypatch.setattr(sys, "meta_path", list(before))
+    monkeypatch.setattr(process_setup, "limit_of_address_space", lambda: None)
+    watch_address_space()
+    assert sys.meta_path == before
+    monkeypatch.setattr(process_setup, "limit_of_address_space", lambda: LIMIT)
+    for _ in range(2):
+        watch_address_space()
+    assert [type(one) for one in sys.meta_path[:2]] == [RoomFinder, type(before[0])]
+
+
+def test_the_limit_is_the_systems(monkeypatch: pytest.MonkeyPatch) -> None:
+    for given, found in (((LIMIT, resource.RLIM_INFINITY), LIMIT), ((resource.RLIM_INFINITY,) * 2, None)):
+        monkeypatch.setattr(resource, "getrlimit", lambda _, given=given: given)
+        assert limit_of_address_space() == found

@@ -4,6 +4,7 @@ import contextlib
 import multiprocessing
 import os
 import random
+import resource
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from planfly.campaigns import worker_pool
 from planfly.campaigns.worker_pool import (
     SchedulerError,
     Workers,
+    allow_descriptors,
     checked_address,
     connected,
     in_own_process,
@@ -257,3 +259,24 @@ def test_a_scheduler_that_is_not_there_is_one_line(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("planfly.campaigns.worker_pool._CONNECT_SECONDS", 0.5)
     with pytest.raises(SchedulerError, match="no scheduler answers"), connected(Workers(None, "127.0.0.1:1")):
         pass
+
+
+@pytest.mark.parametrize(
+    ("limits", "workers", "left"), [((1024, 4096), 2, 1024), ((32, 4096), 2, 64), ((32, 64), 2, 64)]
+)
+def test_descriptors_are_allowed_as_far_as_they_may_be(
+    limits: tuple[int, int], workers: int, left: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """32 and 16 a worker."""
+    kept = list(limits)
+    monkeypatch.setattr(resource, "getrlimit", lambda _: tuple(kept))
+    monkeypatch.setattr(resource, "setrlimit", lambda _, new: kept.__setitem__(slice(None), new))
+    allow_descriptors(workers)
+    assert kept == [left, limits[1]]
+
+
+def test_too_few_descriptors_for_the_workers_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (32, 63))
+    with pytest.raises(OSError, match="take 64 file descriptors, and the limit is 63") as caught:
+        allow_descriptors(2)
+    assert caught.value.filename == "2 workers"

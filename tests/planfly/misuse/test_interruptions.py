@@ -4,7 +4,6 @@ A few moments of a few commands; with PLANFLY_SOAK=1 moments all over the time t
 """
 
 import contextlib
-import json
 import os
 import shutil
 import signal
@@ -21,6 +20,7 @@ from logs.recording.reader import read_log
 from tests.autopilots import find_arduplane
 from tests.instances import make_instance, scenario_text
 from tests.planfly.conftest import FIELD
+from tests.planfly.misuse.every_command import check_whole
 from tests.soak import SOAK, note
 from tests.stopwatch import Stopwatch, processes_of
 
@@ -171,23 +171,6 @@ def begun_work(case: Case, said: Path, work: Path) -> bool:
     return case.words in said.read_text(encoding="utf-8") and (
         not case.grown or (grown.exists() and grown.stat().st_size > 200_000)
     )
-
-
-def check_whole(folder: Path) -> None:
-    """Every file that is there is whole."""
-    for path in folder.rglob("*"):
-        assert not path.name.startswith("."), f"{path.name}: a temporary file is left"
-        if path.name == "broken.mcap" or path.is_dir():
-            continue
-        if path.suffix == ".mcap":
-            # What was recovered from a damaged log says for ever that it is not the whole flight.
-            assert read_log(path).complete != (path.name == "mended.mcap"), path.name
-        elif path.suffix in (".json", ".plan"):
-            json.loads(path.read_text(encoding="utf-8"))
-        elif path.suffix in (".png", ".gif"):
-            assert path.read_bytes().rstrip(b"\0")[-8:].endswith((b"IEND\xaeB`\x82", b";")), path.name
-        elif path.suffix == ".html":
-            assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
 
 
 @pytest.mark.parametrize("case", FEW, ids=lambda case: f"{case.argv[0]}-{case.number.name}")
