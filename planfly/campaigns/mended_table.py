@@ -42,11 +42,14 @@ class Examined(NamedTuple):
     """The numbers of flights that are whole, and of those that are not; both rise.
 
     sound: whether SQLite finds nothing wrong with the file, whatever its rows hold.
+    after: of a file that is not, the last flight that is known of, if fewer are known of than were asked for: others
+        may have been lost behind it; -1 where that is not so.
     """
 
     whole: list[int]
     damaged: list[int]
     sound: bool = True
+    after: int = -1
 
     def text(self) -> str:
         """What is damaged, and what becomes of it, in words.
@@ -54,21 +57,23 @@ class Examined(NamedTuple):
         >>> Examined([0, 1, 3], [2]).text()
         'flight 2 is damaged and was taken out: 3 flights are whole and stay; --resume flies what is missing'
         """
+        stay = f"{len(self.whole)} flights are whole and stay; --resume flies what is missing"
+        behind = f", and any after flight {self.after} were lost" if self.after >= 0 else ""
         if not self.damaged:
-            return f"is damaged: {len(self.whole)} flights are whole and stay; --resume flies what is missing"
+            return f"is damaged{behind}: {stay}"
         listed = ", ".join(map(str, self.damaged[:_LISTED]))
         more = f" and {len(self.damaged) - _LISTED} more" if len(self.damaged) > _LISTED else ""
         several = len(self.damaged) > 1
         damaged = f"flight{'s' if several else ''} {listed}{more} {'are' if several else 'is'} damaged"
         taken = f"{'were' if several else 'was'} taken out"
-        return f"{damaged} and {taken}: {len(self.whole)} flights are whole and stay; --resume flies what is missing"
+        return f"{damaged} and {taken}{behind}: {stay}"
 
 
-def examine(connection: sqlite3.Connection, columns: Sequence[str], most: int) -> Examined:
+def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, most: int) -> Examined:
     """Which rows of the table ``flights`` are whole, whatever has happened to its file.
 
-    columns: that the checksum is of, in order, the flight's number first.  most: flights that it may hold, where that
-    has to be tried number by number.
+    columns: that the checksum is of, in order, the flight's number first.  asked: flights that were asked for.  most:
+    flights that it may hold, where that has to be tried number by number.
     Raises sqlite3.Error for a file that another process holds.
     """
     # Bytes that are no UTF-8 end no reading: they make another checksum.
@@ -80,19 +85,21 @@ def examine(connection: sqlite3.Connection, columns: Sequence[str], most: int) -
     except sqlite3.Error as error:
         _refuse_held(error)
     rows = (row for number in range(most) if (row := _row_of(connection, query, number)) is not None)
-    whole, damaged, _ = _by_checksum(rows)
-    # Of a broken file a row that is not found may have been lost with its page.
-    missing = set(range(max([-1, *whole, *damaged, *_seen(connection, most)]) + 1)) - set(whole)
-    return Examined(whole, sorted(missing), sound=False)
+    whole, damaged = _by_checksum(rows)[:2]
+    # Of a broken file a row that is not found may have been lost with its page.  A number that no checksum vouches for
+    # is believed where it was asked for: flights are numbered from 0 on.
+    last = max([-1, *whole, *(number for number in (*damaged, *_seen(connection)) if number < asked)])
+    missing = set(range(last + 1)) - set(whole)
+    return Examined(whole, sorted(missing), sound=False, after=last if last + 1 < asked else -1)
 
 
-def _seen(connection: sqlite3.Connection, most: int) -> list[int]:
+def _seen(connection: sqlite3.Connection) -> list[int]:
     """Numbers of flights that can be read one after the other, up to where the file is broken."""
     seen: list[int] = []
     with contextlib.suppress(sqlite3.Error):
         for (number,) in connection.execute("SELECT flight FROM flights"):
             seen.append(number)
-    return [number for number in seen if number < most]
+    return seen
 
 
 def _by_checksum(rows: Iterable[tuple[Any, ...]]) -> Examined:

@@ -213,8 +213,8 @@ class LockedTable:
     def _mend(self, known: dict[str, str]) -> None:
         """Keep the flights that are whole, and say which are not; the file is made anew then."""
         # A search may have been asked for fewer flights than are there: those beyond are kept, too.
-        most = max(json.loads(known["settings"]).get("flights", _MOST), self._last() + 1)
-        examined = examine(self._connection, tuple(self._kind.columns), most)
+        asked = json.loads(known["settings"]).get("flights", _MOST)
+        examined = examine(self._connection, tuple(self._kind.columns), asked, max(asked, self._last() + 1))
         if examined.sound and not examined.damaged:
             return
         mended = self.path.with_name(f".{self.path.name}.mended")
