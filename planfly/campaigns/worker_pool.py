@@ -15,6 +15,8 @@ import os
 import pickle
 import platform
 import signal
+import sys
+import tempfile
 import threading
 import time
 import uuid
@@ -25,7 +27,7 @@ from functools import cache
 from importlib import metadata, resources
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 from urllib.parse import urlsplit
 
 from distributed import WorkerPlugin, get_worker
@@ -39,6 +41,45 @@ from planfly.pipeline import Advance
 from world.errors import PlanflyError
 from world.files import temporary_folder
 from world.interruption import Interrupted, children_ignore_sigint, end_children, end_with_parent
+
+if TYPE_CHECKING:
+    from multiprocessing.context import ForkServerContext, SpawnContext
+
+# ----------------------------------------------------------------------
+# How the processes of a campaign are started.
+
+# Bytes of the path of the folder for temporary files, below which are 32 more to the socket.
+_LONGEST_FOLDER = 75
+# Imported once for all of them, by the process that they are forked from.
+_PRELOADED = ("planfly.campaigns.fork_server",)
+
+
+def child_start_method() -> Literal["forkserver", "spawn"]:
+    """How `multiprocessing` starts the processes of a campaign: ``forkserver`` on Linux, ``spawn`` elsewhere.
+
+    Before Python 3.11.1 every user of the machine could speak to a fork server (CVE-2022-42919); and the path of its
+    socket, in a folder among temporary files, has at most 107 bytes.
+    """
+    safe = sys.platform == "linux" and sys.version_info >= (3, 11, 1)
+    return "forkserver" if safe and len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER else "spawn"
+
+
+def child_processes() -> "ForkServerContext | SpawnContext":
+    """The `multiprocessing` context of a campaign's processes, which never hear Ctrl-C.
+
+    On Linux they are forked from one process that has imported what all of them need, which takes seconds.
+    """
+    if child_start_method() == "spawn":
+        return multiprocessing.get_context("spawn")
+    from multiprocessing import forkserver
+
+    context = multiprocessing.get_context("forkserver")
+    # What it preloads is settled when it starts; dask would name modules of its own.
+    context.set_forkserver_preload(list(_PRELOADED))
+    with children_ignore_sigint():
+        forkserver.ensure_running()
+    return context
+
 
 # ----------------------------------------------------------------------
 # Workers of this machine stay as many as were asked for, no fewer and no more, whichever of them die.
@@ -121,6 +162,7 @@ def connected(workers: Workers) -> Iterator[Any]:
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     settings: dict[str, Any] = {
+        "distributed.worker.multiprocessing-method": child_start_method(),
         "distributed.scheduler.allowed-failures": ALLOWED_FAILURES,
         "distributed.worker.memory.terminate": False,
         "distributed.worker.memory.pause": False,
@@ -147,6 +189,7 @@ def connected(workers: Workers) -> Iterator[Any]:
             stack.enter_context(dask.config.set({"temporary-directory": str(folder)}))
             number = workers.count or os.cpu_count() or 1
             start_tracker()
+            child_processes()
             # Ctrl-C in the middle of a worker's imports would have it say so.
             with children_ignore_sigint():
                 cluster = stack.enter_context(_local_cluster(cluster_types, number, folder))
@@ -284,8 +327,9 @@ def in_own_process(work: Callable[..., Made], *args: Any, advance: Advance | Non
     """
     # Before anything else does, so that it says nothing of what the workers leave later.
     start_tracker()
-    here, there = multiprocessing.get_context("spawn").Pipe(duplex=False)
-    child = multiprocessing.get_context("spawn").Process(target=_work, args=(there, work, args, options), daemon=True)
+    context = child_processes()
+    here, there = context.Pipe(duplex=False)
+    child = context.Process(target=_work, args=(there, work, args, options), daemon=True)
     with children_ignore_sigint():
         child.start()
     there.close()

@@ -8,6 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +23,7 @@ from planfly.campaigns.worker_pool import (
     Workers,
     allow_descriptors,
     checked_address,
+    child_start_method,
     connected,
     in_own_process,
     kept_workers,
@@ -71,6 +73,16 @@ def test_what_is_raised_there_is_raised_here_whole() -> None:
 def test_a_process_that_is_lost_is_said_to_be() -> None:
     with pytest.raises(OSError, match="a process of the campaign was lost"):
         in_own_process(killed)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
+@pytest.mark.parametrize(("length", "method"), [(75, "forkserver"), (76, "spawn")])
+def test_processes_are_forked_where_the_path_of_a_socket_is_short(
+    length: int, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # /pymp-12345678/listener-12345678 is 32 bytes long, and a socket's path has 107.
+    monkeypatch.setattr(tempfile, "tempdir", "/" * length)
+    assert child_start_method() == method
 
 
 OPENED = """

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,8 @@ from tests.stopwatch import Stopwatch, processes_of
 pytestmark = pytest.mark.alone
 
 LIMIT = 1.0
+# s in which a process of its own that only waits for the command's end has ended, too.
+_GONE = 1.0
 MOMENTS = 8
 # 1.5 km east, 1.1 km north and back.
 ROUND = """QGC WPL 110
@@ -123,9 +126,14 @@ def interrupted(case: Case, inputs: Path, folder: Path) -> tuple[int | None, flo
 
     A code of None is a command that had ended before the signal came.
     """
-    work, temporary = folder / "work", folder / "temporary"
+    # A short path, as a socket among temporary files needs: pytest's own folders have long ones.
+    with tempfile.TemporaryDirectory() as temporary:
+        return _interrupted(case, inputs, folder, Path(temporary))
+
+
+def _interrupted(case: Case, inputs: Path, folder: Path, temporary: Path) -> tuple[int | None, float, str]:
+    work = folder / "work"
     shutil.copytree(inputs, work)
-    temporary.mkdir()
     environment = os.environ | {"TMPDIR": str(temporary), "PYTHONUNBUFFERED": "1"}
     if case.cold:
         environment["NUMBA_CACHE_DIR"] = str(folder / "kernels")
@@ -151,8 +159,9 @@ def interrupted(case: Case, inputs: Path, folder: Path) -> tuple[int | None, flo
             process.send_signal(case.number)
         with Stopwatch(process.pid) as watch:
             code = process.wait(300.0)
-        time.sleep(0.1)
-        left = alive(process.pid)
+        until = time.monotonic() + _GONE
+        while (left := alive(process.pid)) and time.monotonic() < until:
+            time.sleep(0.05)
     finally:
         for line in alive(process.pid):
             print("killed", line)

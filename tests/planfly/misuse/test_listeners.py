@@ -1,6 +1,7 @@
 """Every socket on which planfly waits for somebody, as the system lists them, against the table of the network page."""
 
 import re
+import stat
 import subprocess
 import sys
 import time
@@ -14,9 +15,10 @@ import pytest
 from flight.autopilots.arduplane_sitl.link import AutopilotLink
 from flight.autopilots.arduplane_sitl.physics import PhysicsPort
 from logs.recording.example_log import write_example_log
-from planfly.campaigns.worker_pool import Workers, connected
+from planfly.campaigns.worker_pool import Workers, child_processes, child_start_method, connected
 from planfly.cli import main
 from planfly.commands.registry import build_parser
+from tests.planfly.campaigns.kills import is_fork_server
 from tests.planfly.conftest import FIELD, Served
 from tests.soak.test_hostile_files import WPL
 
@@ -63,6 +65,16 @@ def test_a_campaign(monkeypatch: pytest.MonkeyPatch) -> None:
     with connected(Workers(1)) as client:
         assert len(client.nthreads()) == 1
         assert listening(psutil.Process().pid) - before == table()["`campaign`, `winds`"]
+
+
+@pytest.mark.skipif(child_start_method() != "forkserver", reason="processes are forked on Linux alone")
+def test_only_its_user_reaches_a_campaigns_fork_server() -> None:
+    child_processes()
+    (server,) = [one for one in psutil.Process().children() if is_fork_server(one)]
+    (path,) = [one.laddr for one in server.net_connections(kind="unix") if one.laddr]
+    # No abstract name, which has no owner, but a file; who may not enter the folder may not speak.
+    assert stat.S_IMODE(Path(path).stat().st_mode) == 0o600
+    assert stat.S_IMODE(Path(path).parent.stat().st_mode) == 0o700
 
 
 def test_a_vehicle(serve: Callable[..., Served]) -> None:
