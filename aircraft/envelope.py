@@ -1,7 +1,7 @@
 """Performance envelope of an aircraft: steady climb, descent, speed and power over airspeed and altitude."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from world.kernels import compiled
 Floats = NDArray[np.float64]
 
 GRAVITY = 9.80665
+# Standard deviations by which a slope that is not known for certain counts as sure: 95 % one-sided, of a normal
+# distribution.
+SURE = 1.645
 # Names of the tables of an `Envelope`, and of its power tables.
 TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
 POWERS = ("power_idle", "power_level", "power_full")
@@ -30,6 +33,8 @@ class Envelope:
     power_idle, power_level, power_full: (v, h) electric power, or heat of the fuel per second, at the steepest descent,
     in level flight and at the steepest climb, W; (0, 0) if unknown.
     volts: battery voltage, 0 without one.
+    source: what the model was made from where its slopes are not known for certain: "a data sheet"; "" where they are.
+    climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
     """
 
     aircraft: str
@@ -46,6 +51,9 @@ class Envelope:
     power_level: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     power_full: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     volts: float = 0.0
+    source: str = ""
+    climb_sd: float = 0.0
+    descent_sd: float = 0.0
 
     def __post_init__(self) -> None:
         """Make the tables read-only."""
@@ -66,6 +74,25 @@ class Envelope:
             _bilinear(self.airspeed, self.amsl, self.climb, airspeed, amsl),
             _bilinear(self.airspeed, self.amsl, self.descent, airspeed, amsl),
         )
+
+    def surely(self) -> "Envelope":
+        """The slopes that the aircraft can for certain, as far as that is known: `SURE` deviations less, 0 at least.
+
+        >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
+        >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
+        >>> made = Envelope("mine", "", False, max_bank=0.5, climb_sd=0.1, descent_sd=0.2, **edges, **tables)
+        >>> round(float(made.surely().climb[0, 0]), 4), float(made.surely().descent[0, 0]), made.surely().climb_sd
+        (0.0355, 0.0, 0.0)
+        """
+        if not (self.climb_sd or self.descent_sd):
+            return self
+        less = {name: SURE * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
+        # What loses height stays as it is.
+        climb, descent = (
+            np.where(table > 0.0, np.maximum(0.0, table - less[name]), table)
+            for name, table in (("climb", self.climb), ("descent", self.descent))
+        )
+        return replace(self, climb=climb, descent=descent, climb_sd=0.0, descent_sd=0.0)
 
     def slope_limits(
         self, airspeed: float, amsl: float, tailwind: float = 0.0, crosswind: float = 0.0

@@ -5,7 +5,7 @@ limits for a planner's candidates, for certificates and for missions.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -84,6 +84,10 @@ class Limits:
         """
         climb, dive = aircraft_slopes(self.performance(airspeed), course, amsl)
         return float(climb), float(dive)
+
+    def surely(self) -> "Limits":
+        """The limits with the slopes that the aircraft can for certain, as far as that is known: what plans keep to."""
+        return replace(self, envelope=self.envelope.surely())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
         """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed in the turn."""

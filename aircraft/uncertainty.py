@@ -7,14 +7,14 @@ Beside the model stands ``uncertainty.toml`` (of a data sheet) or ``posterior.to
 import csv
 import io
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from world.errors import FlightError
+from world.errors import FlightError, PlanflyError
 from world.files import read_small_file, read_toml, utf8_text
 
 Floats = NDArray[np.float64]
@@ -99,10 +99,10 @@ def _quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
     return UncertainQuantity(name, str(entry.get("unit", "factor")), estimate, sd, str(entry.get("reason", "")))
 
 
-def _check_name(name: object, file: str, field: str) -> None:
+def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = FlightError) -> None:
     # JSBSim aborts the process over a name with a space in it.
     if not isinstance(name, str) or not name.startswith(_PREFIX) or not name.isascii() or len(name.split()) != 1:
-        raise FlightError.at(file, field, name, f"a property {_PREFIX}NAME is expected", shown=repr(name))
+        raise error.at(file, key, name, f"a property {_PREFIX}NAME is expected", shown=repr(name))
 
 
 def uncertainty_text(known: Uncertainty) -> str:
@@ -140,7 +140,7 @@ class Draws:
     """
 
     names: tuple[str, ...]
-    values: Floats
+    values: Floats = field(compare=False)
     source: str = ""
 
     def row(self, seed: int) -> int:
@@ -177,8 +177,8 @@ def draws_text(draws: Draws) -> str:
     return "\n".join(lines) + "\n"
 
 
-def read_draws(path: Path, error: type[FlightError] = FlightError) -> Draws:
-    """Read a ``draws.csv``.  Raises FlightError, with the line, for one that cannot be read or used."""
+def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
+    """Read a ``draws.csv``.  Raises the error, with the line, for one that cannot be read or used."""
     text = utf8_text(read_small_file(path, MAX_BYTES, "draws", error), path, error)
     rows = [row for row in csv.reader(io.StringIO(text)) if row]
     if len(rows) < 2:
@@ -186,7 +186,7 @@ def read_draws(path: Path, error: type[FlightError] = FlightError) -> Draws:
         raise error(message, file=path)
     names = tuple(name.strip() for name in rows[0])
     for name in names:
-        _check_name(name, f"{path}:1", "property")
+        _check_name(name, f"{path}:1", "property", error)
     values = []
     for number, row in enumerate(rows[1:], 2):
         try:

@@ -131,8 +131,8 @@ def plan_then_fly(
 def make_plan(
     scenario: Scenario, airframe: Airframe, seed: int, algorithm: str | None = None, advance: Advance | None = None
 ) -> Plan:
-    """Plan within the scenario's and the aircraft's limits."""
-    return plan_path(scenario, airframe.limits, seed=seed, algorithm=algorithm, progress=advance)
+    """Plan within the scenario's and the aircraft's limits, as far as these are known for certain."""
+    return plan_path(scenario, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
 
 
 def make_setup(

@@ -213,6 +213,8 @@ def _next(verdict: Verdict, flown: bool, last: bool, changes: list[Tightening]) 
     """What follows from a round."""
     if verdict.flyable:
         return "done: it flies"
+    if verdict.undecided:
+        return "ended: nothing failed, and the aircraft is not known well enough for the rest"
     if not flown:
         return "ended: within these limits no feasible plan was found"
     if not changes:

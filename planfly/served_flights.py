@@ -212,6 +212,8 @@ def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
     failed = [finding for finding in verdict.findings if finding.ok is False]
     if verdict.flyable:
         return (StatusText(f"verdict ({level}): FLYABLE", INFO),)
+    if verdict.undecided:
+        return (StatusText(f"verdict ({level}): NOT JUDGED IN FULL: {verdict.unjudged}", WARNING),)
     deciding = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
     lines = [StatusText(f"{_heading(item)}: {item.reason}", WARNING) for item in failed[:_MAX_TEXTS]]
     if len(failed) > _MAX_TEXTS:

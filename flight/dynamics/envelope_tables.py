@@ -11,6 +11,7 @@ from platformdirs import user_cache_dir
 
 from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import POWERS, TABLES, Envelope
+from aircraft.uncertainty import read_uncertainty
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import Floats, Trim, fastest, full_throttle, idle, slowest, straight
 from world.files import write_whole
@@ -40,7 +41,11 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     if tables is None:
         tables = compute_tables(aircraft, motor_braking)
         _write(file, key, tables)
+    known = read_uncertainty(aircraft.folder)
     return Envelope(
+        source="" if known is None else known.source,
+        climb_sd=0.0 if known is None else known.climb,
+        descent_sd=0.0 if known is None else known.descent,
         aircraft=aircraft.name,
         model_hash=model_hash(aircraft),
         motor_braking=motor_braking,

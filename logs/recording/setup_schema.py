@@ -150,6 +150,9 @@ class EnvelopeTable(SetupModel):
     power_level: Annotated[_Table, Field(alias="power_level_w")] = []
     power_full: Annotated[_Table, Field(alias="power_full_w")] = []
     volts: Annotated[Finite, Field(alias="battery_v")] = 0.0
+    source: str = ""
+    climb_sd: Annotated[Finite, Field(alias="climb_sd_rad", ge=0.0)] = 0.0
+    descent_sd: Annotated[Finite, Field(alias="descent_sd_rad", ge=0.0)] = 0.0
 
     def envelope(self, file: str) -> Envelope:
         """The envelope of the table.  Raises LogError for tables that do not fit, and for axes out of order."""

@@ -11,6 +11,8 @@ from logs.verdict.places import DecidingParameter, LevelAnswer, Place, Suggestio
 from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
 
 SCHEMA = "planfly.verdict/3"
+# The check of a finding that is not judged because the aircraft is not known well enough.
+UNKNOWN_AIRCRAFT = "unknown aircraft"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,7 @@ class Finding:
     suggestions: of a failed finding, the smallest changes of the plan that would pass it, the least change first.
     brief: the reason in a few words, for a headline.
     placed: whether the reason begins with the place.
-    check: where a rule has several checks, which one; "" otherwise.
+    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT` of what that leaves open; "" otherwise.
     facts: what was measured beside it and is no fault.
     """
 
@@ -83,8 +85,8 @@ class Verdict:
     it did not get to; empty where too little was recorded to tell.
     program: of a flown verdict, the real autopilot that flew, None where none did.
     parameters: of a flown verdict, those of the ArduPlane that flew, by its law or itself; None where none did.
-    unjudged: what of the mission of an imported flight was not judged, as its log lacks items; "" for nothing.  Such a
-    flight is never flyable.
+    unjudged: what was not judged, so that the flight is not flyable although nothing failed; "" for nothing: items that
+    the log of an imported flight lacks, or slopes that the aircraft is not known well enough for.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -157,6 +159,15 @@ def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
     'overshoots its arc by 8 m (at most 5 m)'
     """
     return Message(brief + more, brief, placed)
+
+
+def left_open(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """The findings that are not judged because the aircraft is not known well enough.
+
+    >>> left_open([make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)])[0].place.index
+    1
+    """
+    return tuple(item for item in findings if item.ok is None and item.check == UNKNOWN_AIRCRAFT)
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:

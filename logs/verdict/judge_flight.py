@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding, Verdict, left_open
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
     flown_findings,
@@ -23,7 +23,7 @@ from logs.verdict.judge_geometry import (
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Disagreement, LevelAnswer, Place, ReferenceFlights
-from logs.verdict.summary import headline, summary_lines
+from logs.verdict.summary import headline, summary_lines, undecided_text
 
 __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 
@@ -70,23 +70,21 @@ def judge_flight(
     aligned = align_track(requirements, track)
     findings = flown_findings(requirements, aligned, ended, log_complete)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
-    flyable = complete and not any(item.ok is False for item in findings)
+    unjudged = undecided_text(findings)
+    flyable = complete and not unjudged and not any(item.ok is False for item in findings)
     findings = with_suggestions(requirements, aligned, findings)
     levels = _levels(requirements, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
     lines = summary_lines(findings, setup, "flown", levels, deciding)
     return Verdict(
-        findings,
-        flyable,
-        complete,
-        lines,
-        "flown",
+        *(findings, flyable, complete, lines, "flown"),
         levels=levels,
         deciding=deciding,
         notes=setup.route.notes,
         leg_ends=() if aligned is None else aligned.leg_ends(),
         program=setup.autopilot.program,
         parameters=setup.autopilot.parameters,
+        unjudged=unjudged,
     )
 
 
@@ -97,18 +95,22 @@ def _levels(
 
     Without the envelope there is the flight's own answer alone.
     """
-    levels = []
+    levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
         predicted = (*unflyable_items(requirements.setup), *geometric_findings(requirements))
-        passes = not any(item.ok is False for item in predicted)
+        fails = any(item.ok is False for item in predicted)
+        passes = not fails and not left_open(predicted)
         differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
-        levels.append(LevelAnswer("geometry", passes, headline(predicted, passes), differing))
+        said = headline(predicted, passes, source)
+        levels.append(LevelAnswer("geometry", passes, said, differing, undecided=not passes and not fails))
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
         passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
         differing = _differing("airframe", passed, flown)
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing))
-    return (*levels, LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable)))
+    undecided = bool(left_open(flown)) and not any(item.ok is False for item in flown)
+    own = LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided)
+    return (*levels, own)
 
 
 def _differing(

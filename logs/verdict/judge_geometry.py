@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Verdict, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
 from logs.verdict.rules.registry import RULES
-from logs.verdict.summary import headline, summary_lines
+from logs.verdict.summary import headline, summary_lines, undecided_text
 from planner.plan import Plan, Violation
 
 # ----------------------------------------------------------------------
@@ -69,7 +69,7 @@ def _judged(
 def with_suggestions(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend.
+    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend, and of what is left open.
 
     The way of a return to launch is the autopilot's: no change of its legs can be made.
     """
@@ -77,7 +77,8 @@ def with_suggestions(
     back = {requirements.leg(i) for i in range(first, requirements.legs)} if first >= 0 else set()
     for item in findings:
         suggest = RULES[item.rule].suggest
-        if item.ok is False and suggest is not None and item.place not in back:
+        asked = item.ok is False or (item.ok is None and item.check == UNKNOWN_AIRCRAFT)
+        if asked and suggest is not None and item.place not in back:
             item = replace(item, suggestions=suggest(requirements, aligned, item))
         out.append(item)
     return tuple(out)
@@ -113,10 +114,13 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
         *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible
-    flyable = complete and not any(item.ok is False for item in findings)
-    levels = (LevelAnswer("geometry", flyable, headline(findings, flyable)),)
+    unjudged, fails = undecided_text(findings), any(item.ok is False for item in findings)
+    flyable = complete and not unjudged and not fails
+    said = headline(findings, flyable, setup.envelope.source)
+    levels = (LevelAnswer("geometry", flyable, said, undecided=bool(unjudged) and not fails),)
     lines = summary_lines(findings, setup, "geometric", levels)
-    return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
+    notes = setup.route.notes
+    return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=notes, unjudged=unjudged)
 
 
 def flown_level(setup: FlightSetup) -> LevelName:

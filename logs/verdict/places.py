@@ -17,10 +17,11 @@ PlaceKind = Literal[
 # What a change is of.  To another value: a leg's "length", its "rise" (negative: it falls), "airspeed", a "turn" at
 # most.  By a step: "height" or "descent" (higher, lower) of a leg, or of the path at a zone; "inset" of the path from
 # the area's edges, "distance" from a missile, "north", "east", "south" or "west" at a zone, "duration" of the flight.
-# By a factor: the "battery" or the "tank".
+# By a factor: the "battery" or the "tank".  Not of a plan, but of what is known of the aircraft: so long a flight at
+# "full throttle" or with "no throttle" would tell.
 Quantity = Literal[
     "length", "rise", "airspeed", "turn", "height", "descent", "inset", "distance", "north", "east", "south", "west",
-    "duration", "battery", "tank",
+    "duration", "battery", "tank", "full throttle", "no throttle",
 ]  # fmt: skip
 
 
@@ -110,12 +111,14 @@ class LevelAnswer:
 
     headline: its answer in a line.
     disagreements: the findings that it and the verdict judge differently; none of the verdict's own level.
+    undecided: whether nothing failed, and something was not judged that had to be.
     """
 
     name: LevelName
     flyable: bool
     headline: str
     disagreements: tuple[Disagreement, ...] = ()
+    undecided: bool = False
 
 
 @dataclass(frozen=True, slots=True)

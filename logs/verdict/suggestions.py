@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
-from logs.verdict.findings import Finding
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import (
@@ -36,6 +36,7 @@ from logs.verdict.tolerances import (
     MIN_RISE,
     ROUNDING,
     SPEED_STEP,
+    TELLING_FLIGHT,
     TRIES,
     ZONE_TRIES,
 )
@@ -120,10 +121,16 @@ def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
 
 
 def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """A gentler slope, a longer leg or another speed for one leg; the least relative change first."""
+    """A gentler slope, a longer leg or another speed for one leg; the least relative change first.
+
+    Where the aircraft is not known well enough, a flight that would tell.
+    """
     leg = item.place.index
     if leg is None:
         return ()
+    if item.check == UNKNOWN_AIRCRAFT:
+        what: Quantity = "full throttle" if requirements.slopes[leg] > 0.0 else "no throttle"
+        return ((Change(what, item.place, None, TELLING_FLIGHT, "s"),),)
     limit, source = slope_limit(requirements, leg)
     planned = abs(float(requirements.slopes[leg]))
     rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding, Verdict, left_open
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
 from logs.verdict.rules.registry import RULES
@@ -25,15 +25,41 @@ _LEVELS = {
 }
 
 
-def headline(findings: Sequence[Finding], flyable: bool) -> str:
-    """First line: the answer, and what failed, or was not judged or only just passed."""
+def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
+    """First line: the answer, and what failed, or was not judged or only just passed.
+
+    source: what the aircraft's model was made from, where it is not known for certain.
+    """
+    whose = [f"an aircraft from {source}"] if source else []
     if flyable:
         silent = [_not_judged(findings, rule) for rule in RULES.values() if rule.unjudged]
-        return "; ".join(["flyable", *filter(None, silent), *_by_luck(findings)])
+        return "; ".join(["flyable", *filter(None, silent), *_by_luck(findings), *whose])
     failed = _failed(findings)
+    if not failed and (open_text := undecided_text(findings)):
+        return "; ".join([f"not judged in full: {open_text}", *whose])
     named = _most_telling(failed)
     more = len(failed) - len(named)
-    return "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
+    text = "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
+    return "; ".join([text, *whose])
+
+
+def undecided_text(findings: Sequence[Finding]) -> str:
+    """What the aircraft is not known well enough for, in words; "" for nothing.
+
+    >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
+    >>> from logs.verdict.places import Place
+    >>> legs = (Place("leg", k, to_item=k + 1) for k in range(2))
+    >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
+    'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
+    """
+    found = left_open(findings)
+    if not found:
+        return ""
+    if len(found) > _NAMED:
+        return f"slopes on {len(found)} legs are within what is not known of the aircraft"
+    places = [place_text(item.place) + ("," if item.place.to_item is not None else "") for item in found]
+    slopes, are = ("slopes", "are") if len(found) > 1 else ("slope", "is")
+    return f"{slopes} on {' and '.join(places)} {are} within what is not known of the aircraft"
 
 
 def first_failed(findings: Sequence[Finding]) -> Finding | None:

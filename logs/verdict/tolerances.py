@@ -75,6 +75,12 @@ OFF_SPEED = 1.0
 # Share of the wind at 6 m.  Standard deviation of the gust along the track: MIL-F-8785C has 0.1 high up to 0.2 at the
 # ground.
 GUST_SHARE = 0.15
+# Standard deviations.  A slope is undecided where the limit of an aircraft that is not known for certain lies nearer:
+# 95 % one-sided, of a normal distribution.  Plans keep as far away (`aircraft.envelope.SURE`).
+UNDECIDED = 1.645
+# s.  So long a climb at full throttle, or a glide without, tells what an aircraft can: the speed settles in 5 s, and
+# the gusts of 15 s average out.
+TELLING_FLIGHT = 20.0
 # rad.  The ability that an aircraft showed may fall short of what a leg asks by this and `SURE` standard errors.
 SHOWN_TOLERANCE = math.radians(0.1)
 # Standard errors.  How far a measured ability may be out.

@@ -63,6 +63,8 @@ def change_text(change: Change) -> str:
     'fly leg 3 12 m lower'
     >>> change_text(Change("descent", Place("leg", 3, to_item=5), None, 12.0, "m"))
     'fly leg 3, to item 5, 12 m lower'
+    >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
+    'fly a climb of 20 s at full throttle and give its log to planfly aircraft --identify'
     """
     where, wanted = _place_within(change.place), change.wanted
     match change.what:
@@ -86,10 +88,24 @@ def change_text(change: Change) -> str:
             return f"bring the path {wanted:.0f} m further inside"
         case "distance":
             return f"pass {threat_text(change.place)} {wanted:.0f} m further away"
+    return _beside_the_path(change)
+
+
+def _beside_the_path(change: Change) -> str:
+    """A change of anything but the path."""
+    wanted = change.wanted
+    match change.what:
         case "duration":
             return f"shorten the flight by {wanted:.0f} %"
-        case "battery" | "tank":
-            return f"take a {change.what} {wanted:.2f} times as large"
+        case "full throttle" | "no throttle":
+            climb = change.what == "full throttle"
+            what = (
+                f"a climb of {wanted:.0f} s at full throttle"
+                if climb
+                else f"a glide of {wanted:.0f} s without throttle"
+            )
+            return f"fly {what} and give its log to planfly aircraft --identify"
+    return f"take a {change.what} {wanted:.2f} times as large"
 
 
 def _rise(change: Change) -> str:

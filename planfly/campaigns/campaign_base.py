@@ -9,8 +9,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from aircraft.catalog import model_hash
+from aircraft.catalog import Aircraft, model_hash
 from aircraft.path_limits import Limits
+from aircraft.uncertainty import DRAWS_FILE, read_draws
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import straight
 from flight.mission.from_plan import plan_mission
@@ -19,11 +20,11 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from planfly.airframe import Airframe, choose_seed, load_airframe, with_tracking
-from planfly.campaigns.dispersions import Dispersions, Draw, SpreadError
+from planfly.campaigns.dispersions import DEFAULT, Dispersions, Draw, SpreadError
 from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission
 from planfly.pipeline import Advance, OffNominal, make_plan, make_setup
 from planner.plan import Plan, plan_json, read_plan
-from world.errors import MissionError
+from world.errors import FlightError, MissionError
 from world.files import write_whole
 from world.scenario import Scenario, load_scenario
 from world.scenario_tables import WindTable
@@ -127,6 +128,7 @@ def _of_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: in
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="plan.json", tracking=tracking)
     mission = fences.on_mission(mission)
     placed = place_stops(mission, scenario.origin, scenario.terrain)
+    dispersions = _with_own_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed, plan, dispersions, seed, scenario.name)
 
 
@@ -136,6 +138,7 @@ def _of_mission(opened: OpenedMission, dispersions: Dispersions, source: str) ->
     mission = replace(setup.mission, source=source)
     scenario = setup.scenario
     placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
+    dispersions = _with_own_draws(dispersions, opened.airframe.aircraft)
     return CampaignBase(scenario, opened.airframe, mission, placed, setup.plan, dispersions, setup.seed, opened.name)
 
 
@@ -146,6 +149,7 @@ def check_middle(base: CampaignBase) -> None:
         mass=medians.get("mass", 1.0), drag=medians.get("drag", 1.0), control=medians.get("control_power", 1.0)
     )
     aircraft = base.airframe.aircraft
+    _check_draws(base)
     model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
     amsl = float(base.scenario.start[2])
     if straight(model, base.airframe.airspeed, amsl) is None:
@@ -157,6 +161,26 @@ def check_middle(base: CampaignBase) -> None:
             f" {base.airframe.airspeed:g} m/s",
             file=base.dispersions.name, value=factors,
         )  # fmt: skip
+
+
+def _check_draws(base: CampaignBase) -> None:
+    """Refuse draws of properties that the aircraft's model has not.  Raises SpreadError."""
+    draws = base.dispersions.draws
+    if draws is None:
+        return
+    try:
+        Fdm(base.airframe.aircraft, variation=Variation(properties=draws.properties(0)))
+    except FlightError as error:
+        allowed = f"draws of another aircraft: {error}"
+        raise SpreadError(f"{draws.source}: {allowed}", file=draws.source, field=error.field) from error
+
+
+def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
+    """Default dispersions with the draws that stand beside an aircraft's model, where there are any."""
+    file = aircraft.folder / DRAWS_FILE
+    if dispersions.name != DEFAULT or dispersions.draws is not None or not file.is_file():
+        return dispersions
+    return dispersions.with_draws(read_draws(file, SpreadError))
 
 
 # ----------------------------------------------------------------------
@@ -186,8 +210,8 @@ class VariedFlight:
 def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
     """The flight of a draw; wind: about which it varies, None for the scenario's.
 
-    Scenario and limits are in the flight's wind, as `planfly fly --wind` has them; mass, drag, control power and the
-    start's place are known to nobody who steers.
+    Scenario and limits are in the flight's wind, as `planfly fly --wind` has them; mass, drag, control power, the
+    drawn aircraft and the start's place are known to nobody who steers.
     """
     values = draw.values
     scenario = _in_wind(base.scenario, values, wind)
@@ -196,7 +220,11 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
     battery = base.airframe.battery * values["battery"]
     airframe = replace(base.airframe, limits=_limits(base.airframe, scenario), battery=battery)
     setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed)
-    variation = Variation(mass=values["mass"], drag=values["drag"], control=values["control_power"])
+    draws = base.dispersions.draws
+    properties = () if draws is None else draws.properties(draw.seed)
+    variation = Variation(
+        mass=values["mass"], drag=values["drag"], control=values["control_power"], properties=properties
+    )
     offset = (values["start_east"], values["start_north"], values["start_up"])
     return VariedFlight(setup, airframe, OffNominal(variation, offset))
 
@@ -222,5 +250,7 @@ def _raised(terrain: Terrain, by: float) -> Terrain:
 def _limits(airframe: Airframe, scenario: Scenario) -> Limits:
     """The airframe's limits in another wind."""
     old = airframe.limits
-    limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
+    # What is not known of the aircraft is what the flights are drawn from; each of them is decided.
+    envelope = replace(old.envelope, climb_sd=0.0, descent_sd=0.0)
+    limits = make_limits(scenario, envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
     return with_tracking(limits, airframe.autopilot, scenario)

@@ -9,10 +9,14 @@ A table a quantity, named as in `QUANTITIES`; `distribution` is the name of one 
     distribution = "norm"
     scale = 1.5
     source = "two years of the airfield's records"
+
+``[aircraft] draws = "mine/draws.csv"`` names draws of the whole aircraft, relative to the file: each flight flies one
+of its rows, by the flight's own seed, in place of factors on drag and control power.
 """
 
+import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -21,6 +25,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.uncertainty import Draws, read_draws
 from world.errors import PlanflyError
 from world.files import read_small_file, toml_table, utf8_text
 
@@ -75,6 +80,9 @@ BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
 NAMES = tuple(BY_NAME)
 
 
+# What draws of the whole aircraft take the place of, and the table that names them.
+DRAWN = ("drag", "control_power")
+_AIRCRAFT = "aircraft"
 # Of a distribution at least this much has to lie within the quantity's range; the rest of it is never drawn.
 INSIDE = 0.99
 MAX_BYTES = 100_000
@@ -136,21 +144,43 @@ class Varying:
 
 @dataclass(frozen=True)
 class Dispersions:
-    """All that varies, in the order of `QUANTITIES`; name: where it is from."""
+    """All that varies, in the order of `QUANTITIES`; name: where it is from.
+
+    draws: whole aircraft, of which each flight has one; None where drag and control power vary by themselves.
+    """
 
     varying: tuple[Varying, ...]
     name: str
+    draws: Draws | None = None
 
     def without(self, names: tuple[str, ...]) -> "Dispersions":
         """The dispersions without these quantities."""
-        return Dispersions(tuple(one for one in self.varying if one.quantity.name not in names), self.name)
+        return replace(self, varying=tuple(one for one in self.varying if one.quantity.name not in names))
+
+    def with_draws(self, draws: Draws) -> "Dispersions":
+        """The dispersions with draws of the aircraft, which take the place of drag and control power.
+
+        >>> import numpy as np
+        >>> made = default_dispersions().with_draws(Draws(("ident/thrust",), np.array([[1.1]]), "mine/draws.csv"))
+        >>> [one.quantity.name for one in made.varying][3:5], made.to_json()["aircraft"]["rows"]
+        (['mass', 'battery'], 1)
+        """
+        return replace(self.without(DRAWN), draws=draws)
 
     def to_json(self) -> dict[str, dict[str, Any]]:
-        """As plain data, a table a quantity."""
-        return {
+        """As plain data, a table a quantity, and one of the aircraft's draws."""
+        tables: dict[str, dict[str, Any]] = {
             one.quantity.name: {"distribution": one.distribution, **dict(one.parameters), "source": one.source}
             for one in self.varying
         }
+        if self.draws is not None:
+            tables[_AIRCRAFT] = {
+                "draws": Path(self.draws.source).name,
+                "rows": len(self.draws.values),
+                "properties": list(self.draws.names),
+                "sha256": hashlib.sha256(self.draws.values.tobytes()).hexdigest(),
+            }
+        return tables
 
 
 def default_dispersions() -> Dispersions:
@@ -185,14 +215,29 @@ def parse_dispersions(text: str, name: str) -> Dispersions:
         tables = toml_table(text)
     except ValueError as error:
         raise SpreadError(f"{name}: {' '.join(str(error).split())}", file=name) from None
+    aircraft = tables.pop(_AIRCRAFT, None)
     unknown = [key for key in tables if key not in BY_NAME]
     if unknown:
-        allowed = f"unknown; it is one of {', '.join(NAMES)}"
+        allowed = f"unknown; it is one of {', '.join((*NAMES, _AIRCRAFT))}"
         raise SpreadError.at(name, unknown[0], tables[unknown[0]], allowed, shown="")
     varying = tuple(_varying(BY_NAME[key], tables[key], name) for key in NAMES if key in tables)
-    if not varying:
+    if not varying and aircraft is None:
         raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}", file=name)
-    return Dispersions(varying, name)
+    if aircraft is None:
+        return Dispersions(varying, name)
+    for one in varying:
+        if one.quantity.name in DRAWN:
+            raise SpreadError.at(name, one.quantity.name, None, f"goes without [{_AIRCRAFT}] draws", shown="")
+    return Dispersions(varying, name, _draws(aircraft, name))
+
+
+def _draws(table: Any, name: str) -> Draws:
+    """The draws that a file names, relative to it."""
+    given = table.get("draws") if isinstance(table, dict) else None
+    if not isinstance(given, str) or not given or (isinstance(table, dict) and len(table) > 1):
+        allowed = 'a file of draws is expected, and nothing else, such as draws = "mine/draws.csv"'
+        raise SpreadError.at(name, f"{_AIRCRAFT}.draws", table, allowed, shown="")
+    return read_draws(Path(name).parent / Path(given).expanduser(), SpreadError)
 
 
 def _varying(quantity: Quantity, table: Any, name: str) -> Varying:

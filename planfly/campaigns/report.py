@@ -75,6 +75,7 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
             )
             for row in summary.worst
         ],
+        drawn=summary.dispersions.get("aircraft"),
         dispersions=[
             (
                 BY_NAME[name].title,
@@ -84,6 +85,7 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
                 table["source"],
             )
             for name, table in summary.dispersions.items()
+            if name in BY_NAME
         ],
         pictures=pictures,
         command=command,

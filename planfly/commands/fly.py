@@ -8,7 +8,7 @@ import planfly
 from planfly.targets import RUN_FOLDER
 from planfly.terminal.arguments import MISSIONS, completed, files, number
 from planfly.terminal.command_parser import LineParser, coloured
-from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
+from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import call, flight_options, log_rate_option, result_options, world_options
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import print_verdict, print_warnings
@@ -54,7 +54,7 @@ def fly(args: argparse.Namespace) -> int:
         if flown.autopilot_log is not None:
             print(f"          {flown.autopilot_log} (the autopilot's own)")
         print(coloured(f"next      planfly report {shlex.quote(str(flown.log))}", "hint"))
-    code = FLYABLE if flown.verdict.flyable else NOT_FLYABLE
+    code = verdict_code(flown.verdict)
     give_answer(args, lambda: _answer(args.mission, flown, code))
     return code
 

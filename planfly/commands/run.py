@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import planfly
 from planfly.terminal.arguments import number
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
+from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import (
     call,
     flight_options,
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     result = call(planfly.run, args, on_round=_print_round)
     if args.refine:
         _print_rounds(result)
-    code = FLYABLE if result.verdict.flyable else NOT_FLYABLE
+    code = verdict_code(result.verdict)
     give_answer(args, lambda: _answer(result, bool(args.refine), code))
     return code
 

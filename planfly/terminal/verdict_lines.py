@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from logs.verdict.findings import Finding, Verdict, closest_to_limit
+from logs.verdict.findings import Finding, Verdict, closest_to_limit, left_open
 from logs.verdict.rule import Rule
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text, quantity_text, suggestions_text
@@ -29,6 +29,10 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
             lines.append(coloured("          would pass: ", "hint") + suggestions_text(finding.suggestions))
     if len(failed) > _LISTED:
         lines.append(coloured("  failed  ", "bad") + f"and {len(failed) - _LISTED} more")
+    for finding in left_open(verdict.findings)[:_LISTED]:
+        lines.append(f"  open    {_noun(finding)} at {place_text(finding.place)}: {finding.reason}")
+        if finding.suggestions:
+            lines.append(coloured("          would tell: ", "hint") + suggestions_text(finding.suggestions))
     for rule in RULES.values():
         mine = [finding for finding in verdict.findings if finding.rule == rule.name]
         if mine:

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.envelope import GRAVITY, Envelope, _at, ground_slope, ground_speed, turn_radius
+from aircraft.envelope import GRAVITY, SURE, Envelope, _at, ground_slope, ground_speed, turn_radius
+from logs.verdict.tolerances import UNDECIDED
 from tests.setups import falling_envelope
 
 
@@ -113,3 +114,7 @@ def test_level_speeds_lie_between_those_of_the_heights() -> None:
     assert envelope.level_speeds(2000.0) == pytest.approx((19.0, 33.0))
     with pytest.raises(ValueError, match="read-only"):
         envelope.climb[0, 0] = 1.0
+
+
+def test_plans_keep_as_far_from_what_is_not_known_as_the_verdict() -> None:
+    assert SURE == UNDECIDED

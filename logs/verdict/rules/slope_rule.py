@@ -2,7 +2,7 @@
 
 import math
 
-from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import step
 from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
@@ -23,6 +23,7 @@ from logs.verdict.tolerances import (
     SATURATED,
     SHOWN_TOLERANCE,
     SURE,
+    UNDECIDED,
 )
 from logs.verdict.wording import place_text
 from world.wind import W20
@@ -72,6 +73,10 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
             how = "least squares" if fit.fitted else "least squares, short leg,"
             method = f"{how} over {fit.run:.0f} m"
     ok: bool | None = not faults
+    check = ""
+    if not faults and source == "aircraft" and (doubt := _in_doubt(requirements, leg, limit)):
+        ok, check = None, UNKNOWN_AIRCRAFT
+        facts.insert(0, doubt)
     if measure is not None and not measure.finished:
         facts.append("the flight did not get to its end")
         ok = None if ok else False
@@ -90,8 +95,30 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
         margin=math.degrees(limit - sign * judged),
         unit="deg",
         method=method,
+        check=check,
         facts=_measured(requirements, leg, measure),
     )
+
+
+def _in_doubt(requirements: RouteRequirements, leg: int, limit: float) -> str:
+    """Why a slope within the limit is undecided, where the limit is not known for certain; "" where it is decided.
+
+    limit: rad, over the ground; its deviation is that to the air, as a share of the limit there.
+    """
+    envelope, planned = requirements.setup.envelope, float(requirements.slopes[leg])
+    speed = float(requirements.route.airspeed[leg])
+    up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
+    rising = planned >= 0.0
+    to_air = envelope.air_angles(speed, up)[0 if rising else 1]
+    deviation = envelope.climb_sd if rising else envelope.descent_sd
+    if abs(planned) <= LEVEL or not deviation or not to_air > 0.0:
+        return ""
+    deviation *= limit / to_air
+    if abs(planned) <= limit - UNDECIDED * deviation:
+        return ""
+    asked, known, off = (math.degrees(angle) for angle in (abs(planned), limit, deviation))
+    verb = "climbs" if rising else "falls"
+    return f"{verb} {asked:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {off:.1f}°"
 
 
 def _steep_arc(requirements: RouteRequirements, leg: int) -> list[Message]:
@@ -242,7 +269,17 @@ RULE = Rule(
     margin=Margin("slope", "deg", 1.0),
     tolerances=(
         *("PLAN_TOLERANCE", "ON_THE_SPOT", "STEP", "KINK_WAYPOINTS", "OFF_SLOPE", "OFF_HEIGHT", "OFF_HEIGHT_SHORT"),
-        *("LEVEL", "CALM", "OFF_SPEED", "GUST_SHARE", "SHOWN_TOLERANCE", "SURE", "SATURATED", "SPEED_MEMORY"),
+        *(
+            "LEVEL",
+            "UNDECIDED",
+            "CALM",
+            "OFF_SPEED",
+            "GUST_SHARE",
+            "SHOWN_TOLERANCE",
+            "SURE",
+            "SATURATED",
+            "SPEED_MEMORY",
+        ),
         *("SLOWEST_LIFTED", "THROUGHOUT", "FULL", "IDLE", "NO_CURRENT", "WHOLE_THROTTLE", "SHOWN_OVER"),
         *("SETTLED_AFTER", "INDEPENDENT", "KNOWN_TO", "SINGULAR", "UNSURE", "ACCELERATION", "CLEAR_OF_BLEND"),
         *("SHORTEST_SLOPE", "SHORTEST_TIME", "SLOPE_FLOOR", "MAX_UNSTEADY", "ROUGH_SLOPE"),

@@ -215,7 +215,7 @@ def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:
     own = autopilot.title if autopilot.parameters is None else f"{autopilot.title}, by its parameters"
     rows = []
     for level in verdict.levels:
-        state = state_of(level.flyable)
+        state = state_of(None if level.undecided else level.flyable)
         asks, flown_by = _LEVELS[level.name]
         sign = f"{_SIGNS[state]} {_WORDS[state]}"
         rows.append(LevelRow(state, sign, level.name, asks, flown_by or own, level.headline))

@@ -117,7 +117,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     assert len(names[Limits]) == 9
     assert len(names[Mission]) == 7
     assert len(names[Route]) == 13
-    assert len(names[Envelope]) == 14
+    assert len(names[Envelope]) == 17
     assert len(dataclasses.fields(MissionItem)) == 8
 
 

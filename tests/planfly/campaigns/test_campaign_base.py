@@ -7,11 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aircraft.data_sheet import DataSheet
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, check_middle, open_campaign, vary
-from planfly.campaigns.dispersions import QUANTITIES, Draw, SpreadError, default_dispersions, parse_dispersions
+from planfly.campaigns.dispersions import (
+    QUANTITIES,
+    Dispersions,
+    Draw,
+    SpreadError,
+    default_dispersions,
+    parse_dispersions,
+    read_dispersions,
+)
+from planfly.data_sheets import make_data_sheet_folder
 from planfly.open_mission import open_mission
 from tests.planfly.campaigns.made_campaigns import write_short
 from world.errors import MissionError
+from world.scenario import Scenario, with_flight
 
 
 def test_it_has_the_mission_as_fly_opens_it(base: CampaignBase, tmp_path: Path) -> None:
@@ -108,3 +119,73 @@ def test_aircraft_battery_terrain_and_start(base: CampaignBase) -> None:
     assert float(ground.height(500.0, 0.0)) == pytest.approx(107.0)
     # The route stays where it was planned.
     np.testing.assert_array_equal(made.setup.route.waypoints, vary(base, drawn()).setup.route.waypoints)
+
+
+# ----------------------------------------------------------------------
+# Draws of the whole aircraft.
+
+
+@pytest.fixture(scope="module")
+def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with an aircraft from a data sheet, and a mission that it flies."""
+    place = tmp_path_factory.mktemp("drawn")
+    make_data_sheet_folder(place / "foam", DataSheet(2.1, 1.6, 15.0, 10.0))
+    rows = [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{46.0 + 0.004 * k:.6f}\t8.0\t500.0\t1" for k in range(3)]
+    (place / "hop.waypoints").write_text("QGC WPL 110\n" + "\n".join(rows) + "\n")
+    return place
+
+
+def _opened(place: Path, dispersions: Dispersions) -> CampaignBase:
+    def with_foam(scenario: Scenario) -> Scenario:
+        return with_flight(scenario, aircraft=str(place / "foam"))
+
+    return open_campaign(str(place / "hop.waypoints"), dispersions, change=with_foam)
+
+
+def test_an_aircraft_brings_its_draws(sheet: Path) -> None:
+    made = _opened(sheet, default_dispersions())
+    names = [one.quantity.name for one in made.dispersions.varying]
+    assert "mass" in names
+    assert not {"drag", "control_power"} & set(names)
+    # Line 2 of the file is row 0, which seeds 0, 512, ... fly.
+    with (sheet / "foam" / "draws.csv").open() as file:
+        properties, first, second = (next(file).strip().split(",") for _ in range(3))
+    nominal = {one.name: one.nominal for one in QUANTITIES}
+    for seed, row in ((1024, first), (513, second)):
+        found = vary(made, Draw(0, seed, nominal)).off_nominal.variation.properties
+        assert [name for name, _ in found] == properties
+        assert [value for _, value in found] == pytest.approx([float(value) for value in row])
+    # Each flight's aircraft is one that is known.
+    varied = vary(made, Draw(0, 1, nominal))
+    assert (varied.setup.envelope.climb_sd, varied.setup.envelope.descent_sd) == (0.0, 0.0)
+
+
+def test_a_file_of_dispersions_names_draws(sheet: Path) -> None:
+    spread = sheet / "spread.toml"
+    spread.write_text('[aircraft]\ndraws = "foam/draws.csv"\n')
+    made = _opened(sheet, read_dispersions(spread))
+    assert made.dispersions.draws is not None
+    assert made.dispersions.varying == ()
+    other = replace(made.dispersions.draws, values=made.dispersions.draws.values + 0.01)
+    assert replace(made, dispersions=replace(made.dispersions, draws=other)).world_hash() != made.world_hash()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('[aircraft]\ndraws = "none.csv"', "none.csv: cannot be read"),
+        ("[aircraft]\ndraws = 3", "aircraft.draws: a file of draws is expected"),
+        ("[aircraft]\n", "aircraft.draws: a file of draws is expected"),
+        (
+            '[aircraft]\ndraws = "foam/draws.csv"\n[drag]\ndistribution = "norm"\nloc = 1\nscale = 0.1\nsource = "x"',
+            "drag: goes without [aircraft] draws",
+        ),
+        ('[aircraft]\ndraws = "other.csv"', "other.csv: draws of another aircraft: "),
+    ],
+)
+def test_bad_draws_are_refused(sheet: Path, text: str, told: str) -> None:
+    (sheet / "other.csv").write_text("ident/wings\n1.0\n")
+    (sheet / "bad.toml").write_text(text)
+    with pytest.raises(SpreadError) as caught:
+        _opened(sheet, read_dispersions(sheet / "bad.toml"))
+    assert told in str(caught.value)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aircraft.envelope import Envelope
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import failing, judge, leg, of
@@ -229,3 +230,58 @@ def test_throttle_at_a_limit_is_told() -> None:
     # 1,500 m at 23 m/s.
     assert facts["throttle at full"] == pytest.approx(1500.0 / 23.0, abs=0.5)
     assert facts["too slow"] == pytest.approx(2.0, abs=0.1)
+
+
+def unsure(climb_sd: float = 3.0, descent_sd: float = 1.0) -> Envelope:
+    """The synthetic aircraft, made from a data sheet: 13.7 degrees up and 7.8 down, give or take."""
+    return replace(
+        envelope(), source="a data sheet", climb_sd=math.radians(climb_sd), descent_sd=math.radians(descent_sd)
+    )
+
+
+def test_a_slope_within_what_is_not_known_is_undecided() -> None:
+    # 13.7 less 1.645 x 3 is 8.8 degrees.
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure())
+    for verdict in (judge(setup, fly_path(setup)), judge_geometry(setup)):
+        item = of(verdict, "slope", leg(1))
+        assert (item.ok, item.check) == (None, "unknown aircraft")
+        assert item.reason.startswith(
+            "climbs 10.0°, and what a data sheet says of the limit is 13.7° give or take 3.0°"
+        )
+        assert [change.what for one in item.suggestions for change in one] == ["full throttle"]
+        assert (verdict.flyable, verdict.undecided, verdict.complete) == (False, True, True)
+        assert verdict.headline == (
+            "not judged in full: slope on leg 1, to item 2, is within what is not known of the aircraft;"
+            " an aircraft from a data sheet"
+        )
+        assert verdict.levels[0].undecided
+
+
+def test_what_is_sure_of_an_unsure_aircraft_is_judged() -> None:
+    for slope, ok in ((8.0, True), (14.5, False), (-6.0, True), (-8.5, False)):
+        setup = make_setup([[e, n, u + 400] for e, n, u in hill(slope)], table=unsure())
+        verdict = judge_geometry(setup)
+        assert of(verdict, "slope", leg(1)).ok is ok
+        assert verdict.flyable is ok
+        assert verdict.headline.endswith("; an aircraft from a data sheet")
+        assert not verdict.undecided
+
+
+def test_the_scenarios_limit_is_known() -> None:
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure(), limits={"max_climb_deg": 11.0})
+    assert of(judge_geometry(setup), "slope", leg(1)).ok is True
+
+
+def test_a_glide_would_tell_of_a_descent() -> None:
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(-6.5)], table=unsure())
+    item = of(judge_geometry(setup), "slope", leg(1))
+    assert item.ok is None
+    assert [change.what for one in item.suggestions for change in one] == ["no throttle"]
+
+
+def test_a_failure_comes_before_what_is_open() -> None:
+    way = hill(10.0)
+    high = [[e, n, u + 400] for e, n, u in way] + [[0, 5000, way[-1][2] + 400], [0, 5300, way[-1][2] + 900]]
+    verdict = judge_geometry(make_setup(high, table=unsure()))
+    assert verdict.headline.startswith("not flyable: slope on leg 4")
+    assert not verdict.undecided

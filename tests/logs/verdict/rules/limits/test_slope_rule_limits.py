@@ -1,6 +1,7 @@
 """Slopes just inside and just outside each limit, their truth by plain sums."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -13,7 +14,7 @@ from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.rules import slope_rule
 from logs.verdict.rules.slope_rule import slope_findings
 from tests.logs.verdict.judging import leg, of
-from tests.synthetic import bank_radius, fly_path, make_setup
+from tests.synthetic import bank_radius, envelope, fly_path, make_setup
 
 
 def hill(slope_deg: float, run: float = 2000.0) -> list[list[float]]:
@@ -124,3 +125,10 @@ def test_an_arc_may_take_a_metre_a_second_of_speed(lost: float, steep: bool) -> 
         [2000.0 * math.sin(turn), 2000.0 + 2000.0 * math.cos(turn), 1500.0 - 2.0 * drop],
     ]
     assert (steep_arc(route_requirements(make_setup(points)), 0) is not None) is steep
+
+
+@pytest.mark.parametrize(("slope", "ok"), [(8.71, True), (8.82, None), (-6.10, True), (-6.21, None)])
+def test_a_slope_is_decided_up_to_1_645_deviations_from_the_limit(slope: float, ok: bool | None) -> None:
+    """13.7 less 1.645 x 3 is 8.765 degrees of climb; 7.8 less 1.645 x 1 is 6.155 of descent."""
+    table = replace(envelope(), source="a data sheet", climb_sd=math.radians(3.0), descent_sd=math.radians(1.0))
+    assert of(judge_geometry(make_setup(hill(slope), table=table)), "slope", leg(1)).ok is ok
