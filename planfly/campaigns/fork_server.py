@@ -4,14 +4,36 @@ Nothing else imports this module: `planfly.campaigns.worker_pool` names it to `m
 """
 
 import atexit
+import contextlib
 import os
+import shutil
+import socket
 import sys
 from importlib import import_module
+from pathlib import Path
 
 for _needed in ("planfly.campaigns.report", "planfly.pipeline", "scipy.stats"):
     import_module(_needed)
 
+
+def socket_folders() -> list[Path]:
+    """The folders that `multiprocessing` made for the Unix sockets which this process holds open."""
+    found = []
+    for number in Path("/proc/self/fd").iterdir():
+        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(int(number.name))) as opened:
+            name = opened.getsockname()
+            if opened.family == socket.AF_UNIX and Path(name).parent.name.startswith("pymp-"):
+                found.append(Path(name).parent)
+    return found
+
+
+def end(folders: list[Path]) -> None:
+    """End at once, instead of taking apart all that was imported, and remove what a killed campaign leaves."""
+    for folder in folders:
+        shutil.rmtree(folder, ignore_errors=True)
+    os._exit(0)
+
+
 if "multiprocessing.forkserver" in " ".join(sys.orig_argv):
-    # It ends when the campaign's own process has ended, at once instead of taking apart all that it has imported.
-    # The processes that are forked from it end otherwise: they forget what was registered here.
-    atexit.register(os._exit, 0)
+    # The processes that are forked from this one forget it.
+    atexit.register(end, socket_folders())
