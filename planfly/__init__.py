@@ -21,6 +21,7 @@ campaign, campaign_flight, winds     how likely it is to fly; the largest wind f
 serve                                a MAVLink vehicle for ground stations
 scenarios, aircraft                  what is embedded
 describe_aircraft, new_aircraft      trims, modes and envelope; a folder for an aircraft of one's own
+identify_aircraft                    that folder from flight logs, with what is not known of it
 paper_tables, optimise               the paper's section V; the planner's optimisers alone, by ask and tell
 progress                             have the progress of the calls reported
 PlanflyError                         what bad input raises, with file, field, value and allowed; and its kinds
@@ -62,6 +63,8 @@ if TYPE_CHECKING:
     from planfly.api.flying import fly as fly
     from planfly.api.flying import judge as judge
     from planfly.api.flying import plan_then_fly as plan_then_fly
+    from planfly.api.identifying import IdentifiedAircraft as IdentifiedAircraft
+    from planfly.api.identifying import identify_aircraft as identify_aircraft
     from planfly.api.imported import Reflown as Reflown
     from planfly.api.imported import import_log as import_log
     from planfly.api.imported import recover as recover
@@ -125,6 +128,10 @@ _HOMES = {
             "aircraft",
             "describe_aircraft",
             "new_aircraft",
+        ),
+        "planfly.api.identifying": (
+            "IdentifiedAircraft",
+            "identify_aircraft",
         ),
         "planfly.api.campaigns": (
             "CampaignFlight",

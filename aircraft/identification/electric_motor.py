@@ -20,6 +20,7 @@ class ElectricMotor:
     thrust: (3,) of the same in its thrust.
     back_voltage: KV, V s/rad, which is also the torque constant KQ.
     resistance: ohm.  idle_current: i0, A.  voltage: of the battery, V.
+    windmill: share of the formula's thrust that counts where it is below zero.
     """
 
     torque: tuple[float, float, float]
@@ -28,6 +29,7 @@ class ElectricMotor:
     resistance: float
     idle_current: float
     voltage: float
+    windmill: float = 1.0
 
     def changed(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
@@ -66,6 +68,7 @@ class ElectricMotor:
         speed = self.speed(airspeed, throttle, density, volts)
         a, b, c = self.thrust
         thrust = density * (a * speed * speed + b * airspeed * speed + c * airspeed * airspeed)
+        thrust = np.where(thrust < 0.0, self.windmill * thrust, thrust)
         current = np.maximum(0.0, (volts * throttle - self.back_voltage * speed) / self.resistance)
         return thrust, throttle * current
 

@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 ALIGNED_SECONDS = 200.0
 # Rounds of lift curve and drag, each with the angle of attack of the last.
 _ROUNDS = 2
+# Share of an interval below which the logs say next to nothing of a parameter.
+SILENT = 0.2
 # How much wider than computed the interval of a fast motion is.
 FAST_WIDENING = 2.0
 # Title, unit and samples a second of each equation.
@@ -70,6 +72,7 @@ class Estimate:
     clocks: of each stretch.  equations: as fitted.
     shifts: by what is held fixed, (n,): how far the estimate moves with one standard deviation of it.
     with_current: whether the battery's current was used.
+    dynamics: whether the moments were estimated; their parameters are the prior's otherwise.
     seconds: of flight that were used.
     """
 
@@ -79,6 +82,7 @@ class Estimate:
     equations: tuple[Equation, ...]
     shifts: Mapping[str, Floats] = field(default_factory=dict)
     with_current: bool = False
+    dynamics: bool = True
     seconds: float = 0.0
 
     @property
@@ -86,21 +90,34 @@ class Estimate:
         """(n,) standard deviations."""
         return np.sqrt(np.diag(self.covariance))
 
+    def silent(self) -> tuple[str, ...]:
+        """What the logs say next to nothing of, a line each with the manoeuvre that would show it."""
+        shares = self.of_log().tolist()
+        return tuple(
+            f"{parameter.title}: stays the prior's; fly {parameter.show}"
+            for parameter, share in zip(PARAMETERS, shares, strict=True)
+            if share < SILENT
+        )
+
     def of_log(self) -> Floats:
         """(n,) share of each interval that is the log's: 1 less the variance that is left of the prior's."""
         return np.clip(1.0 - np.square(self.sds / prior_sds()), 0.0, 1.0)
 
 
-def estimate_model(records: Sequence[FlightRecord], base: BaseModel) -> Estimate:
-    """Estimate all parameters from stretches of flight."""
-    clocks = align_clocks(records, base)
+def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics: bool = True) -> Estimate:
+    """Estimate all parameters from stretches of flight.
+
+    dynamics: the moments, too; otherwise lift, drag and thrust alone, for logs that are too slow for the rest.
+    """
+    slow = Clocks(servo_lag=base.servo_lag)
+    clocks = align_clocks(records, base) if dynamics else tuple(slow for _ in records)
     signals = levelled(align(records, clocks, base.motor_lag))
-    nominal = fit_all(signals, base)
+    nominal = fit_all(signals, base, dynamics=dynamics)
     shifts = {}
     for held in HELD_FIXED:
         if held.applies(with_current=nominal.with_current):
             changed, model = held.change(signals, base)
-            shifts[held.name] = fit_all(changed, model, level=held.level).values - nominal.values
+            shifts[held.name] = fit_all(changed, model, level=held.level, dynamics=dynamics).values - nominal.values
     shifts |= _lift_shifts(signals, base, nominal)
     return replace(
         nominal,
@@ -145,7 +162,9 @@ def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Cloc
     return tuple(found[record.source] for record in records)
 
 
-def fit_all(signals: Signals, base: BaseModel, lift: Floats | None = None, level: float = 0.0) -> Estimate:
+def fit_all(
+    signals: Signals, base: BaseModel, lift: Floats | None = None, level: float = 0.0, *, dynamics: bool = True
+) -> Estimate:
     """Estimate all parameters from aligned signals, everything else held where it is; without shifts.
 
     lift: (2,) values of its slope and offset that are held, too.  level: by which the autopilot's is off, rad.
@@ -168,12 +187,14 @@ def fit_all(signals: Signals, base: BaseModel, lift: Floats | None = None, level
             flow = vane(signals, base, values)
         fits["drag"], five, spread = fit_drag(signals, base, values, flow)
         take("drag", five, spread)
-    for axis, fit in fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values)).items():
+    moments = fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values)) if dynamics else {}
+    for axis, fit in moments.items():
         fits[axis] = fit
         count = sum(parameter.group == axis for parameter in PARAMETERS)
         take(axis, fit.estimate[:count], fit.covariance[:count, :count])
     equations = tuple(_equation(group, fit) for group, fit in fits.items())
-    return Estimate(values, covariance, (), equations, with_current=bool(np.isfinite(signals.current).all()))
+    known = bool(np.isfinite(signals.current).all())
+    return Estimate(values, covariance, (), equations, with_current=known, dynamics=dynamics)
 
 
 def _equation(group: Group, fit: Fit) -> Equation:
@@ -188,7 +209,7 @@ def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[s
     made = {}
     for k in range(2):
         lift = nominal.values[:2] + np.sqrt(max(0.0, float(sizes[k]))) * axes[:, k]
-        shift = fit_all(signals, base, lift=lift).values - nominal.values
+        shift = fit_all(signals, base, lift=lift, dynamics=nominal.dynamics).values - nominal.values
         nominal.covariance[:2, :2] -= np.outer(shift[:2], shift[:2])
         made[f"lift curve, axis {k + 1}"] = shift
     return made

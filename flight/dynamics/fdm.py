@@ -300,14 +300,38 @@ class Fdm:
                 file=self.aircraft.name, field="airspeed", value=airspeed,
             )  # fmt: skip
         self.balance(values)
+        self._let_go()
+        return from_vector(values, amsl)
+
+    def begin_at(
+        self,
+        *,
+        attitude: Sequence[float],
+        velocity: Sequence[float],
+        rates: Sequence[float],
+        wind: Sequence[float],
+        amsl: float,
+        commands: Sequence[float],
+    ) -> None:
+        """Begin a flight in any state, trimmed or not; surfaces and motor stand at these commands (4,).
+
+        attitude: roll, pitch, yaw, rad.  velocity: north, east, down over the ground, m/s.  rates: p, q, r, rad/s.
+        wind: north, east, down, the way the air moves, m/s; it stays on as the steady wind.  amsl: m.
+        """
+        self._wind = np.array(wind, dtype=np.float64)
+        self.move_to(amsl)
+        self._evaluate(attitude, np.array(velocity, dtype=np.float64), rates, commands, settle=True)
+        self._let_go()
+
+    def _let_go(self) -> None:
+        """Let everything move from where the initial conditions have put it."""
         if self._engine:
             self._engine.release()
         self._exec.set_trim_status(False)
         self._exec.set_sim_time(0.0)
         # While the initial conditions ran, the wind stood in the gusts, because they overwrite the wind.
-        self.set_wind(*wind)
+        self.set_wind(*self._wind)
         self.set_gust(0.0, 0.0, 0.0)
-        return from_vector(values, amsl)
 
     def step(self, n: int = 1) -> None:
         """Advance by n steps of ``dt`` seconds."""

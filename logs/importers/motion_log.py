@@ -20,6 +20,10 @@ from world.errors import LogError
 Floats = NDArray[np.float64]
 
 
+# Where a log flew that does not say where.
+_NOWHERE = (46.0, 8.0)
+
+
 @dataclass(frozen=True, slots=True)
 class Samples:
     """Rows of one kind: time (n,) s of the log's clock, rising; values (n, k)."""
@@ -44,7 +48,7 @@ class MotionLog:
     airspeed: (n, 1) equivalent, m/s, of a sensor that was in use.  ratio: (n, 1) true by equivalent airspeed.
     height: (n, 1) m above sea level.  battery: (n, 2) V and A.
     modes: time and number of the flight mode.  parameters: by name; those that changed in flight keep the last.
-    changed: names of parameters that changed within the log.
+    place: latitude and longitude of its first position, degrees; in Switzerland where it has none.
     """
 
     source: str
@@ -62,7 +66,7 @@ class MotionLog:
     battery: Samples
     modes: tuple[tuple[float, int], ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
-    changed: frozenset[str] = frozenset()
+    place: tuple[float, float] = _NOWHERE
 
 
 _DEGREE = math.pi / 180.0
@@ -105,7 +109,6 @@ class _Dataflash:
         events = self._index.messages("MSG")
         texts = events.texts("Message") if events.has("Message") else []
         program, vehicle = program_and_vehicle(texts, self._index.messages("VER"))
-        parameters, changed = self._parameters()
         inertial = self._first((("IMU", ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")),))
         return MotionLog(
             source=self._source,
@@ -122,8 +125,8 @@ class _Dataflash:
             height=self._first((("POS", ("Alt",)),)),
             battery=self._first((("BAT", ("Volt", "Curr")), ("CURR", ("Volt", "Curr")))),
             modes=tuple(self._modes()),
-            parameters=parameters,
-            changed=changed,
+            parameters=self._parameters(),
+            place=self._place(),
         )
 
     def _messages(self, name: str) -> Messages:
@@ -165,16 +168,23 @@ class _Dataflash:
             zip((found.column("TimeUS") * 1e-6).tolist(), found.column(column).astype(int).tolist(), strict=True)
         )
 
-    def _parameters(self) -> tuple[dict[str, float], frozenset[str]]:
+    def _parameters(self) -> dict[str, float]:
         found = self._messages("PARM")
-        values: dict[str, float] = {}
-        changed = set()
-        if found.has("Name", "Value"):
-            for name, value in zip(found.texts("Name"), found.column("Value").tolist(), strict=True):
-                if name in values and values[name] != value:
-                    changed.add(name)
-                values[name] = value
-        return values, frozenset(changed)
+        if not found.has("Name", "Value"):
+            return {}
+        values = zip(found.texts("Name"), found.column("Value").tolist(), strict=True)
+        return {name: value for name, value in values if math.isfinite(value)}
+
+    def _place(self) -> tuple[float, float]:
+        found = self._messages("POS")
+        if not found.has("Lat", "Lng"):
+            return _NOWHERE
+        place = np.column_stack([found.column("Lat"), found.column("Lng")])
+        good = np.isfinite(place).all(axis=1) & (np.abs(place) < [90.0, 180.0]).all(axis=1)
+        if not good.any():
+            return _NOWHERE
+        lat, lon = place[int(np.argmax(good))].tolist()
+        return lat, lon
 
 
 def _rising(time: Floats, values: Floats) -> Samples:

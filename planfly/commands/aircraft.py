@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import aircraft_words, completed
+from planfly.terminal.arguments import aircraft_words, completed, files
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call, result_options
@@ -51,6 +51,7 @@ def aircraft_options(line: LineParser) -> None:
         "planfly aircraft aerosonde --out aerosonde",
         "planfly aircraft --new ./mine --mass 2.1 --span 1.6 --cruise 15 --stall 10 --layout wing",
         "planfly aircraft --new ./copy --from aerosonde",
+        "planfly aircraft --identify A.BIN B.BIN --mass 13.2 --span 2.9 --area 0.55 --check C.BIN --out ./mine",
     )
     completed(
         parser.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)"),
@@ -86,11 +87,33 @@ def aircraft_options(line: LineParser) -> None:
     sheet.add_argument(
         "--params", metavar="FILE", help="ArduPlane's parameters: what they say of the aircraft is taken"
     )
-    result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced)")
+    logs = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
+    completed(
+        logs.add_argument(
+            "--identify", dest="logs", metavar="LOG.BIN", nargs="+", help="logs of ArduPlane to identify it from"
+        ),
+        files(".bin", ".BIN"),
+    )
+    completed(
+        logs.add_argument(
+            "--base", metavar="NAME", help="with --identify: the aircraft that it is most like (default: aerosonde)"
+        ),
+        aircraft_words,
+    )
+    completed(
+        logs.add_argument("--check", metavar="LOG.BIN", help="with --identify: another log, to replay with the model"),
+        files(".bin", ".BIN"),
+    )
+    result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced); of --identify, the folder")
 
 
 def aircraft(args: argparse.Namespace) -> int:
     """List the embedded aircraft, print and draw the one that is named, or make a folder for a new one."""
+    if args.logs is not None:
+        return _identify(args)
+    for name in ("base", "check"):
+        if getattr(args, name) is not None:
+            raise PlanflyError.of_argument(name, getattr(args, name), "goes with `logs` LOG.BIN", shown="")
     if args.folder is not None:
         return _make_folder(args)
     for name in _SHEET:
@@ -138,6 +161,38 @@ def _make_folder(args: argparse.Namespace) -> int:
         _print_sheet(made)
     give_answer(args, lambda: _answer([made]))
     print(f"next      planfly aircraft {shlex.quote(str(shown))}, and --aircraft {shlex.quote(str(shown))} flies it")
+    return FLYABLE
+
+
+def _identify(args: argparse.Namespace) -> int:
+    """Identify an aircraft from logs, and make its folder."""
+    for name in ("mass", "span", "out"):
+        if getattr(args, name) is None:
+            said = "the folder to make" if name == "out" else "of the aircraft as it flew"
+            raise PlanflyError(f"--identify needs --{name}, {said}", field=f"--{name}")
+    given = [
+        name for name in _SHEET if name not in ("mass", "span", "area", "battery") and getattr(args, name) is not None
+    ]
+    if given or args.name is not None or args.folder is not None:
+        field = "name" if args.name is not None else f"--{given[0]}" if given else "--new"
+        raise PlanflyError(f"--identify goes without {field}: the logs have that", field=field)
+    found = call(planfly.identify_aircraft, args, folder=args.out)
+    made, estimate = found.aircraft, found.estimate
+    files_made = sorted(file.name for file in made.folder.iterdir())
+    print(f"aircraft  {args.out} ({', '.join(files_made)}), from {estimate.seconds / 60.0:.1f} min of flight")
+    for name, unit, (low, value, high) in (
+        ("climb", "deg", found.climb), ("sink", "deg", found.sink), ("power", "W", found.power),
+    ):  # fmt: skip
+        print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {low:.1f} to {high:.1f} (95 %)")
+    if not estimate.dynamics:
+        print("  performance only: under 10 rows of IMU or RCOU a second tell nothing of the moments")
+    for line in estimate.silent():
+        print(f"  not seen {line}")
+    for replay in found.replays:
+        shown = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
+        print(f"  replay   {replay.model}: {shown} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")
+    give_answer(args, lambda: _answer([made]))
+    print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
     return FLYABLE
 
 

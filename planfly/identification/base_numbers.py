@@ -132,13 +132,16 @@ def read_motor(aircraft: Aircraft) -> ElectricMotor:
 
         (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))
         (damping,) = numbers("motor/b")
-        idle, per_volt = (
-            next(value for value in numbers("motor/driven-rad_sec") if 0.0 < value < 4.0 and value != 2.0),
-            -next(value for value in numbers("motor/driven-rad_sec") if value < 0.0),
-        )
+        driven = numbers("motor/driven-rad_sec")
+        per_volt = -next(value for value in driven if value < 0.0)
+        # The no-load torque stands there, or in a function of its own.
+        own = functions.get("motor/loss-n_m")
+        idle = numbers("motor/loss-n_m")[0] if own is not None else next(v for v in driven if 0.0 < v < 2.0)
         back = damping / per_volt
-        thrust = numbers("motor/thrust-n")
-    except (KeyError, ValueError, StopIteration, OSError, ElementTree.ParseError):
+        pull = "motor/pull-n" if "motor/pull-n" in functions else "motor/thrust-n"
+        thrust = numbers(pull)
+        windmill = numbers("motor/thrust-n")[1] if pull == "motor/pull-n" else 1.0
+    except (KeyError, ValueError, IndexError, StopIteration, OSError, ElementTree.ParseError):
         allowed = "a motor in the form of aircraft/aerosonde/aerosonde.xml is expected"
         raise FlightError(
             f"{aircraft.model_file}: its motor cannot be identified: {allowed}",
@@ -152,13 +155,15 @@ def read_motor(aircraft: Aircraft) -> ElectricMotor:
         resistance=back / per_volt,
         idle_current=idle / back,
         voltage=aircraft.battery_voltage,
+        windmill=windmill,
     )
 
 
-def scaled(base: BaseModel, mass: float, span: float, area: float) -> BaseModel:
+def scaled(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
     """The same kind of aircraft with another mass (kg), span (m) and area (m^2).
 
     Inertia goes with mass and span squared.  The chord keeps its share of the mean chord; coefficients and motor stay.
+    volts: of the battery; another one has a motor for it, that turns as fast at full throttle.
     """
     weight, wide = mass / base.mass, span / base.span
     chord = base.chord * (area / span) / (base.area / base.span)
@@ -167,4 +172,14 @@ def scaled(base: BaseModel, mass: float, span: float, area: float) -> BaseModel:
     return replace(
         base, mass=mass, span=span, area=area, chord=chord,
         inertia=(ixx * factor, iyy * factor, izz * factor, ixz * factor),
+        motor=base.motor if volts is None else _for_voltage(base.motor, volts),
+    )  # fmt: skip
+
+
+def _for_voltage(motor: ElectricMotor, volts: float) -> ElectricMotor:
+    """A motor wound for another voltage: the same torque and power at the same speed."""
+    ratio = volts / motor.voltage
+    return replace(
+        motor, voltage=volts, back_voltage=motor.back_voltage * ratio, resistance=motor.resistance * ratio * ratio,
+        idle_current=motor.idle_current / ratio,
     )  # fmt: skip

@@ -27,7 +27,7 @@ FUNCTIONS = {
     "campaign": ("campaign", "campaign_flight"),
     "winds": ("winds",),
     "paper": ("paper_tables",),
-    "aircraft": ("aircraft", "describe_aircraft", "new_aircraft"),
+    "aircraft": ("aircraft", "describe_aircraft", "new_aircraft", "identify_aircraft"),
     "scenarios": ("scenarios",),
     "help": (),
     "completion": (),

@@ -30,10 +30,20 @@ VERBS = {
     ),
     *("compare", "export", "foxglove_layout", "timeline", "instruments", "movie", "play_to_foxglove"),
     *("play_to_stations", "import_log", "refly", "recover", "campaign", "campaign_flight", "winds", "serve"),
-    *("scenarios", "aircraft", "describe_aircraft", "new_aircraft", "paper_tables", "optimise", "progress"),
+    *(
+        "scenarios",
+        "aircraft",
+        "describe_aircraft",
+        "new_aircraft",
+        "identify_aircraft",
+        "paper_tables",
+        "optimise",
+        "progress",
+    ),
 }
 RESULTS = {
     *("AircraftNumbers", "BestFound", "CampaignFlight", "CampaignResult", "Comparison", "ExportedFiles", "FlightLog"),
+    "IdentifiedAircraft",
     *("FlownMission", "ImportedFlight", "Instruments", "Judged", "Optimiser", "PaperTables", "Plan", "PlanThenFly"),
     *("Reflown", "Round", "RunResult", "TimelineEntry", "Track", "Verdict", "WindsFound", "WrittenReport"),
 }

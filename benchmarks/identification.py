@@ -1,0 +1,193 @@
+"""How well aircraft of known truth are identified from their logs: fresh variants, flown by ArduPlane's law.
+
+    python -m benchmarks.identification --first 1001 --count 10 --out build/identification.json
+
+Each variant's truth is drawn from 0.8 of the priors, with the things that identification holds fixed drawn as well; it
+flies the mission of manoeuvres in light turbulence, `tests.instrumented_flights` makes its sensors and clocks, and the log
+is identified, once without and once with the battery's current.  Nothing was tuned on these seeds.
+"""
+
+import argparse
+import json
+import math
+import tempfile
+import time
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import planfly
+from aircraft.catalog import Aircraft, load_aircraft
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.draws import draw_aircraft
+from aircraft.identification.estimate import Estimate, estimate_model
+from aircraft.identification.parameters import NAMES, PARAMETERS
+from aircraft.identification.performance import performance
+from flight.dynamics.envelope_tables import load_envelope
+from flight.simulation.track import Track
+from planfly.identification.base_numbers import base_model, scaled
+from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identified
+from planfly.identification.records import flight_records
+from planfly.identification.servos import read_servos
+from tests.instrumented_flights import HOME, Truth, drawn_sensors, fly_identification, sensed
+
+Floats = NDArray[np.float64]
+
+_SHARE, _CRUISE = 0.8, 25.0
+# Standard deviations of what identification holds fixed, and of moments of inertia.
+_FIXED = {"side_force": 0.25, "lift_of_rate": 0.4, "lift_of_elevator": 0.4}
+_INERTIA = {"roll_inertia": 0.15, "pitch_inertia": 0.12, "yaw_inertia": 0.12}
+_STEEP = 1.2
+
+
+def drawn_truth(seed: int) -> Truth:
+    """A truth by its seed that climbs at least 4 degrees and flies level at less than full throttle."""
+    numbers = base_model(load_aircraft("aerosonde"))
+    for attempt in range(100):
+        draw = np.random.default_rng([seed, attempt])
+        values: dict[str, float] = {"mass": float(np.clip(draw.normal(1.0, 0.12), 0.8, 1.25))}
+        for parameter in PARAMETERS:
+            field = parameter.name.replace("-", "_")
+            off = float(np.clip(draw.normal(), -2.0, 2.0)) * _SHARE * parameter.sd
+            values[field] = max(0.25, parameter.prior + off) if parameter.kind == "factor" else 0.5 * off
+        for field, sd in (_FIXED | _INERTIA).items():
+            values[field] = float(np.clip(draw.normal(1.0, sd), 1.0 - 2.0 * sd, 1.0 + 2.0 * sd))
+        truth = Truth(**values)
+        base = scaled(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
+        flown = performance(base, true_values(truth), np.asarray(_CRUISE).item(), DENSITY)
+        stable = truth.pitch_stiffness > 0.5 and truth.weathercock > 0.4 and truth.roll_damping > 0.5
+        if math.radians(4.0) < flown.climb[0] < math.radians(16.0) and flown.throttle[0] < 0.93 and stable:
+            return truth
+    raise RuntimeError(f"seed {seed}: no aircraft that flies")
+
+
+def true_values(truth: Truth) -> Floats:
+    """(n,) of the parameters."""
+    true = truth.parameters()
+    return np.array([true[name] for name in NAMES])
+
+
+def identify(
+    track: Track, changed: Aircraft, base: BaseModel, seed: int, *, battery: bool
+) -> tuple[Estimate, Any, float]:
+    """The estimate, its log, and the CPU time it took, s."""
+    prior = load_aircraft("aerosonde")
+    log = sensed(track, changed, drawn_sensors(seed, battery=battery), seed)
+    began = time.process_time()
+    records = flight_records(log, prior, read_servos(prior.folder / "ardupilot.toml"))
+    estimate = estimate_model(records, base)
+    return estimate, log, time.process_time() - began
+
+
+def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]:
+    """Errors of performance, and whether truths lie within their intervals."""
+    best = performance(base, np.vstack([truth, estimate.values]), _CRUISE, DENSITY)
+    drawn = performance(base, draw_aircraft(estimate), _CRUISE, DENSITY)
+    low, high = np.degrees(np.percentile(drawn.climb, [2.5, 97.5]))
+    climb, found = np.degrees(best.climb)
+    off = np.abs(estimate.values - truth) / estimate.sds
+    return {
+        "climb_deg": found - climb,
+        "climb_interval_deg": 0.5 * (high - low),
+        "climb_inside": bool(low <= climb <= high),
+        "sink_percent": 100.0 * (best.sink[1] / best.sink[0] - 1.0),
+        "power_percent": 100.0 * (best.power[1] / best.power[0] - 1.0),
+        "drag_percent": 100.0 * (best.drag[1] / best.drag[0] - 1.0),
+        "inside": int((off < 1.96).sum()),
+        "outside": [name for name, one in zip(NAMES, off, strict=True) if one >= 1.96],
+        "true_climb_deg": climb,
+    }
+
+
+def too_steep_is_refused(folder: Path, truth: Aircraft, estimate: Estimate, base: BaseModel, log: Any) -> bool:
+    """Whether the identified model refuses a leg that is too steep for the truth by a fifth."""
+    prior = load_aircraft("aerosonde")
+    found = make_identified(prior, base, estimate, [log], read_servos(prior.folder / "ardupilot.toml"))
+    place = folder / "mine"
+    place.mkdir()
+    for name, text in folder_files(found, "mine", (prior.battery_voltage, prior.battery_energy)).items():
+        (place / name).write_text(text, encoding="utf-8")
+    climb, _ = load_envelope(truth).air_angles(_CRUISE, AMSL)
+    rise = 2000.0 * math.tan(_STEEP * climb)
+    lat, lon, ground = HOME
+    rows = [
+        ("0 1 0 16", lat, lon, ground),
+        ("1 0 3 16", lat, lon, 150.0),
+        ("2 0 3 16", lat + 2000.0 / 111_000.0, lon, 150.0 + rise),
+    ]
+    lines = [f"{head} 0 0 0 0 {y:.6f} {x:.6f} {up:.1f} 1" for head, y, x, up in rows]
+    file = folder / "steep.waypoints"
+    file.write_text("\n".join(["QGC WPL 110", *lines]) + "\n", encoding="utf-8")
+    verdict = planfly.judge(str(file), aircraft=str(place)).verdict
+    return not verdict.flyable
+
+
+def one_variant(seed: int, repeats: int) -> dict[str, Any]:
+    """All rows of one variant."""
+    truth = drawn_truth(seed)
+    values = true_values(truth)
+    numbers = base_model(load_aircraft("aerosonde"))
+    base = scaled(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
+    made: dict[str, Any] = {
+        "seed": seed,
+        "truth": {one.name: round(getattr(truth, one.name), 3) for one in fields(truth)},
+    }
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        track, changed = fly_identification(folder, truth, seed, repeats=repeats)
+        made["minutes"] = float(track.time[-1]) / 60.0
+        for battery in (False, True):
+            estimate, log, spent = identify(track, changed, base, seed, battery=battery)
+            own = folder / ("with" if battery else "without")
+            own.mkdir()
+            made["with_battery" if battery else "without_battery"] = errors(base, values, estimate) | {
+                "cpu_s": spent,
+                "too_steep_refused": too_steep_is_refused(own, changed, estimate, base, log),
+            }
+        made["five_minutes"] = []
+        for other in (1, 2):
+            short, _ = fly_identification(folder, truth, seed, repeats=1, wind=2.0 + 3.0 * other)
+            estimate, _, _ = identify(short, changed, base, seed + 10_000 * other, battery=False)
+            made["five_minutes"].append(errors(base, values, estimate))
+    return made
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--first", type=int, default=1001)
+    parser.add_argument("--count", type=int, default=10)
+    parser.add_argument("--repeats", type=int, default=4)
+    parser.add_argument("--out", default="build/identification.json")
+    args = parser.parse_args()
+    rows = []
+    Path(args.out).parent.mkdir(parents=True, exist_ok=True)
+    for seed in range(args.first, args.first + args.count):
+        rows.append(one_variant(seed, args.repeats))
+        print(json.dumps(rows[-1]), flush=True)
+        Path(args.out).write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    print(json.dumps(summary(rows), indent=1))
+
+
+def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """The rows of the table."""
+    made: dict[str, Any] = {}
+    for kind in ("without_battery", "with_battery"):
+        chosen = [row[kind] for row in rows]
+        for name in ("climb_deg", "sink_percent", "power_percent"):
+            sizes = np.abs([row[name] for row in chosen])
+            made[f"{kind}.{name}"] = {"median": float(np.median(sizes)), "worst": float(sizes.max())}
+        made[f"{kind}.coverage"] = sum(row["inside"] for row in chosen) / (len(NAMES) * len(chosen))
+        made[f"{kind}.too_steep_refused"] = sum(row["too_steep_refused"] for row in chosen)
+        made[f"{kind}.cpu_s"] = max(row["cpu_s"] for row in chosen)
+    short = [one for row in rows for one in row["five_minutes"]]
+    made["five_minutes.inside"] = f"{sum(one['climb_inside'] for one in short)} of {len(short)}"
+    made["five_minutes.within_1.5_deg"] = sum(abs(one["climb_deg"]) < 1.5 for one in short)
+    made["five_minutes.interval_deg"] = float(np.median([one["climb_interval_deg"] for one in short]))
+    return made
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,161 @@
+"""Identify an aircraft from its flight logs."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft
+from aircraft.identification.estimate import Estimate, estimate_model
+from aircraft.identification.flight_record import FlightRecord
+from logs.importers.motion_log import MotionLog, read_motion
+from planfly.data_sheets import parse_sheet
+from planfly.first_start import with_warm_up
+from planfly.identification.base_numbers import base_model, scaled
+from planfly.identification.checks import check_estimate
+from planfly.identification.folder import Identified, folder_files, make_identified
+from planfly.identification.records import LEAST_HZ, flight_records, log_outputs
+from planfly.identification.replay import Replay, replay_log
+from planfly.identification.servos import ServoOutput, read_servos
+from planfly.stages import stage
+from world.errors import FlightError, PlanflyError
+from world.files import whole_path, write_folder
+from world.scenario_tables import names_folder
+
+# How far from its base an aircraft may be, as a factor of mass and span, before the prior is none.
+_FARTHEST = 1.6
+# Ranges of what is stated, with their units: of small aircraft.
+_RANGES = {"mass": (0.3, 50.0, "kg"), "span": (0.4, 10.0, "m"), "area": (0.03, 10.0, "m2")}
+
+
+@dataclass(frozen=True, slots=True)
+class IdentifiedAircraft:
+    """What `planfly.identify_aircraft` returns.
+
+    aircraft: as its folder has it.
+    estimate: of each parameter, with covariance.
+    climb, sink: steepest at cruise, full throttle and idle, degrees: lower end, estimate and upper end (95 %).
+    power: of level flight at cruise, W, likewise.
+    replays: of the check log, by the base and by the identified model; none without one.
+    """
+
+    aircraft: Aircraft
+    estimate: Estimate
+    climb: tuple[float, float, float]
+    sink: tuple[float, float, float]
+    power: tuple[float, float, float]
+    replays: tuple[Replay, ...] = ()
+
+
+@with_warm_up()
+def identify_aircraft(
+    logs: str | Path | Sequence[str | Path],
+    folder: str | Path,
+    *,
+    mass: float,
+    span: float,
+    area: float | None = None,
+    battery: str | None = None,
+    base: str | Path = "aerosonde",
+    check: str | Path | None = None,
+) -> IdentifiedAircraft:
+    """Make the folder of an aircraft from flight logs of ArduPlane, with what is not known of it.
+
+    logs: of one aircraft with one mass, with inertial sensors (IMU) and servo outputs (RCOU).
+    folder: to make, which must not be there yet.
+    mass: kg, in flight.  span: of the wing, m.  area: of the wing, m^2; None for the base's share of the span squared.
+    battery: volts and capacity, "44.4V,888Wh"; None for the base's.
+    base: the aircraft that it is most like, by name or folder: what its logs do not show stays the base's.
+    check: a log that is not among them, to replay with both models.
+    Raises a `planfly.PlanflyError` for logs that cannot be used; nothing is written then.
+    """
+    target = check_new_folder(Path(folder))
+    paths = [Path(one) for one in ([logs] if isinstance(logs, str | Path) else logs)]
+    if not paths:
+        raise PlanflyError.of_argument("logs", "", "at least one log is expected", shown="")
+    prior = _base(base)
+    stated = {
+        "mass": mass,
+        "span": span,
+        "area": area if area is not None else prior.wing_area * (span / prior.wing_span) ** 2,
+    }
+    _check_stated(stated, prior)
+    volts, energy = prior.battery_voltage, prior.battery_energy
+    if battery is not None:
+        sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
+        volts, energy = sheet.volts, sheet.energy
+    numbers = scaled(base_model(prior), stated["mass"], stated["span"], stated["area"], volts)
+    with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}"):
+        read = [(log, *_stretches(log, prior)) for log in map(read_motion, paths)]
+        checked = None if check is None else _stretches(read_motion(Path(check)), prior)[0]
+    records = [record for _, stretches, _ in read for record in stretches]
+    log, _, outputs = read[-1]
+    with stage("estimating"):
+        fast = all(min(one.inertial.rate, one.outputs.rate) >= LEAST_HZ for one, _, _ in read)
+        estimate = estimate_model(records, numbers, dynamics=fast)
+        check_estimate(estimate, numbers, {name: output.output for name, output in outputs.items()}, log.source)
+        found = make_identified(prior, numbers, estimate, [one for one, _, _ in read], outputs)
+        files = folder_files(found, target.name, (volts, energy))
+    replays = () if checked is None else _replay(found, files, target.name, checked)
+    write_folder(target, {name: text.encode() for name, text in files.items()})
+    return _answer(read_aircraft(target), found, replays)
+
+
+def _base(base: str | Path) -> Aircraft:
+    text = str(base.absolute()) if isinstance(base, Path) else base
+    return find_aircraft(whole_path(Path(text)) if names_folder(text) else text)
+
+
+def _check_stated(stated: dict[str, float], prior: Aircraft) -> None:
+    """Refuse numbers of no small aircraft, and a base that is of another class.  Raises FlightError."""
+    for name, value in stated.items():
+        low, high, unit = _RANGES[name]
+        if isinstance(value, bool) or not low <= value <= high:
+            raise FlightError.of_argument(name, value, f"allowed {low:g}..{high:g} {unit}", shown=f"{value} {unit}")
+    for name, value, own in (("mass", stated["mass"], prior.mass), ("span", stated["span"], prior.wing_span)):
+        if not 1.0 / _FARTHEST <= value / own <= _FARTHEST:
+            allowed = f"{own / _FARTHEST:.3g}..{own * _FARTHEST:.3g} is near enough to {prior.name}"
+            advice = "planfly aircraft --new FOLDER makes a base from a data sheet, for `base`"
+            raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g}")
+
+
+def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
+    """The log's stretches, and its outputs: the base's own where it has the same outputs, rigged as stated."""
+    outputs = log_outputs(log, prior)
+    file = prior.folder / "ardupilot.toml"
+    own = read_servos(file) if file.is_file() else {}
+    same = own.keys() == outputs.keys() and all(_same(own[name], output) for name, output in outputs.items())
+    chosen = dict(own) if same else outputs
+    return flight_records(log, prior, chosen if same else None), chosen
+
+
+def _same(one: ServoOutput, other: ServoOutput) -> bool:
+    """Whether two are the same output over the same travel, the same way round."""
+    (a, *_, b), (c, *_, d) = one.value, other.value
+    ends = (one.pulse[0], one.pulse[-1]) == (other.pulse[0], other.pulse[-1])
+    return one.output == other.output and ends and (b - a) * (d - c) > 0.0
+
+
+def _replay(found: Identified, files: dict[str, str], name: str, records: list[FlightRecord]) -> tuple[Replay, ...]:
+    with stage("replaying the check log"):
+        return replay_log(found, files, name, records)
+
+
+def _answer(aircraft: Aircraft, found: Identified, replays: tuple[Replay, ...]) -> IdentifiedAircraft:
+    best, drawn = found.performance()
+
+    def interval(value: np.ndarray, draws: np.ndarray, factor: float = 1.0) -> tuple[float, float, float]:
+        low, high = np.percentile(draws, [2.5, 97.5])
+        return factor * float(low), factor * float(value[0]), factor * float(high)
+
+    degrees = math.degrees(1.0)
+    return IdentifiedAircraft(
+        aircraft,
+        found.estimate,
+        climb=interval(best.climb, drawn.climb, degrees),
+        sink=interval(best.sink, drawn.sink, degrees),
+        power=interval(best.power, drawn.power),
+        replays=replays,
+    )

@@ -1,0 +1,75 @@
+"""What an estimate says that cannot be: outputs that seem reversed, values at their bounds, a mass that changes."""
+
+import numpy as np
+
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.estimate import Estimate
+from aircraft.identification.parameters import INDEX, PARAMETERS
+from world.errors import LogError
+
+# Parameters whose sign is that of an output, and the control.
+_POWERS = {"aileron-power": "aileron", "elevator-power": "elevator", "rudder-power": "rudder"}
+# Share of an interval that is the log's from which on a sign counts.
+_KNOWN = 0.3
+# Slopes of lift curves, per rad, of wings as there are.
+LIFT_SLOPES = (3.0, 7.0)
+# A change of mass within the logs, as a share, and how many of its standard deviations it must be.
+MASS_CHANGE, _SURE = 0.05, 4.0
+_BLOCK_SECONDS = 30.0
+
+
+def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
+    """Refuse an estimate that no aircraft can have.
+
+    outputs: number of the servo output of each control.  source: of the logs, for the message.
+    Raises LogError, in one line.
+    """
+    known = estimate.of_log()
+    for name, control in _POWERS.items():
+        k = INDEX[name]
+        if estimate.values[k] < 0.0 and (known[k] > _KNOWN or estimate.values[k] < -2.0 * estimate.sds[k]):
+            number = outputs.get(control, 0)
+            message = f"output {number} seems reversed: {control} moves the aircraft the other way"
+            raise LogError(
+                f"{source}: {message} (SERVO{number}_REVERSED)", file=source, field=f"SERVO{number}_REVERSED"
+            )
+    slope = base.coefficients.lift_alpha * estimate.values[INDEX["lift-slope"]]
+    low, high = LIFT_SLOPES
+    if not low <= slope <= high:
+        allowed = f"{low:g}..{high:g} is expected: are mass and wing area those of these logs?"
+        raise LogError(
+            f"{source}: lift slope {slope:.2f} per rad: {allowed}", file=source, value=slope, allowed=allowed
+        )
+    for parameter, value in zip(PARAMETERS, estimate.values.tolist(), strict=True):
+        low, high = parameter.bounds
+        if not low < value < high:
+            allowed = f"allowed {low:g}..{high:g}"
+            message = f"{parameter.title} ({parameter.name}) = {value:.2f} is at its bound: {allowed}"
+            raise LogError(f"{source}: {message}", file=source, field=parameter.name, value=value, allowed=allowed)
+    change, sd = mass_change(estimate, base)
+    if abs(change) > MASS_CHANGE and abs(change) > _SURE * sd:
+        message = f"the mass seems to change by {100.0 * change:+.0f} % within the logs: one mass is expected"
+        raise LogError(f"{source}: {message}", file=source, value=change)
+
+
+def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
+    """Change of mass over all logs, as a share of it, and its standard deviation.
+
+    A lighter aircraft needs less angle of attack than its supposed mass does, and ever less as it burns or drops
+    something: the trend of the angle over what the lift curve says, over the angle from zero lift.
+    """
+    equation = estimate.equations[0]
+    c = base.coefficients
+    slope = c.lift_alpha * estimate.values[INDEX["lift-slope"]]
+    zero = -(c.lift_zero + estimate.values[INDEX["lift-offset"]]) / slope
+    length = round(_BLOCK_SECONDS * equation.hertz)
+    count = len(equation.measured) // length
+    if count < 6:
+        return 0.0, np.inf
+    share = (equation.measured - equation.predicted) / np.maximum(0.02, equation.predicted - zero)
+    means = share[: count * length].reshape(count, length).mean(axis=1)
+    time = (np.arange(count) + 0.5) / count - 0.5
+    trend = float(time @ means / (time @ time))
+    left = means - means.mean() - trend * time
+    sd = float(np.sqrt(left @ left / (count - 2) / (time @ time)))
+    return trend, sd

@@ -1,0 +1,206 @@
+"""The folder of an identified aircraft: its model and all that goes with it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft, read_aircraft
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.drag import NUISANCES
+from aircraft.identification.draws import draw_aircraft
+from aircraft.identification.estimate import Estimate
+from aircraft.identification.parameters import PARAMETERS
+from aircraft.identification.performance import Performance, performance
+from aircraft.uncertainty import Draws, draws_text
+from flight.dynamics.envelope_tables import load_envelope
+from flight.guidance.model_gains import gains_of_model, gains_text
+from flight.mission_files.wpl import waypoints_text
+from logs.importers.motion_log import MotionLog
+from planfly.identification.manoeuvres import identification_mission
+from planfly.identification.model_text import identified_xml
+from planfly.identification.servos import ServoOutput
+from world.files import temporary_folder
+
+Floats = NDArray[np.float64]
+
+# Height at which performance is stated, m, and the density of the standard atmosphere there, kg/m^3 (ISO 2533).
+AMSL, DENSITY = 480.0, 1.1695
+# Parameters of a log that say how it flew, by their beginnings; the rest is of its hardware.
+_FLYING = (
+    "AIRSPEED_", "ARSPD_FBW_", "TECS_", "NAVL1_", "RLL_RATE_", "PTCH_RATE_", "RLL2SRV_", "PTCH2SRV_", "YAW2SRV_",
+    "KFF_",    "ROLL_LIMIT_DEG", "PTCH_LIM_", "PTCH_TRIM_DEG", "SCALING_SPEED", "TRIM_THROTTLE", "THR_MIN", "THR_MAX",
+    "THR_SLEWRATE", "WP_RADIUS", "WP_LOITER_RAD", "RTL_", "LEVEL_ROLL_LIMIT",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Identified:
+    """All that was found out.
+
+    base: the aircraft that it began with.  numbers: of that, scaled.  estimate, draws: (512, n).
+    logs: that it was identified from.  outputs: of the servos.
+    """
+
+    base: Aircraft
+    numbers: BaseModel
+    estimate: Estimate
+    draws: Floats
+    logs: Sequence[MotionLog]
+    outputs: Mapping[str, ServoOutput]
+    cruise: float
+
+    def performance(self) -> tuple[Performance, Performance]:
+        """Of the estimate (1,), and of all draws (512,)."""
+        return (
+            performance(self.numbers, self.estimate.values, self.cruise, DENSITY),
+            performance(self.numbers, self.draws, self.cruise, DENSITY),
+        )
+
+
+def make_identified(
+    base: Aircraft,
+    numbers: BaseModel,
+    estimate: Estimate,
+    logs: Sequence[MotionLog],
+    outputs: Mapping[str, ServoOutput],
+) -> Identified:
+    """With 512 draws, at the cruise speed of the last log."""
+    cruise = logs[-1].parameters.get("AIRSPEED_CRUISE", base.airspeed)
+    return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise)
+
+
+def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
+    """The files of its folder but for the page, by their names; battery: V and J.
+
+    Raises FlightError for an aircraft that does not trim.
+    """
+    xml = identified_xml(found.base, name, found.numbers, found.estimate.values)
+    with temporary_folder("planfly-identified-") as place:
+        folder = place / name
+        folder.mkdir()
+        (folder / f"{name}.xml").write_text(xml, encoding="utf-8")
+        toml = folder / f"{name}.toml"
+        toml.write_text(_metadata(found, battery, 0.0), encoding="utf-8")
+        envelope = load_envelope(read_aircraft(folder))
+        slow, fast = envelope.level_speeds(0.0)
+        toml.write_text(_metadata(found, battery, slow, fast), encoding="utf-8")
+        aircraft = read_aircraft(folder)
+        mission = identification_mission(aircraft, envelope, *_home(found.logs[-1]))
+        files = {
+            f"{name}.xml": xml,
+            f"{name}.toml": toml.read_text(encoding="utf-8"),
+            "gains.toml": gains_text(gains_of_model(aircraft)),
+            "identify.waypoints": waypoints_text(mission),
+        }
+    properties = tuple(parameter.property_name for parameter in PARAMETERS)
+    return files | {
+        "ardupilot.parm": _parameters(found.logs[-1]),
+        "ardupilot.toml": _servos(found.outputs),
+        "posterior.toml": posterior_text(found),
+        "draws.csv": draws_text(Draws(properties, found.draws)),
+    }
+
+
+def _home(log: MotionLog) -> tuple[float, float, float]:
+    """Latitude, longitude and height of where the log was flown; a place of its own where it does not say."""
+    lowest = float(log.height.values.min()) if len(log.height.time) else 0.0
+    return (*log.place, max(0.0, lowest - 100.0))
+
+
+def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast: float = math.inf) -> str:
+    """The text of ``name.toml``; slow, fast: of level flight, m/s."""
+    base, value = found.base, found.logs[-1].parameters.get
+    ratio = math.sqrt(1.225 / DENSITY)
+    cruise = found.cruise
+    least = max(min(value("AIRSPEED_MIN", base.airspeed_min), cruise), slow + 0.1)
+    cruise = max(cruise, least)
+    most = max(cruise, min(value("AIRSPEED_MAX", base.airspeed_max) * ratio, fast))
+    stall = min(slow if slow > 0.0 else base.stall_speed, least)
+    volts, energy = battery
+    rows = {
+        "mass_kg": found.numbers.mass, "wing_area_m2": found.numbers.area, "wing_span_m": found.numbers.span,
+        "airspeed_mps": cruise, "airspeed_min_mps": least, "airspeed_max_mps": most, "stall_speed_mps": stall,
+        "max_bank_deg": value("ROLL_LIMIT_DEG", math.degrees(base.max_bank)),
+        "max_pitch_deg": math.degrees(base.max_pitch), "max_elevator_deg": math.degrees(base.max_elevator),
+        "max_aileron_deg": math.degrees(base.max_aileron), "max_rudder_deg": math.degrees(base.max_rudder),
+        "surface_rate_deg_s": math.degrees(base.surface_rate), "surface_lag_s": base.surface_lag,
+        "motor_lag_s": base.motor_lag, "battery_v": volts, "battery_wh": energy / 3600.0,
+    }  # fmt: skip
+    lines = [
+        "# What planner, guidance and verdict need to know of the aircraft; posterior.toml says what was estimated.",
+        f'title = "aircraft of {found.numbers.mass:.3g} kg, identified from flight logs"',
+        *(f"{key} = {number:.6g}" for key, number in rows.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _parameters(log: MotionLog) -> str:
+    lines = [f"# As {Path(log.source).name} was flown: parameters of flying; those of its hardware are left out."]
+    lines += [f"{name} {value:.9g}" for name, value in sorted(log.parameters.items()) if name.startswith(_FLYING)]
+    return "\n".join(lines) + "\n"
+
+
+def _servos(outputs: Mapping[str, ServoOutput]) -> str:
+    lines = ["# Which servo output moves what, and the control at these pulses.", ""]
+    for name, output in outputs.items():
+        values = output.value if name == "throttle" else [math.degrees(angle) for angle in output.value]
+        unit = "value" if name == "throttle" else "value_deg"
+        lines += [
+            f"[{name}]",
+            f"output = {output.output}",
+            f"pulse_us = [{', '.join(f'{pulse:g}' for pulse in output.pulse)}]",
+            f"{unit} = [{', '.join(f'{value:.6g}' for value in values)}]",
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def posterior_text(found: Identified) -> str:
+    """The text of ``posterior.toml``."""
+    estimate = found.estimate
+    _, drawn = found.performance()
+    climb, sink = (float(np.degrees(np.std(angles))) for angles in (drawn.climb, drawn.sink))
+    shares = estimate.of_log()
+    lines = [
+        "# What flight logs say of this aircraft.  Each property is one of the model's: a factor on the base's",
+        "# coefficient, or an offset to it; the model's own value of it is the estimate.",
+        "",
+        'source = "flight logs"',
+        f"climb_sd_deg = {climb:.3f}    # of the steepest climb at cruise, one standard deviation",
+        f"descent_sd_deg = {sink:.3f}  # of the steepest descent",
+        f'base = "{found.base.name}"',
+        f"mass_kg = {found.numbers.mass:.6g}",
+        f"seconds = {estimate.seconds:.0f}",
+        f"battery_current = {'true' if estimate.with_current else 'false'}",
+        f"dynamics = {'true' if estimate.dynamics else 'false'}",
+        "held_fixed = [",
+        *(f'  "{name}",' for name in (*estimate.shifts, *NUISANCES)),
+        "]",
+    ]
+    for log in found.logs:
+        lines += ["", "[[log]]", f'file = "{_plain(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
+    for k, parameter in enumerate(PARAMETERS):
+        lines += [
+            "",
+            "[[quantity]]",
+            f'property = "{parameter.property_name}"',
+            f'unit = "{"factor" if parameter.kind == "factor" else "1"}"',
+            f"prior = {parameter.prior:g}",
+            f"prior_sd = {parameter.sd:g}",
+            f"estimate = {estimate.values[k]:.6g}",
+            f"sd = {estimate.sds[k]:.4g}",
+            f"of_log = {shares[k]:.3f}  # share of the interval that is the logs'",
+            f'reason = "{parameter.title}"',
+        ]
+    correlation = estimate.covariance / np.outer(estimate.sds, estimate.sds)
+    lines += ["", "[correlation]", "# Rows and columns in the order of the quantities.", "matrix = ["]
+    lines += [f"  [{', '.join(f'{value:.4f}' for value in row)}]," for row in correlation]
+    return "\n".join([*lines, "]", ""])
+
+
+def _plain(text: str) -> str:
+    return text.replace("\\", "/").replace('"', "'")

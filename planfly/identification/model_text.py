@@ -1,0 +1,234 @@
+"""The identified aircraft's JSBSim model: the base's text with what was estimated as properties ``ident/NAME``.
+
+The base's own coefficients stay.  Beside each function of forces and moments stands another, of what the estimate adds
+to them; motor and propeller are written anew, in the form of the Aerosonde's.  The properties' defaults are the
+estimate: a draw of the aircraft is another set of them.
+"""
+
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.electric_motor import ElectricMotor
+from aircraft.identification.parameters import INDEX, PARAMETERS
+from aircraft.xml_text import number
+
+Floats = NDArray[np.float64]
+
+_SLUG_FT2, _POUND = 1.3558179483314004, 0.45359237
+# Angles of attack beyond this, rad, are not seen in flight: what was estimated is held from there on.
+_LARGEST_ALPHA = 0.25
+
+
+def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
+    """The text of ``name.xml``.
+
+    base: whose model's text it begins with.  numbers: scaled to the aircraft.  values: (n,) of
+    `aircraft.identification.parameters.PARAMETERS`.
+    """
+    text = base.model_file.read_text(encoding="utf-8")
+    # A base from a data sheet has properties of these names: they stay at its own values, under another.
+    text = text.replace("ident/", "base/")
+    root = ElementTree.fromstring(text, parser=ElementTree.XMLParser(target=ElementTree.TreeBuilder()))
+    root.set("name", name)
+    _set_sizes(root, numbers)
+    kept = [one for one in root.iter("property") if (one.text or "").strip().startswith("base/")]
+    old = root.find("external_reactions")
+    reactions = ElementTree.fromstring(_reactions(numbers.motor, values, kept))
+    assert old is not None  # noqa: S101 - `planfly.identification.base_numbers.read_motor` found its motor there
+    root.remove(old)
+    # Its properties are read by what follows.
+    position = next(k for k, one in enumerate(root) if one.tag == "flight_control")
+    root.insert(position, reactions)
+    aerodynamics = root.find("aerodynamics")
+    assert aerodynamics is not None  # noqa: S101
+    shared = f"<a>{_lift_functions(numbers)}</a>"
+    first_axis = next(k for k, one in enumerate(aerodynamics) if one.tag == "axis")
+    for k, function in enumerate(ElementTree.fromstring(shared)):
+        aerodynamics.insert(first_axis + k, function)
+    drag = " <p> aero/drag-factor </p>" if "aero/drag-factor" in text else ""
+    control = " <p> aero/control-factor </p>" if "aero/control-factor" in text else ""
+    for axis in aerodynamics.iter("axis"):
+        for function in ElementTree.fromstring(
+            f"<a>{_additions(base, numbers, axis.get('name', ''), drag, control)}</a>"
+        ):
+            axis.append(function)
+    ElementTree.indent(root)
+    said = f"{base.name}, identified from flight logs by planfly: posterior.toml says how."
+    head = f'<?xml version="1.0"?>\n<!-- {said} -->\n'
+    return head + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _set_sizes(root: ElementTree.Element, numbers: BaseModel) -> None:
+    ixx, iyy, izz, ixz = numbers.inertia
+    sizes = {
+        "metrics/wingarea": (numbers.area, "M2"),
+        "metrics/wingspan": (numbers.span, "M"),
+        "metrics/chord": (numbers.chord, "M"),
+        "mass_balance/ixx": (ixx / _SLUG_FT2, "SLUG*FT2"),
+        "mass_balance/iyy": (iyy / _SLUG_FT2, "SLUG*FT2"),
+        "mass_balance/izz": (izz / _SLUG_FT2, "SLUG*FT2"),
+        "mass_balance/ixz": (ixz / _SLUG_FT2, "SLUG*FT2"),
+        "mass_balance/emptywt": (numbers.mass / _POUND, "LBS"),
+    }
+    for path, (value, unit) in sizes.items():
+        found = root.find(path)
+        assert found is not None, path  # noqa: S101 - JSBSim loaded the model
+        found.text, found.attrib = f" {number(value)} ", {"unit": unit}
+    balance = root.find("mass_balance")
+    assert balance is not None  # noqa: S101
+    balance.set("negated_crossproduct_inertia", "false")
+
+
+# ----------------------------------------------------------------------
+# Aerodynamics: what the estimate adds, of the base's coefficients.
+
+
+def _factor(name: str) -> str:
+    """A factor less 1."""
+    return f"<sum> <p> ident/{name} </p> <v> -1 </v> </sum>"
+
+
+def _term(coefficient: float, *factors: str) -> str:
+    return f"<product> <v> {number(coefficient)} </v> {' '.join(factors)} </product>"
+
+
+def _lift_functions(numbers: BaseModel) -> str:
+    """Coefficients of lift of the angle of attack alone, before and after the estimate, as far as seen."""
+    c = numbers.coefficients
+    return f"""
+    <function name="ident/alpha-rad"> <min> <v> {_LARGEST_ALPHA} </v>
+      <max> <v> {-_LARGEST_ALPHA} </v> <p> aero/alpha-rad </p> </max> </min> </function>
+    <function name="ident/lift-before">
+      <sum> <v> {number(c.lift_zero)} </v> {_term(c.lift_alpha, "<p> ident/alpha-rad </p>")} </sum> </function>
+    <function name="ident/lift-after">
+      <sum> <v> {number(c.lift_zero)} </v> <p> ident/lift-offset </p>
+        {_term(c.lift_alpha, "<p> ident/lift-slope </p>", "<p> ident/alpha-rad </p>")} </sum> </function>"""
+
+
+def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
+    """The function that joins an axis; none for an axis of which nothing was estimated."""
+    c = numbers.coefficients
+    surfaces = [
+        f"<product> <p> {reading.name} </p> <v> {number(reading.factor)} </v> </product>{control}"
+        for reading in base.model.readings[:3]
+    ]
+    elevator, aileron, rudder = surfaces
+    roll, pitch, yaw = (f"<p> velocities/{letter}-aero-rad_sec </p>" for letter in "pqr")
+    wide, long, beta = "<p> aero/bi2vel </p>", "<p> aero/ci2vel </p>", "<p> aero/beta-rad </p>"
+    before, after = ("<product>" + 2 * f" <p> ident/lift-{when} </p>" + " </product>" for when in ("before", "after"))
+    sums = {
+        "X": (
+            f"{drag} ",
+            _term(c.drag_zero, _factor("zero-lift-drag")),
+            _term(c.drag_induced, f"<sum> <product> <p> ident/induced-drag </p> {after} </product>"
+                  f" <product> <v> -1 </v> {before} </product> </sum>"),
+        ),
+        "Z": ("", "<difference> <p> ident/lift-after </p> <p> ident/lift-before </p> </difference>"),
+        "ROLL": (
+            "<p> metrics/bw-ft </p>",
+            _term(c.roll_beta, _factor("dihedral-effect"), beta),
+            _term(c.roll_roll, _factor("roll-damping"), wide, roll),
+            _term(c.roll_yaw, _factor("roll-from-yaw"), wide, yaw),
+            _term(c.roll_aileron, _factor("aileron-power"), aileron),
+        ),
+        "PITCH": (
+            "<p> metrics/cbarw-ft </p>",
+            "<p> ident/pitch-offset </p>",
+            _term(c.pitch_alpha, _factor("pitch-stiffness"), "<p> aero/alpha-rad </p>"),
+            _term(c.pitch_rate, _factor("pitch-damping"), long, pitch),
+            _term(c.pitch_elevator, _factor("elevator-power"), elevator),
+        ),
+        "YAW": (
+            "<p> metrics/bw-ft </p>",
+            _term(c.yaw_beta, _factor("weathercock"), beta),
+            _term(c.yaw_roll, _factor("yaw-from-roll"), wide, roll),
+            _term(c.yaw_yaw, _factor("yaw-damping"), wide, yaw),
+            _term(c.yaw_aileron, _factor("adverse-yaw"), aileron),
+            _term(c.yaw_rudder, _factor("rudder-power"), rudder),
+        ),
+    }  # fmt: skip
+    if axis not in sums:
+        return ""
+    scale, *terms = sums[axis]
+    return f"""<function name="ident/added/{axis.lower()}">
+      <product> <p> aero/qbar-area </p> {scale} <sum> <v> 0 </v> {" ".join(terms)} </sum> </product> </function>"""
+
+
+# ----------------------------------------------------------------------
+# Motor and propeller.
+
+_RHO, _SPEED, _AIR = "<p> motor/rho-kg_m3 </p>", "<p> motor/propeller-rad_sec </p>", "<p> motor/airspeed-mps </p>"
+
+
+def _reactions(motor: ElectricMotor, values: Floats, kept: list[ElementTree.Element]) -> str:
+    """The text of ``<external_reactions>``: the properties, and what drives the propeller."""
+    own = "\n".join(
+        f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
+        for parameter in PARAMETERS
+    )
+    old = "\n".join(ElementTree.tostring(one, encoding="unicode").strip() for one in kept)
+    q2, q1, q0 = (number(value) for value in motor.torque)
+    kv, r = motor.back_voltage, motor.resistance
+    # Over the factor on motor speed: KV is divided by it, and its square is KQ KV.
+    speed = "<p> ident/motor-speed </p>"
+    loss = f"<quotient> <v> {number(kv * motor.idle_current)} </v> {speed} </quotient>"
+    drive = f"<quotient> <product> <v> {number(-kv / r)} </v> <p> motor/input-v </p> </product> {speed} </quotient>"
+    square = f"<quotient> <v> {number(kv * kv / r)} </v> <product> {speed} {speed} </product> </quotient>"
+
+    def root(b: str, c: str) -> str:
+        inside = f"""<difference> <product> {b} {b} </product>
+          <product> <v> 4 </v> <p> motor/q2 </p> <sum> <p> motor/q0 </p> {c} </sum> </product> </difference>"""
+        return f"""<quotient> <difference> <sqrt> <max> <v> 0 </v> {inside} </max> </sqrt> {b} </difference>
+          <product> <v> 2 </v> <p> motor/q2 </p> </product> </quotient>"""
+
+    pull = [
+        f"<product> <v> {number(motor.thrust[0])} </v> {_SPEED} {_SPEED} </product>",
+        f"<product> <v> {number(motor.thrust[1])} </v> {_AIR} {_SPEED} </product>",
+        f"<product> <v> {number(motor.thrust[2])} </v> {_AIR} {_AIR} </product>",
+    ]
+    torque = "<p> ident/propeller-torque </p>"
+    back = f"<quotient> <product> <v> {number(kv)} </v> {_SPEED} </product> {speed} </quotient>"
+    functions = {
+        "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
+        "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",
+        "input-v": "<product> <p> motor/battery-v </p> <p> motor/throttle-norm </p> </product>",
+        "q2": f"<product> <v> {q2} </v> {torque} {_RHO} </product>",
+        "q1": f"<product> <v> {q1} </v> {torque} {_RHO} {_AIR} </product>",
+        "q0": f"<product> <v> {q0} </v> {torque} {_RHO} {_AIR} {_AIR} </product>",
+        "b": f"<sum> <p> motor/q1 </p> {square} </sum>",
+        "driven-rad_sec": root("<p> motor/b </p>", f"{loss} {drive}"),
+        "windmill-rad_sec": root("<p> motor/q1 </p>", loss),
+        "propeller-rad_sec": "<max> <v> 0 </v> <p> motor/driven-rad_sec </p>"
+        " <difference> <p> motor/windmill-rad_sec </p>"
+        " <product> <v> 1000000000 </v> <p> motor/braking </p> </product> </difference> </max>",
+        "current-a": "<max> <product> <v> -1000000 </v> <p> motor/braking </p> </product>"
+        f" <quotient> <difference> <p> motor/input-v </p> {back} </difference> <v> {number(r)} </v> </quotient> </max>",
+        "battery-power-w": "<product> <p> motor/input-v </p> <p> motor/current-a </p> </product>",
+        "battery-current-a": "<product> <p> motor/throttle-norm </p> <p> motor/current-a </p> </product>",
+        "pull-n": f"<product> {_RHO} <p> ident/thrust </p> <sum> {' '.join(pull)} </sum> </product>",
+        "thrust-n": "<sum> <max> <v> 0 </v> <p> motor/pull-n </p> </max>"
+        f" <product> <v> {number(motor.windmill)} </v> <min> <v> 0 </v> <p> motor/pull-n </p> </min> </product> </sum>",
+        "torque-n_m": f"<sum> <product> <p> motor/q2 </p> {_SPEED} {_SPEED} </product>"
+        f" <product> <p> motor/q1 </p> {_SPEED} </product> <p> motor/q0 </p> </sum>",
+    }
+    body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
+    return f"""<external_reactions>
+{old}
+{own}
+<property value="{number(motor.voltage)}"> motor/battery-v </property>
+<property value="0"> motor/braking </property>
+{body}
+<force name="thrust" frame="BODY">
+  <function> <product> <p> motor/thrust-n </p> <v> 0.2248089430997105 </v> </product> </function>
+  <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
+  <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
+</force>
+<moment name="torque" frame="BODY">
+  <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
+  <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
+</moment>
+</external_reactions>"""

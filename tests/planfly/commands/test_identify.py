@@ -1,0 +1,91 @@
+"""`planfly aircraft --identify`: from a log to a folder that flies, and what is refused."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import planfly
+from aircraft.catalog import read_aircraft
+from aircraft.uncertainty import read_draws, read_uncertainty
+from flight.dynamics.fdm import Fdm
+from planfly.cli import main
+from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
+from tests.instrumented_flights import short_motion, write_motion
+
+ARGUMENTS = ["--mass", "13.2", "--span", "2.8956", "--area", "0.55"]
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@cache
+def log_bytes() -> bytes:
+    return write_motion(Path("a.BIN"), flown_truth().log).read_bytes()
+
+
+def identify(*more: str) -> int:
+    return main(["aircraft", "--identify", "a.BIN", *ARGUMENTS, "--out", "./mine", *more])
+
+
+def test_a_log_becomes_a_folder_that_flies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.BIN").write_bytes(log_bytes())
+    assert identify("--battery", "44.4V,888Wh", "--check", "a.BIN") == 0
+    said = capsys.readouterr().out
+    assert "at cruise" in said
+    folder = tmp_path / "mine"
+    assert {file.name for file in folder.iterdir()} >= {
+        *("mine.xml", "mine.toml", "gains.toml", "ardupilot.parm", "ardupilot.toml", "posterior.toml", "draws.csv"),
+        "identify.waypoints",
+    }
+    made = read_aircraft(folder)
+    assert made.mass == pytest.approx(13.2)
+    draws = read_draws(folder / "draws.csv")
+    known = read_uncertainty(folder)
+    assert known is not None
+    assert draws.values.shape == (512, len(known.quantities))
+    assert draws.names == tuple(one.name for one in known.quantities)
+    truth = TRUTH.parameters()
+    for k, one in enumerate(known.quantities):
+        assert abs(one.estimate - truth[one.name.removeprefix("ident/")]) < 3.0 * one.sd, one.name
+        # Draws stay within bounds, which cut what a log does not show.
+        assert 0.6 * one.sd < draws.values[:, k].std() < 1.15 * one.sd, one.name
+        # The model's own value is the estimate.
+        assert Fdm(made).properties.getter(one.name)() == pytest.approx(one.estimate, abs=1e-5)
+    joint = np.corrcoef(draws.values.T)
+    thrust, speed = (draws.names.index(f"ident/{name}") for name in ("thrust", "motor-speed"))
+    assert joint[thrust, speed] < -0.5
+    # The replay: far nearer than the base, whose ailerons and mass are others.
+    rows = [line for line in said.splitlines() if line.strip().startswith("replay")]
+    roll = [float(row.split("roll ")[2].split(",")[0]) for row in rows]
+    assert roll[1] < 0.4 * roll[0]
+    assert planfly.judge("mine/identify.waypoints", aircraft="./mine").verdict.flyable
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--identify", "a.BIN", "--span", "2.9", "--out", "./mine"], "--identify needs --mass"),
+        (["--identify", "a.BIN", "--mass", "13", "--span", "2.9"], "--identify needs --out, the folder to make"),
+        (["--identify", "no.BIN", *ARGUMENTS, "--out", "./mine"], "no.BIN: no such file"),
+        (["--identify", "a.BIN", *ARGUMENTS, "--cruise", "20", "--out", "./mine"], "goes without --cruise"),
+        (["--identify", "a.BIN", "--mass", "2", "--span", "2.9", "--out", "./mine"], "near enough to aerosonde"),
+        (["--identify", "a.BIN", "--mass", "99", "--span", "2.9", "--out", "./mine"], "allowed 0.3..50 kg"),
+        (["--identify", "a.BIN", *ARGUMENTS, "--battery", "12", "--out", "./mine"], "volts and capacity"),
+        (["--identify", "a.BIN", *ARGUMENTS, "--out", "./mine"], "0.0 min of it are flight on the wing"),
+        (["aerosonde", "--check", "a.BIN"], "goes with --identify"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_motion(Path("a.BIN"), replace(short_motion(), parameters={"AIRSPEED_MIN": 18.0}))
+    assert main(["aircraft", *arguments]) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("planfly: ")]
+    assert len(lines) == 1
+    assert said in lines[0]
+    assert not Path("mine").exists()

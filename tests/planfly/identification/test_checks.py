@@ -1,0 +1,80 @@
+"""What an estimate may not be, by name and in one line."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.identification.estimate import Estimate, estimate_model
+from aircraft.identification.parameters import INDEX
+from planfly.identification.checks import check_estimate, mass_change
+from planfly.identification.records import flight_records
+from planfly.identification.servos import read_servos
+from tests.aircraft.identification.flown_truth import flown_truth
+from tests.planfly.identification.test_records import PRIOR, changed
+from world.errors import LogError
+
+OUTPUTS = {"aileron": 1, "elevator": 2, "throttle": 3, "rudder": 4}
+
+
+def refused(estimate: Estimate) -> str:
+    with pytest.raises(LogError) as error:
+        check_estimate(estimate, flown_truth().base, OUTPUTS, "a.BIN")
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def with_value(name: str, value: float) -> Estimate:
+    estimate = flown_truth().estimate
+    values = estimate.values.copy()
+    values[INDEX[name]] = value
+    return replace(estimate, values=values)
+
+
+def test_a_good_estimate_passes() -> None:
+    check_estimate(flown_truth().estimate, flown_truth().base, OUTPUTS, "a.BIN")
+
+
+def test_a_servo_the_other_way_round_is_named_by_its_output() -> None:
+    """The log of an aircraft whose SERVO1_REVERSED does not say what its linkage does."""
+    flown = flown_truth()
+    servos = dict(read_servos(PRIOR.folder / "ardupilot.toml"))
+    servos["aileron"] = servos["aileron"].reversed
+    records = [record.part(60.0) for record in flight_records(changed(), PRIOR, servos)]
+    assert "output 1 seems reversed" in refused(estimate_model(records, flown.base))
+
+
+def test_an_estimate_at_its_bound_is_named() -> None:
+    assert "thrust (thrust) = 2.10 is at its bound: allowed 0.3..2" in refused(with_value("thrust", 2.1))
+
+
+def test_a_lift_curve_that_no_wing_has_is_refused() -> None:
+    assert "lift slope 8.41 per rad: 3..7 is expected" in refused(with_value("lift-slope", 1.5))
+
+
+def test_a_mass_that_changes_within_the_logs_is_refused() -> None:
+    """By a plain sum: of a tenth less mass the angle from zero lift is a tenth less."""
+    estimate, base = flown_truth().estimate, flown_truth().base
+    lift, *others = estimate.equations
+    c = base.coefficients
+    slope = c.lift_alpha * estimate.values[INDEX["lift-slope"]]
+    zero = -(c.lift_zero + estimate.values[INDEX["lift-offset"]]) / slope
+    share = np.linspace(0.0, -0.3, len(lift.predicted))
+    lighter = replace(lift, measured=lift.predicted + share * (lift.predicted - zero))
+    changing = replace(estimate, equations=(lighter, *others))
+    change, sd = mass_change(changing, base)
+    assert change == pytest.approx(-0.3, abs=0.01)
+    assert sd < 0.01
+    assert "the mass seems to change by -30 % within the logs" in refused(changing)
+    # This log of five and a half minutes tells no change of its own mass.
+    change, sd = mass_change(estimate, base)
+    assert abs(change) < 4.0 * sd
+
+
+def test_under_10_hz_the_performance_alone_is_estimated() -> None:
+    flown = flown_truth()
+    slow = estimate_model(flown.records, flown.base, dynamics=False)
+    assert not slow.dynamics
+    for name in ("roll-damping", "elevator-power", "yaw-damping", "pitch-offset"):
+        assert slow.of_log()[INDEX[name]] == pytest.approx(0.0, abs=1e-9)
+    assert slow.of_log()[INDEX["thrust"]] > 0.5

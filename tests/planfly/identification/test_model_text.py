@@ -1,0 +1,75 @@
+"""The written model does what the parameters say, as JSBSim flies it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
+from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import straight
+from planfly.identification.base_numbers import _Probe, base_model, scaled
+from planfly.identification.model_text import identified_xml
+from tests.instrumented_flights import Truth, changed_aerosonde
+
+BASE = load_aircraft("aerosonde")
+FACTORS = {
+    "lift-slope": "lift_alpha", "zero-lift-drag": "drag_zero", "induced-drag": "drag_induced",
+    "pitch-stiffness": "pitch_alpha", "pitch-damping": "pitch_rate", "elevator-power": "pitch_elevator",
+    "dihedral-effect": "roll_beta", "roll-damping": "roll_roll", "roll-from-yaw": "roll_yaw",
+    "aileron-power": "roll_aileron", "weathercock": "yaw_beta", "yaw-from-roll": "yaw_roll", "yaw-damping": "yaw_yaw",
+    "adverse-yaw": "yaw_aileron", "rudder-power": "yaw_rudder",
+}  # fmt: skip
+
+
+def written(place: Path, values: np.ndarray, mass: float = 11.0) -> Aircraft:
+    folder = place / "mine"
+    folder.mkdir()
+    numbers = scaled(base_model(BASE), mass, BASE.wing_span, BASE.wing_area)
+    (folder / "mine.xml").write_text(identified_xml(BASE, "mine", numbers, values), encoding="utf-8")
+    text = (BASE.folder / "aerosonde.toml").read_text(encoding="utf-8").replace("mass_kg = 11.0", f"mass_kg = {mass}")
+    (folder / "mine.toml").write_text(text, encoding="utf-8")
+    return read_aircraft(folder)
+
+
+def test_every_factor_and_offset_is_in_the_model(tmp_path: Path) -> None:
+    values = prior_means() + 0.02 * np.arange(1, len(PARAMETERS) + 1)
+    found = _Probe(written(tmp_path, values)).coefficients()
+    for name, field in FACTORS.items():
+        expected = values[INDEX[name]] * getattr(base_model(BASE).coefficients, field)
+        assert getattr(found, field) == pytest.approx(expected, rel=2e-3), name
+    assert found.lift_zero == pytest.approx(0.23 + values[INDEX["lift-offset"]], rel=1e-3)
+    assert found.pitch_zero == pytest.approx(0.0135 + values[INDEX["pitch-offset"]], rel=1e-3)
+
+
+def test_at_the_prior_it_is_the_base_trim_for_trim(tmp_path: Path) -> None:
+    own, base = straight(Fdm(written(tmp_path, prior_means())), 25.0, 500.0), straight(Fdm(BASE), 25.0, 500.0)
+    assert own is not None
+    assert base is not None
+    assert own.vector() == pytest.approx(base.vector(), abs=1e-6)
+
+
+def test_motor_and_propeller_are_those_of_a_model_edited_by_hand(tmp_path: Path) -> None:
+    truth = Truth(thrust=0.8, motor_speed=1.08, propeller_torque=1.15, mass=1.2)
+    values = prior_means()
+    for name in ("thrust", "motor-speed", "propeller-torque"):
+        values[INDEX[name]] = truth.parameters()[name]
+    trims = [
+        straight(Fdm(aircraft), 25.0, 500.0)
+        for aircraft in (written(tmp_path, values, 13.2), changed_aerosonde(tmp_path / "edited", truth))
+    ]
+    one, other = trims
+    assert one is not None
+    assert other is not None
+    assert one.vector() == pytest.approx(other.vector(), abs=1e-5)
+
+
+def test_a_draw_is_a_set_of_properties(tmp_path: Path) -> None:
+    fdm = Fdm(written(tmp_path, prior_means()))
+    fdm.properties.set("ident/thrust", 0.8)
+    weaker = straight(fdm, 25.0, 500.0)
+    assert weaker is not None
+    base = straight(Fdm(BASE), 25.0, 500.0)
+    assert base is not None
+    assert weaker.throttle > base.throttle + 0.02
