@@ -2,9 +2,9 @@
 
     python -m benchmarks.identification --first 1001 --count 10 --out build/identification.json
 
-Each variant's truth is drawn from 0.8 of the priors, with the things that identification holds fixed drawn as well; it
-flies the mission of manoeuvres in light turbulence, `tests.instrumented_flights` makes its sensors and clocks, and the log
-is identified, once without and once with the battery's current.  Nothing was tuned on these seeds.
+Each variant's truth is drawn from 0.8 of the priors, with the things that identification holds fixed drawn as well.
+It flies the mission of manoeuvres in light turbulence, `tests.instrumented_flights` makes its sensors and clocks, and
+the log is identified, once without and once with the battery's current.  Nothing was tuned on these seeds.
 """
 
 import argparse
@@ -57,7 +57,7 @@ def drawn_truth(seed: int) -> Truth:
             values[field] = float(np.clip(draw.normal(1.0, sd), 1.0 - 2.0 * sd, 1.0 + 2.0 * sd))
         truth = Truth(**values)
         base = scaled(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
-        flown = performance(base, true_values(truth), np.asarray(_CRUISE).item(), DENSITY)
+        flown = performance(base, true_values(truth), _CRUISE, DENSITY)
         stable = truth.pitch_stiffness > 0.5 and truth.weathercock > 0.4 and truth.roll_damping > 0.5
         if math.radians(4.0) < flown.climb[0] < math.radians(16.0) and flown.throttle[0] < 0.93 and stable:
             return truth
