@@ -119,7 +119,7 @@ def aircraft_names() -> tuple[str, ...]:
     """Names that `load_aircraft` takes, sorted.
 
     >>> aircraft_names()
-    ('aerosonde', 'c172x')
+    ('aerosonde', 'c172x', 'ultrastick25e', 'x8', 'zagi')
     """
     return tuple(sorted(file.stem for file in _ROOT.glob("*/*.toml") if file.stem == file.parent.name))
 

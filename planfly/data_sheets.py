@@ -226,7 +226,7 @@ _MAX_PITCH_DEG = 25.0
 
 
 @dataclass(frozen=True, slots=True)
-class _Performance:
+class Performance:
     """Trims of the model at cruise speed and `AMSL`: level, steepest climb, idle; slowest and fastest level flight."""
 
     level: Trim
@@ -275,7 +275,7 @@ def _files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, flo
     sheet = made.sheet
     (draft / f"{name}.toml").write_text(_metadata(made, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
     aircraft = read_aircraft(draft)
-    flown = _performance(Fdm(aircraft, tried=True), aircraft)
+    flown = performance_of(Fdm(aircraft, tried=True), aircraft)
     # The propeller carries a little at the stall; the sheet's counts where the model could fly slower.
     slow = max(sheet.stall, math.ceil(10.0 * flown.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0)
     least = min(max(slow, LEAST_SPEED * slow), sheet.cruise)
@@ -290,15 +290,15 @@ def _files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, flo
         f"{name}.xml": model,
         f"{name}.toml": metadata,
         "gains.toml": gains_text(gains_of_model(aircraft, fdm)),
-        "ardupilot.parm": _parameters(aircraft, flown, fdm, stated),
-        "ardupilot.toml": _servos(aircraft, flown),
+        "ardupilot.parm": arduplane_parameters(aircraft, flown, fdm, stated),
+        "ardupilot.toml": servo_text(aircraft, flown),
         "uncertainty.toml": uncertainty_text(known),
         DRAWS_FILE: draws_text(draw_quantities(known.quantities)),
         "README.md": _readme(name, made, flown, known, stated),
     }
 
 
-def _performance(fdm: Simulator, aircraft: Aircraft) -> _Performance:
+def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
     """What it flies like.  Raises FlightError where one of these flights does not exist."""
     cruise = aircraft.airspeed
     level = straight(fdm, cruise, AMSL)
@@ -315,7 +315,7 @@ def _performance(fdm: Simulator, aircraft: Aircraft) -> _Performance:
             argument = {"climb": "climb", "idle": "cruise", "slowest": "stall", "fastest": "top"}[name]
             allowed = f"the model holds no such flight ({name}); numbers nearer to those of other aircraft are expected"
             raise FlightError.of_argument(argument, None, allowed, shown="")
-    return _Performance(level, **{name: trim for name, trim in found.items() if trim is not None})
+    return Performance(level, **{name: trim for name, trim in found.items() if trim is not None})
 
 
 def _metadata(made: SizedAircraft, stall: float, least: float, most: float) -> str:
@@ -357,7 +357,7 @@ motor_lag_s = {numbers.lag[1]:.6g}
 # ArduPlane's parameters and servos.
 
 
-def _parameters(aircraft: Aircraft, flown: _Performance, fdm: Fdm, stated: Mapping[str, float]) -> str:
+def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, stated: Mapping[str, float]) -> str:
     """The text of ``ardupilot.parm``; what a file of parameters states of the aircraft stays as it is there."""
     a, b = linearise(fdm, flown.level)
     cruise, bank = aircraft.airspeed, aircraft.max_bank
@@ -411,7 +411,7 @@ def _parameters(aircraft: Aircraft, flown: _Performance, fdm: Fdm, stated: Mappi
     return "\n".join(lines) + "\n"
 
 
-def _servos(aircraft: Aircraft, flown: _Performance) -> str:
+def servo_text(aircraft: Aircraft, flown: Performance) -> str:
     """The text of ``ardupilot.toml``: controls before any mixer, which the model itself has."""
     elevator, aileron, rudder = (
         math.degrees(value) for value in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
@@ -463,7 +463,7 @@ _SHOWN = (
 
 
 def _readme(
-    name: str, made: SizedAircraft, flown: _Performance, known: Uncertainty, stated: Mapping[str, float]
+    name: str, made: SizedAircraft, flown: Performance, known: Uncertainty, stated: Mapping[str, float]
 ) -> str:  # fmt: skip
     sheet = made.sheet
     drive = "burns fuel; its mass stays the same" if sheet.fuelled else "is electric"

@@ -57,7 +57,7 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     >>> planfly.aircraft("aerosonde").airspeed
     25.0
     >>> list(planfly.aircraft())
-    ['aerosonde', 'c172x']
+    ['aerosonde', 'c172x', 'ultrastick25e', 'x8', 'zagi']
     """
     if name is None:
         return {known: load_aircraft(known) for known in aircraft_names()}

@@ -125,7 +125,8 @@ def aircraft(args: argparse.Namespace) -> int:
     if args.name is None:
         listed = list(planfly.aircraft().values())
         for known in listed:
-            print(f"{known.name:<12} {known.title}: {known.mass:.5g} kg, cruises at {known.airspeed:g} m/s")
+            size = f"{known.mass:.5g} kg, span {known.wing_span:.5g} m"
+            print(f"{known.name:<14} {known.title}: {size}, cruises at {known.airspeed:g} m/s")
         give_answer(args, lambda: _answer(listed))
         return FLYABLE
     out = args.out or "runs/aircraft-{name}"

@@ -26,7 +26,8 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_a_name_it_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["aerosonde", "c172x"]
+    assert [line.split()[0] for line in lines] == ["aerosonde", "c172x", "ultrastick25e", "x8", "zagi"]
+    assert lines[0].endswith("Aerosonde UAV (Beard and McLain): 11 kg, span 2.8956 m, cruises at 25 m/s")
 
 
 def _rows(text: str, title: str) -> list[list[str]]:

@@ -1,0 +1,1 @@
+"""The Zagi flying wing of Beard and McLain as a JSBSim model."""
