@@ -15,9 +15,9 @@ from flight.guidance.model_gains import gains_of_model, gains_text
 from planfly.data_sheets import arduplane_parameters, performance_of, servo_text
 
 # Beard and McLain, first edition, appendix E.1.  The table's drag by elevator is linear (0.30 a radian) and would drive
-# an aircraft that trims with its elevons up; it is left out, as is the table's drag by angle of attack, which the book's
-# parabola replaces.  With the table's Cn_beta of -0.0004 and Cn_r of -0.00434 nothing but a rudder could hold a bank: the
-# zero of roll by ailerons lies at +0.55 rad/s.  Both are the X8's here.
+# an aircraft that trims with its elevons up; it is left out, as is the table's drag by angle of attack, which the
+# book's parabola replaces.  With the table's Cn_beta of -0.0004 and Cn_r of -0.00434 nothing but a rudder could hold a
+# bank: the zero of roll by ailerons lies at +0.55 rad/s.  Both are the X8's here.
 _ZAGI_ASPECT = 1.4224**2 / 0.2589
 ZAGI = ModelNumbers(
     title="Zagi flying wing (Beard and McLain)",
@@ -119,10 +119,9 @@ def write(name: str) -> None:
     aircraft = load_aircraft(name)
     fdm = Fdm(aircraft)
     flown = performance_of(fdm, aircraft)
-    print(
-        f"{name}: level {flown.level}\n  climb {math.degrees(flown.climb.climb):.1f}, idle"
-        f" {math.degrees(flown.idle.climb):.1f} degrees; {flown.slowest.airspeed:.2f} to {flown.fastest.airspeed:.2f} m/s"
-    )
+    climb, sink = math.degrees(flown.climb.climb), math.degrees(flown.idle.climb)
+    slow, fast = flown.slowest.airspeed, flown.fastest.airspeed
+    print(f"{name}: level {flown.level}\n  climb {climb:.1f}, idle {sink:.1f} degrees; {slow:.2f} to {fast:.2f} m/s")
     (folder / "gains.toml").write_text(gains_text(gains_of_model(aircraft, fdm)), encoding="utf-8")
     (folder / "ardupilot.parm").write_text(arduplane_parameters(aircraft, flown, fdm, {}), encoding="utf-8")
     (folder / "ardupilot.toml").write_text(servo_text(aircraft, flown), encoding="utf-8")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.terminal.arguments import aircraft_words, completed, files
-from planfly.terminal.command_parser import LineParser
+from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call, result_options
 from planfly.terminal.output import give_answer
@@ -25,19 +25,8 @@ if TYPE_CHECKING:
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
 _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
 _SHEET = (
-    "mass",
-    "span",
-    "area",
-    "cruise",
-    "stall",
-    "top",
-    "bank",
-    "climb",
-    "battery",
-    "motor",
-    "prop",
-    "layout",
-    "fuel",
+    *("mass", "span", "area", "cruise", "stall", "top", "bank", "climb"),
+    *("battery", "motor", "prop", "layout", "fuel"),
 )
 # Wind of the ground slopes that are shown, m/s.
 _WIND = 10.0
@@ -66,6 +55,28 @@ def aircraft_options(line: LineParser) -> None:
         ),
         aircraft_words,
     )
+    _sheet_options(parser)
+    logs = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
+    completed(
+        logs.add_argument(
+            "--identify", dest="logs", metavar="LOG.BIN", nargs="+", help="logs of ArduPlane to identify it from"
+        ),
+        files(".bin", ".BIN"),
+    )
+    completed(
+        logs.add_argument(
+            "--base", metavar="NAME", help="with --identify: the aircraft that it is most like (default: aerosonde)"
+        ),
+        aircraft_words,
+    )
+    completed(
+        logs.add_argument("--check", metavar="LOG.BIN", help="with --identify: another log, to replay with the model"),
+        files(".bin", ".BIN"),
+    )
+    result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced); of --identify, the folder")
+
+
+def _sheet_options(parser: CommandParser) -> None:
     sheet = parser.group("a data sheet: with --new; mass, span, cruise and stall are needed, the rest is guessed")
     numbers = {
         "mass": ("KG", "mass, 0.5 to 25 kg"),
@@ -87,24 +98,6 @@ def aircraft_options(line: LineParser) -> None:
     sheet.add_argument(
         "--params", metavar="FILE", help="ArduPlane's parameters: what they say of the aircraft is taken"
     )
-    logs = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
-    completed(
-        logs.add_argument(
-            "--identify", dest="logs", metavar="LOG.BIN", nargs="+", help="logs of ArduPlane to identify it from"
-        ),
-        files(".bin", ".BIN"),
-    )
-    completed(
-        logs.add_argument(
-            "--base", metavar="NAME", help="with --identify: the aircraft that it is most like (default: aerosonde)"
-        ),
-        aircraft_words,
-    )
-    completed(
-        logs.add_argument("--check", metavar="LOG.BIN", help="with --identify: another log, to replay with the model"),
-        files(".bin", ".BIN"),
-    )
-    result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced); of --identify, the folder")
 
 
 def aircraft(args: argparse.Namespace) -> int:
