@@ -38,8 +38,10 @@ _METRES_A_RADIAN = math.degrees(METRES_A_DEGREE)
 # The parser looks for each key as it stands here: no blanks.
 _ANSWER = (
     b'\n{"timestamp":%.6f,"imu":{"gyro":[%.7f,%.7f,%.7f],"accel_body":[%.6f,%.6f,%.6f]},'
-    b'"position":[%.4f,%.4f,%.4f],"attitude":[%.7f,%.7f,%.7f],"velocity":[%.5f,%.5f,%.5f],"airspeed":%.5f}\n'
+    b'"position":[%.4f,%.4f,%.4f],"attitude":[%.7f,%.7f,%.7f],"velocity":[%.5f,%.5f,%.5f],"airspeed":%.5f'
 )
+_BATTERY = b',"battery":{"voltage":%.3f,"current":%.4f}'
+_END = b"}\n"
 
 
 class ServoPacket(NamedTuple):
@@ -98,13 +100,15 @@ def parse_servo_packet(data: bytes) -> ServoPacket:
     return ServoPacket(numbers[2], numbers[3:])
 
 
-def encode_motion(motion: BodyMotion | tuple[float, ...]) -> bytes:
+def encode_motion(motion: BodyMotion | tuple[float, ...], battery: tuple[float, float] | None = None) -> bytes:
     r"""The datagram that tells the autopilot how the aircraft moves.
+
+    battery: its volts and amperes; None for an aircraft without one.
 
     >>> encode_motion(BodyMotion(0.5, *[0.0] * 5, -9.81, *[0.0] * 9, 25.0))[:44]
     b'\n{"timestamp":0.500000,"imu":{"gyro":[0.0000'
     """
-    return _ANSWER % motion
+    return _ANSWER % motion + (b"" if battery is None else _BATTERY % battery) + _END
 
 
 def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -> tuple[float, float]:
@@ -473,12 +477,22 @@ class Lockstep:
         self.error = _NO_ERROR
         access = fdm.loop_access()
         self._access: LoopAccess = access
+        # An aircraft that burns fuel has no volts.
+        self._volts = fdm.aircraft.battery_voltage
+        self._current = access.getters["current"], float(access.factors["current"][0])
         self._motion = [(access.getters[name], float(access.factors[name][0])) for name in _MOTION]
 
     @property
     def time(self) -> float:
         """Time of the exchange, s."""
         return self._frame / FRAME_HZ
+
+    def _battery(self) -> tuple[float, float] | None:
+        """Volts and amperes of the battery; its volts stay what they are."""
+        if not self._volts:
+            return None
+        current, factor = self._current
+        return self._volts, current() * factor
 
     def hold(self, rail: RailEnd, pushed: float = 0.0) -> None:
         """One frame on the rail, ``pushed`` s after the push began."""
@@ -494,7 +508,8 @@ class Lockstep:
                     velocity_north=motion.velocity_north + v_north,
                     velocity_east=motion.velocity_east + v_east,
                     velocity_down=motion.velocity_down - v_up,
-                )
+                ),
+                (self._volts, 0.0) if self._volts else None,
             )
         )
 
@@ -513,7 +528,8 @@ class Lockstep:
                     *(self._next_time(), p, q, r, *self._fdm.specific_force()),
                     *(north + dn, east + de, home_amsl - amsl - du),
                     *(roll, pitch, yaw, vn + dvn, ve + dve, vd - dvu, airspeed),
-                )
+                ),
+                self._battery(),
             )
         )
 

@@ -204,12 +204,11 @@ def _die_with_parent() -> None:
 SIMULATION = {
     # As often as JSBSim steps.
     "SIM_RATE_HZ": 120.0,
-    # No radio, no battery monitor, no terrain data, and no other serial ports: nothing of these fails.
+    # No radio, no terrain data, and no other serial ports: nothing of these fails.
     "FLTMODE_CH": 0.0,
     "THR_FAILSAFE": 0.0,
     "FS_SHORT_ACTN": 3.0,
     "FS_LONG_ACTN": 0.0,
-    "BATT_MONITOR": 0.0,
     "TERRAIN_ENABLE": 0.0,
     "SERIAL1_PROTOCOL": -1.0,
     "SERIAL2_PROTOCOL": -1.0,
@@ -227,6 +226,10 @@ SIMULATION = {
         [f"SR0_{name}" for name in ("RAW_SENS", "EXT_STAT", "RC_CHAN", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3")], 0.0
     ),
 }
+# The battery's volts and amperes are measured, so that its log has them (BAT); how empty it is ends no flight: the
+# verdict judges energy.
+_MEASURED = {"BATT_MONITOR": 4.0, "BATT_FS_LOW_ACT": 0.0, "BATT_FS_CRT_ACT": 0.0, "BATT_LOW_VOLT": 0.0}
+_UNMEASURED = {"BATT_MONITOR": 0.0}
 # A person's parameters that say how an aircraft flies begin so; others belong to the hardware that they were read from.
 FLYING = (
     *("NAVL1_", "WP_", "TECS_", "AIRSPEED_", "ROLL_LIMIT_DEG", "PTCH_", "RLL_", "YAW_", "YAW2SRV_", "KFF_", "THR_"),
@@ -257,7 +260,8 @@ def autopilot_parameters(
 
     The mission's speed is the cruise speed, unless the person has one.
     """
-    base = SIMULATION | servos.parameters() | load_aircraft_parameters(aircraft)
+    battery = _MEASURED if aircraft.battery_voltage else _UNMEASURED
+    base = SIMULATION | battery | servos.parameters() | load_aircraft_parameters(aircraft)
     base["AIRSPEED_CRUISE"] = setup.airspeed
     flying = {name: value for name, value in own.items() if name.startswith(FLYING)}
     changed = {name: value for name, value in flying.items() if base.get(name) != value}

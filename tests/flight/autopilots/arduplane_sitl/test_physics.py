@@ -82,6 +82,14 @@ def test_an_answer_is_one_json_object_between_line_ends() -> None:
     }
 
 
+def test_an_answer_has_the_battery_where_there_is_one() -> None:
+    data = encode_motion(MOTION, (44.4, 12.3456))
+    assert json.loads(data)["battery"] == {"voltage": 44.4, "current": 12.3456}
+    assert json.loads(data)["airspeed"] == 25.5
+    assert b" " not in data
+    assert data.count(b"\n") == 2
+
+
 def test_small_numbers_keep_their_form() -> None:
     assert re.search(rb"\de", encode_motion(BodyMotion(*[1e-9] * 17))) is None
 
@@ -435,6 +443,18 @@ def test_a_step_tells_the_motion_of_a_trimmed_flight(exchange: Exchange) -> None
     assert told["imu"]["accel_body"] == pytest.approx(up.tolist(), abs=0.03)
     # Into the wind from the left.
     assert yaw == pytest.approx(math.pi / 2.0 - math.asin(4.0 / 25.0), abs=1e-3)
+
+
+def test_the_batterys_volts_and_amperes_are_told(exchange: Exchange) -> None:
+    exchange.lockstep.hold(rail_end(exchange.fdm.read(), (-4.0, 0.0, 0.0)))
+    exchange.fdm.write(exchange.trim.commands())
+    exchange.lockstep.step()
+    resting, flying = (told["battery"] for told in exchange.port.told)
+    assert resting == {"voltage": 44.4, "current": 0.0}
+    assert flying["voltage"] == 44.4
+    # The book's drag at 25 m/s takes some 190 W of thrust; propeller and motor lose half of what they get.
+    assert 200.0 < 44.4 * flying["current"] < 500.0
+    assert 44.4 * flying["current"] == pytest.approx(float(exchange.fdm.read().power), rel=1e-3)
 
 
 def test_a_loop_flies_on_the_controls_that_are_asked_for(exchange: Exchange) -> None:

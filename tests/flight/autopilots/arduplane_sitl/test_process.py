@@ -40,6 +40,14 @@ def test_the_simulations_the_servos_and_the_aircrafts_are_all_given() -> None:
     assert (found.changed, found.unused) == ({}, ())
 
 
+@pytest.mark.parametrize(("name", "monitor"), [("aerosonde", 4.0), ("c172x", 0.0)])
+def test_the_battery_is_measured_where_there_is_one(name: str, monitor: float) -> None:
+    aircraft = load_aircraft(name)
+    given = autopilot_parameters(setup_at(), aircraft, load_servo_map(aircraft), {}).given
+    assert given["BATT_MONITOR"] == monitor
+    assert given.get("BATT_FS_LOW_ACT", 0.0) == 0.0
+
+
 def test_the_missions_speed_is_the_cruise_speed_unless_the_person_has_one() -> None:
     assert autopilot_parameters(setup_at(22.0), AEROSONDE, SERVOS, {}).given["AIRSPEED_CRUISE"] == 22.0
     own = {"AIRSPEED_CRUISE": 23.0}
