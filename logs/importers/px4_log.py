@@ -20,6 +20,7 @@ from flight.mission.items import Home, Mission, MissionItem, item_problem, on_gr
 from flight.simulation.setup import Damage
 from logs.importers.dataflash_frames import MappedFile, pieces
 from logs.importers.logged_missions import px4_items, px4_state, without_gaps
+from logs.importers.px4_formats import MessageFormats
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.address_space import AddressSpaceError
 from world.errors import LogError
@@ -51,8 +52,8 @@ def read_px4(path: Path) -> RawLog:
     try:
         # It complains on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
-            found = ULog(_Steps(file), _TOPICS, disable_str_exceptions=True)
-    except AddressSpaceError:
+            found = ULog(_Steps(file, str(path)), _TOPICS, disable_str_exceptions=True)
+    except (AddressSpaceError, LogError):
         raise
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory", file=path) from None
@@ -62,17 +63,25 @@ def read_px4(path: Path) -> RawLog:
 
 
 class _Steps:
-    """A file in which a step back from a read that met the end is as long as what was read.
+    """A file in which a step back from a read that met the end is as long as what was read, and formats are counted.
 
-    pyulog steps back by what a record claims to be, and would read the end of a damaged file again and again.
+    pyulog steps back by what a record claims to be, and would read the end of a damaged file again and again; it reads
+    a record's three bytes of length and letter, and then its content.
     """
 
-    def __init__(self, file: BinaryIO) -> None:
-        self._file, self._missing = file, 0
+    def __init__(self, file: BinaryIO, source: str) -> None:
+        self._file, self._missing, self._letter = file, 0, b""
+        self._formats = MessageFormats(source)
 
     def read(self, size: int) -> bytes:
         data = self._file.read(size)
         self._missing = size - len(data)
+        if self._letter == b"F":
+            self._formats.state(data.decode("utf-8", "replace"))
+        elif self._letter == b"A":
+            # After the topic's instance and number.
+            self._formats.hold(data[3:].decode("utf-8", "replace"))
+        self._letter = data[2:] if size == 3 and not self._letter else b""
         return data
 
     def seek(self, offset: int, whence: int = 0) -> int:
@@ -323,7 +332,9 @@ class _Topics:
         return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
 
     def _parameters(self) -> dict[str, float]:
-        return {str(name): float(value) for name, value in self._log.initial_parameters.items()}
+        known = self._log.initial_parameters.items()
+        # A damaged one may be a text.
+        return {str(name): float(value) for name, value in known if isinstance(value, int | float)}
 
     def _program(self) -> str:
         info = self._log.msg_info_dict

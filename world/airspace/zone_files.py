@@ -330,22 +330,17 @@ def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) 
     source: names the scenario in messages.  base: folder that relative paths count from.  Raises ScenarioError as
     `read_zone_file` does, and for more zones than a scenario may have.
     """
-    tables = []
+    tables: list[ZoneTable] = []
     for file in [files] if isinstance(files, str) else files:
-        tables += read_zone_file(Path(base or "", file), f"{source}: zones_file: {file}")
-    if len(tables) > MAX_ZONES:
-        raise ScenarioError(
-            f"{source}: zones_file: {len(tables):,} zones in all: at most {MAX_ZONES:,}",
-            file=source,
-            field="zones_file",
-        )
+        tables += read_zone_file(Path(base or "", file), f"{source}: zones_file: {file}", MAX_ZONES - len(tables))
     return tables
 
 
-def read_zone_file(path: Path, source: str) -> list[ZoneTable]:
+def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> list[ZoneTable]:
     """Read the zones of a file, in the format of its suffix.
 
-    source: names it in messages.  Raises ScenarioError for a file that cannot be read, and for a zone that is none.
+    source: names it in messages.  most: zones that it may have.  Raises ScenarioError for a file that cannot be read,
+    for one zone more than that, and for a zone that is none.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -361,8 +356,11 @@ def read_zone_file(path: Path, source: str) -> list[ZoneTable]:
         allowed = f"a file of zones is {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         message = f"{source}: suffix {path.suffix!r}: {allowed}"
         raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
-    tables = []
+    tables: list[ZoneTable] = []
     for where, entries in reader(_text(path, source), source):
+        if len(tables) >= most:
+            message = f"{source}: more zones than may be: at most {MAX_ZONES:,} in all files"
+            raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
         tables.append(_table(entries, f"{source}: {where}"))
     if not tables:
         raise ScenarioError(f"{source}: there is no zone in it", file=source)

@@ -73,13 +73,18 @@ EVERY = {
 assert list(EVERY) == [command.name for command in COMMANDS]
 
 
-def make_inputs(folder: Path, flight: Path, broken: Path) -> Path:
-    """Make the files that the commands read.  flight, broken: the fixtures."""
+def make_inputs(folder: Path, flight: Path, broken: Path, *, imported: bool) -> Path:
+    """Make the files that the commands read.
+
+    flight, broken: the fixtures.  imported: whether an imported log is to be there, too, which refly reads.
+    """
     folder.mkdir()
     (folder / "field.toml").write_text(FIELD, encoding="utf-8")
     (folder / "short.waypoints").write_text(SHORT, encoding="ascii")
     for path in (flight / "flight.mcap", flight / "plan.json", broken, FLIGHTS / "tight.BIN"):
         shutil.copy(path, folder)
+    if not imported:
+        return folder
     subprocess.run(
         [sys.executable, "-m", "planfly", "import", "tight.BIN", "imported.mcap"], cwd=folder, check=False,
         capture_output=True, env=os.environ | {"PYTHONPATH": str(ROOT)},

@@ -35,7 +35,7 @@ MOUNTS = _may_mount()
 
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory: pytest.TempPathFactory, flight: Path, broken: Path) -> Path:
-    return make_inputs(tmp_path_factory.mktemp("every") / "inputs", flight, broken)
+    return make_inputs(tmp_path_factory.mktemp("every") / "inputs", flight, broken, imported=SOAK)
 
 
 def some(*names: str) -> pytest.MarkDecorator:
@@ -67,7 +67,7 @@ def limited(which: int, most: int) -> Callable[[], None]:
     return lambda: resource.setrlimit(which, (most, most))
 
 
-@some("run", "fly", "serve", "import", "campaign", "help")
+@some("fly", "import")
 def test_600_mb_of_address_space(name: str, inputs: Path, tmp_path: Path) -> None:
     """Most libraries together are larger; OpenBLAS, for one, would never return."""
     given, folder = EVERY[name], tmp_path / "work"
@@ -79,7 +79,7 @@ def test_600_mb_of_address_space(name: str, inputs: Path, tmp_path: Path) -> Non
     whole(folder, inputs)
 
 
-@some("campaign", "serve", "export")
+@some("campaign")
 def test_32_descriptors(name: str, inputs: Path, tmp_path: Path) -> None:
     given, folder = EVERY[name], tmp_path / "work"
     shutil.copytree(inputs, folder)
@@ -107,7 +107,7 @@ def full_disk(folder: Path, inputs: Path) -> Iterator[Callable[[], None] | None]
         subprocess.run(["umount", str(folder)], check=True)
 
 
-@some("plan", "export", "check", "recover", "help")
+@some("export", "check")
 def test_a_full_disk(name: str, inputs: Path, tmp_path: Path) -> None:
     given, folder = EVERY[name], tmp_path / "full"
     with full_disk(folder, inputs) as change:
@@ -124,7 +124,7 @@ READ_ONLY = 'mount --make-rprivate / && mount --bind . . && mount -o remount,ro,
 NOWHERE = {"HOME": "/nonexistent", "NUMBA_CACHE_DIR": "/proc/none", "XDG_CACHE_HOME": "/proc/none"}
 
 
-@some("recover", "scenarios", "help", "completion")
+@some("recover", "help")
 def test_no_home_and_nothing_to_write(name: str, inputs: Path, tmp_path: Path) -> None:
     """A service account on a read-only install: each command runs; kernels are compiled for it alone."""
     given, folder = EVERY[name], tmp_path / "work"

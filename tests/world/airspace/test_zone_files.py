@@ -1,12 +1,15 @@
 """What files state of a zone: our own keys, openAIP's limits in both of its spellings, and what is refused."""
 
 import json
+import time
+import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.world.made.made_scenario import SMALL
+from world.airspace import zone_files
 from world.airspace.zone_files import FLIGHT_LEVEL_ERROR, MAX_BYTES, geojson_zones, kml_zones, zone_entries
 from world.airspace.zones import Cylinder, Polygon
 from world.errors import PlanflyError, ScenarioError
@@ -363,3 +366,50 @@ def test_a_bad_file_is_refused_by_its_name(name: str, tmp_path: Path) -> None:
     assert message.startswith(f"{tmp_path / 'small.toml'}: ")
     assert message.isprintable()
     assert wanted in message
+
+
+# ----------------------------------------------------------------------
+# A million zones: no more are read than a scenario may have, in all its files.
+
+
+@pytest.mark.parametrize("suffix", ["geojson", "kml"])
+def test_no_more_zones_are_made_than_a_scenario_may_have(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = json.dumps(LAKE) if suffix == "geojson" else placemark(polygon())
+    for name, count in (("a", 3), ("b", 2)):
+        parts = [one] * count
+        text = f'{{"type": "FeatureCollection", "features": [{",".join(parts)}]}}'
+        (tmp_path / f"{name}.{suffix}").write_text(text if suffix == "geojson" else document(*parts))
+    made: list[str] = []
+    monkeypatch.setattr(zone_files, "MAX_ZONES", 4)
+    monkeypatch.setattr(zone_files, "_table", lambda _, where: made.append(where))
+    files = [f"{name}.{suffix}" for name in "ab"]
+    with pytest.raises(ScenarioError) as caught:
+        zone_files.read_zone_files(files, "s.toml", tmp_path)
+    assert str(caught.value) == f"s.toml: zones_file: b.{suffix}: more zones than may be: at most 4 in all files"
+    assert len(made) == 4
+
+
+def test_a_million_of_each_is_a_line_at_once(tmp_path: Path) -> None:
+    """Threats and zones of a scenario, and a file of zones: beyond what is read, by their size alone."""
+    threat = '[[threats]]\nname="t"\neast_m=0\nnorth_m=0\namsl_m=5\nkill_radius_m=1\nkill_scale_m=5\n'
+    started = time.process_time()
+    for name, text in (("t.toml", SMALL + threat * 10**6), ("z.toml", SMALL + OWN * 10**6)):
+        (tmp_path / name).write_text(text)
+        with pytest.raises(ScenarioError, match="bytes: a scenario file has at most 16,777,216"):
+            load_scenario(str(tmp_path / name))
+    for name in ("z.geojson", "z.kml"):
+        (tmp_path / name).write_text(" " * 10**8)
+        with pytest.raises(ScenarioError, match="bytes: a file of zones has at most 16,777,216"):
+            zone_files.read_zone_file(tmp_path / name, name)
+    assert time.process_time() - started < 2.0
+
+
+@pytest.mark.parametrize("what", ["threats", "zones"])
+def test_more_threats_and_zones_than_20000_are_a_line(what: str) -> None:
+    spec = tomllib.loads(SMALL)
+    spec[what] = [{}] * 20_001
+    with pytest.raises(ScenarioError, match=rf"^s: {what}: .*20,?000") as caught:
+        from_spec(spec, "s")
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,74 @@
+"""How many fields the message formats of a PX4 log come to, counted before pyulog makes them.
+
+A format may hold others, and arrays of them (PX4, "ULog File Format", Message Format): forty that hold the next one
+twice are a kilobyte and 2^40 fields.  pyulog makes every field of a topic when the log says that it holds the topic.
+"""
+
+import re
+from collections.abc import Iterator
+
+from world.errors import LogError
+
+# Fields of all topics of a log at most: PX4's own have some 30,000.
+MAX_FIELDS = 300_000
+_FIELD = re.compile(r"(\w+)(?:\[(\d{1,9})\])? ")
+_PLAIN = frozenset(f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)) | {
+    "float", "double", "bool", "char",
+}  # fmt: skip
+
+
+class MessageFormats:
+    """The formats that a log has stated so far, and the fields of the topics that it has said to hold.
+
+    source: names the log in messages.
+    """
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._formats: dict[str, list[tuple[str, int]]] = {}
+        self._counts: dict[str, int] = {}
+        self._total = 0
+
+    def state(self, text: str) -> None:
+        """Take a format in: its name, a colon, and its fields.
+
+        >>> formats = MessageFormats("a.ulg")
+        >>> formats.state("wind:uint64_t timestamp;float[3] wind;")
+        >>> formats.fields("wind")
+        4
+        """
+        name, _, fields = text.partition(":")
+        self._formats[name] = list(_types(fields))
+        self._counts.clear()
+
+    def hold(self, name: str) -> None:
+        """Note that the log holds a topic of this format.  Raises LogError for more fields than a log may have."""
+        self._total += self.fields(name)
+        if self._total > MAX_FIELDS:
+            words = f"the formats of its messages come to more than {MAX_FIELDS:,} fields"
+            raise LogError(f"{self._source}: not a PX4 log that can be read: {words}", file=self._source)
+
+    def fields(self, name: str) -> int:
+        """Fields of a format, those that it nests included; more than `MAX_FIELDS` where it holds itself."""
+        return self._count(name, frozenset())
+
+    def _count(self, name: str, within: frozenset[str]) -> int:
+        if name in _PLAIN or name not in self._formats:
+            return 1
+        if name in within:
+            return MAX_FIELDS + 1
+        if name not in self._counts:
+            inside, total = within | {name}, 0
+            for kind, number in self._formats[name]:
+                total += number * self._count(kind, inside)
+                if total > MAX_FIELDS:
+                    break
+            self._counts[name] = total
+        return self._counts[name]
+
+
+def _types(fields: str) -> Iterator[tuple[str, int]]:
+    """Type and number of each field; of an array its length."""
+    for field in fields.split(";"):
+        if found := _FIELD.match(field):
+            yield found[1], int(found[2] or 1)
