@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft, load_aircraft
-from benchmarks.tuning.tune_gains import DIGITS, REPORTED, SEARCHED, TRAINED, model_gains, rounded, search, start, write
+from benchmarks.tuning.tune_gains import DIGITS, REPORTED, SEARCHED, TRAINED, rounded, search, write
 from benchmarks.tuning.tuning_missions import Case, cases
 from flight.guidance.gains import Gains, load_gains
+from flight.guidance.model_gains import airframe_gains, at_airspeed
 from tests.setups import setup_maker, standard
 
 NAMES = sorted(TRAINED)
@@ -39,8 +40,11 @@ def test_the_missions_are_of_every_kind_and_not_those_reported_on(name: str) -> 
 
 def test_the_search_finds_the_least_and_does_so_again() -> None:
     aircraft = load_aircraft("aerosonde")
-    begun = replace(load_gains(aircraft), **start(aircraft))
-    best = {name: value * (1.0 + 0.4 * math.sin(k)) for k, (name, value) in enumerate(start(aircraft).items())}
+    begun = replace(load_gains(aircraft), **at_airspeed(aircraft.airspeed))
+    best = {
+        name: value * (1.0 + 0.4 * math.sin(k))
+        for k, (name, value) in enumerate(at_airspeed(aircraft.airspeed).items())
+    }
 
     def far(gains: Gains) -> float:
         return 1.0 + sum(math.log(getattr(gains, name) / value) ** 2 for name, value in best.items())
@@ -56,7 +60,7 @@ def test_the_search_finds_the_least_and_does_so_again() -> None:
 def test_what_is_written_is_what_is_read(tmp_path: Path) -> None:
     aircraft = load_aircraft("aerosonde")
     shutil.copy(aircraft.folder / "gains.toml", tmp_path)
-    chosen = rounded(replace(load_gains(aircraft), **start(aircraft)))
+    chosen = rounded(replace(load_gains(aircraft), **at_airspeed(aircraft.airspeed)))
     write(replace(aircraft, folder=tmp_path), chosen, 3, 7)
     again = load_gains(replace(aircraft, folder=tmp_path))
     assert asdict(again) == pytest.approx(asdict(chosen), rel=10.0**-DIGITS)
@@ -67,6 +71,6 @@ def test_what_is_written_is_what_is_read(tmp_path: Path) -> None:
 def test_the_airframes_own_gains_are_off_its_model(name: str) -> None:
     aircraft = load_aircraft(name)
     gains = load_gains(aircraft)
-    for key, value in model_gains(aircraft).items():
+    for key, value in airframe_gains(aircraft).items():
         assert getattr(gains, key) == pytest.approx(value, rel=1e-3), key
     assert f"tune_gains {name} --rounds" in (aircraft.folder / "gains.toml").read_text(encoding="utf-8")
