@@ -2,7 +2,9 @@
 
 import itertools
 import os
+import re
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -15,11 +17,14 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live import link
 from logs.recording.reader import read_log
+from planfly.campaigns.tables import read_table
 from planfly.cli import main
 from planfly.commands import replay
 from tests.flight.live.fake_vehicle import KEY
 from tests.logs.made_flight import make_setup, make_track, record
-from tests.planfly.conftest import Served
+from tests.planfly.conftest import FIELD, Served
+from tests.planfly.misuse.every_command import SHORT
+from tests.soak import SOAK
 from tests.stations import UdpStation, item
 
 LAT, LON = 460_000_000, 80_000_000
@@ -120,3 +125,64 @@ def test_a_served_flight_survives_a_clock_set_back(
     log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
     assert log.complete
     assert np.allclose(np.diff(log.track.time), 1.0 / 60.0, atol=1e-6)
+
+
+# A wall clock that an hour is taken from where one file is there, and a day added where another is.
+SET = """
+import os, time
+real = time.time
+time.time = lambda: real() - 3600.0 * os.path.exists({back!r}) + 86400.0 * os.path.exists({forth!r})
+"""
+FLIGHTS = 40
+
+
+@pytest.mark.skipif(not SOAK, reason="half a minute; set PLANFLY_SOAK=1")
+def test_a_campaign_survives_a_clock_that_is_set_back_and_forth(tmp_path: Path) -> None:
+    """Of its client, its scheduler and its workers: no flight is lost, and none took an hour."""
+    for name in ("site", "out"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")
+    (tmp_path / "short.waypoints").write_text(SHORT, encoding="ascii")
+    back, forth = tmp_path / "back", tmp_path / "forth"
+    (tmp_path / "site" / "sitecustomize.py").write_text(SET.format(back=str(back), forth=str(forth)), encoding="utf-8")
+    argv = ["campaign", "short.waypoints", "--scenario", "field.toml", "--flights", str(FLIGHTS), "--workers", "2"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "planfly", *argv, "--out", "out", "--overwrite"], cwd=tmp_path, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), *filter(None, sys.path)])},
+    )  # fmt: skip
+    until = time.monotonic() + 300.0
+    for flag in (back, forth, back):
+        begun = logged(tmp_path / "out")
+        while process.poll() is None and logged(tmp_path / "out") < begun + 20_000:
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        assert process.poll() is None, "it was over before its clock was set"
+        flag.unlink() if flag.exists() else flag.touch()
+    said, _ = process.communicate(timeout=300.0)
+    assert process.returncode in (0, 3, 4), said
+    assert "Traceback" not in said
+    table = read_table(tmp_path / "out" / "campaign.sqlite")
+    assert len(table["flight"]) == FLIGHTS
+    assert "lost" not in table["outcome"].tolist()
+    assert 0.0 < table["seconds"].min() <= table["seconds"].max() < 60.0
+
+
+def logged(folder: Path) -> int:
+    """Bytes of the log of a table's rows, which nobody else can read meanwhile: 4 kB or more each."""
+    log = folder / "campaign.sqlite-wal"
+    return log.stat().st_size if log.exists() else 0
+
+
+def test_durations_are_taken_from_clocks_that_nobody_sets() -> None:
+    """The wall clock is read where a station is told the time, and nowhere else."""
+    root = Path(__file__).parents[3]
+    found = [
+        path.relative_to(root).as_posix()
+        for package in ("aircraft", "flight", "logs", "planfly", "planner", "world")
+        for path in sorted((root / package).rglob("*.py"))
+        if re.search(
+            r"\btime\.time(_ns)?\(|from time import .*\btime\b|datetime\.(now|utcnow|today)\(", path.read_text("utf-8")
+        )
+    ]
+    assert found == ["flight/live/vehicle.py", "planfly/replays/live.py"]

@@ -137,3 +137,19 @@ def test_no_home_and_nothing_to_write(name: str, inputs: Path, tmp_path: Path) -
     assert not any("Traceback" in line for line in done.lines), done.lines
     note("every command: no home, read-only", **{name: done.code})
     whole(folder, inputs)
+
+
+def _on_one_processor() -> None:
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system binds no process to a processor")
+@some("help")
+def test_one_processor(name: str, inputs: Path, tmp_path: Path) -> None:
+    """Nothing waits for another process to have one of its own."""
+    given, folder = EVERY[name], tmp_path / "work"
+    shutil.copytree(inputs, folder)
+    done = give(given, folder, change=_on_one_processor)
+    assert done.code in given.codes, (done.code, done.lines)
+    note("every command: one processor", **{name: done.code})
+    whole(folder, inputs)
