@@ -32,7 +32,9 @@ _LOGGED_VOLTAGE = 0.25
 # What no model gets right, m/s^2 and A, and over how long it hangs together, s.
 _FORCE_FLOOR, _CURRENT_FLOOR, _FLOOR_SECONDS = 0.015, 0.3, 5.0
 _OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
-_ROUNDS, _STEP = 4, 1e-3
+_STEP = 1e-3
+# Steps of a search at most, and how short the last is, as a share of the prior's standard deviations.
+_MOST_STEPS, _CLOSE = 12, 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,28 +85,51 @@ def fit_drag(signals: Signals, base: BaseModel, values: Floats, flow: Flow) -> t
     nuisances[list(NUISANCES).index("voltage of the battery")] *= _LOGGED_VOLTAGE if with_current else 1.0
     means = np.concatenate([prior_means()[_OWN], np.zeros(len(nuisances))])
     sds = np.concatenate([prior_sds()[_OWN], nuisances])
-    goal, goal_current = thin.smooth(thin.acceleration[:, 0], FORCE_BAND), thin.current
+    # From the forces alone to the two together: with the current at once the first steps lead astray.
+    fit = _search(forces, _Goal(thin, with_current=False), means, sds)
     if with_current:
-        goal_current = thin.smooth(thin.current, FORCE_BAND)
-    floor = _FORCE_FLOOR**2 * _FLOOR_SECONDS * thin.hertz
-    now = means.copy()
-    for _ in range(_ROUNDS):
-        force, current = forces.predicted(now)
-        rows, second = forces.slopes(now)
-        goals, blocks = goal - force + rows @ now, thin.block
-        if with_current:
-            # Both count by the scatter of their residuals.
-            off = max(_CURRENT_FLOOR, float((goal_current - current).std()))
-            scale = max(_FORCE_FLOOR, float((goal - force).std())) / off
-            rows = np.vstack([rows, scale * second])
-            goals = np.concatenate([goals, scale * (goal_current - current + second @ now)])
-            blocks = np.concatenate([blocks, blocks])
-        fit = fit_with_prior(rows, goals, means, sds, blocks, floor)
-        now = fit.estimate
-    force, _ = forces.predicted(now)
+        fit = _search(forces, _Goal(thin, with_current=True), means, sds, fit.estimate)
+    force, _ = forces.predicted(fit.estimate)
+    goal = thin.smooth(thin.acceleration[:, 0], FORCE_BAND)
     explained = 1.0 - float((goal - force).var() / goal.var())
     own = int(_OWN.sum())
-    return Fit(now, fit.covariance, force, goal - force, explained), now[:own], fit.covariance[:own, :own]
+    return (
+        Fit(fit.estimate, fit.covariance, force, goal - force, explained),
+        fit.estimate[:own],
+        fit.covariance[:own, :own],
+    )
+
+
+class _Goal:
+    """What is measured: forward acceleration and, with the current, that; (n,) low-passed."""
+
+    def __init__(self, signals: Signals, *, with_current: bool) -> None:
+        self.force = signals.smooth(signals.acceleration[:, 0], FORCE_BAND)
+        self.current = signals.smooth(signals.current, FORCE_BAND) if with_current else None
+        self.block, self.floor = signals.block, _FORCE_FLOOR**2 * _FLOOR_SECONDS * signals.hertz
+
+
+def _search(forces: _Forces, goal: _Goal, means: Floats, sds: Floats, start: Floats | None = None) -> Fit:
+    """Steps of Gauss and Newton from a start, none longer than a standard deviation of the prior."""
+    now = means.copy() if start is None else start.copy()
+    for _ in range(_MOST_STEPS):
+        force, current = forces.predicted(now)
+        rows, second = forces.slopes(now)
+        left, blocks = goal.force - force, goal.block
+        goals = left + rows @ now
+        if goal.current is not None:
+            # Both count by the scatter of their residuals.
+            off = max(_CURRENT_FLOOR, float((goal.current - current).std()))
+            scale = max(_FORCE_FLOOR, float(left.std())) / off
+            rows = np.vstack([rows, scale * second])
+            goals = np.concatenate([goals, scale * (goal.current - current + second @ now)])
+            blocks = np.concatenate([blocks, blocks])
+        fit = fit_with_prior(rows, goals, means, sds, blocks, goal.floor)
+        step = np.clip(fit.estimate - now, -sds, sds)
+        now = now + step
+        if np.abs(step / sds).max() < _CLOSE:
+            break
+    return Fit(now, fit.covariance, fit.predicted, fit.residual, fit.explained)
 
 
 def _forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow) -> _Forces:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft
 from aircraft.identification.estimate import Estimate, estimate_model
-from aircraft.identification.flight_record import FlightRecord
+from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from logs.importers.motion_log import MotionLog, read_motion
 from planfly.data_sheets import parse_sheet
 from planfly.first_start import with_warm_up
@@ -17,12 +18,14 @@ from planfly.identification.base_numbers import base_model, scaled
 from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.records import LEAST_HZ, flight_records, log_outputs
-from planfly.identification.replay import Replay, replay_log
+from planfly.identification.replay import QUANTITIES, UNITS, Replay, replay_log
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.stages import stage
 from world.errors import FlightError, PlanflyError
 from world.files import whole_path, write_folder
 from world.scenario_tables import names_folder
+
+Floats = NDArray[np.float64]
 
 # How far from its base an aircraft may be, as a factor of mass and span, before the prior is none.
 _FARTHEST = 1.6
@@ -99,6 +102,8 @@ def identify_aircraft(
         found = make_identified(prior, numbers, estimate, [one for one, _, _ in read], outputs)
         files = folder_files(found, target.name, (volts, energy))
     replays = () if checked is None else _replay(found, files, target.name, checked)
+    with stage("drawing"):
+        files["identify.html"] = _page(found, replays, None if check is None else Path(check).name, target.name)
     write_folder(target, {name: text.encode() for name, text in files.items()})
     return _answer(read_aircraft(target), found, replays)
 
@@ -143,19 +148,49 @@ def _replay(found: Identified, files: dict[str, str], name: str, records: list[F
         return replay_log(found, files, name, records)
 
 
-def _answer(aircraft: Aircraft, found: Identified, replays: tuple[Replay, ...]) -> IdentifiedAircraft:
+def _page(found: Identified, replays: tuple[Replay, ...], checked: str | None, name: str) -> str:
+    from logs.views.report.identification import IdentificationFacts, ReplayedLog, identification_page
+
+    numbers = tuple(
+        (title, unit, *interval)
+        for (title, unit), interval in zip(
+            (("climb at full throttle", "°"), ("sink at idle", "°"), ("power in level flight", "W")),
+            _intervals(found),
+            strict=True,
+        )
+    )
+    replay = None
+    if checked is not None and replays:
+        before, after = replays
+        logged, flown = after.shown
+        rows = tuple(
+            (quantity, unit, before.rms[quantity], after.rms[quantity])
+            for quantity, unit in zip(QUANTITIES, UNITS, strict=True)
+        )
+        replay = ReplayedLog(checked, after.windows, rows, logged, flown, GRID_HZ)
+    logs = tuple((Path(log.source).name, log.sha256) for log in found.logs)
+    return identification_page(IdentificationFacts(name, found.estimate, logs, numbers, replay))
+
+
+Interval = tuple[float, float, float]
+
+
+def _intervals(found: Identified) -> tuple[Interval, Interval, Interval]:
+    """Climb and sink, degrees, and power, W: lower end, estimate and upper end (95 %)."""
     best, drawn = found.performance()
 
-    def interval(value: np.ndarray, draws: np.ndarray, factor: float = 1.0) -> tuple[float, float, float]:
+    def interval(value: Floats, draws: Floats, factor: float = 1.0) -> Interval:
         low, high = np.percentile(draws, [2.5, 97.5])
         return factor * float(low), factor * float(value[0]), factor * float(high)
 
     degrees = math.degrees(1.0)
-    return IdentifiedAircraft(
-        aircraft,
-        found.estimate,
-        climb=interval(best.climb, drawn.climb, degrees),
-        sink=interval(best.sink, drawn.sink, degrees),
-        power=interval(best.power, drawn.power),
-        replays=replays,
+    return (
+        interval(best.climb, drawn.climb, degrees),
+        interval(best.sink, drawn.sink, degrees),
+        interval(best.power, drawn.power),
     )
+
+
+def _answer(aircraft: Aircraft, found: Identified, replays: tuple[Replay, ...]) -> IdentifiedAircraft:
+    climb, sink, power = _intervals(found)
+    return IdentifiedAircraft(aircraft, found.estimate, climb, sink, power, replays)

@@ -1,0 +1,53 @@
+"""Charts of an identification: each equation as measured and as predicted, and a log replayed by the models."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.identification.estimate import Equation
+from logs.views.charts import Chart, Panel, filled_series, series
+
+Floats = NDArray[np.float64]
+# Degrees in place of radians, by unit.
+_SHOWN = {"rad": ("°", 180.0 / np.pi), "rad/s2": ("°/s²", 180.0 / np.pi), "m/s2": ("m/s²", 1.0)}
+
+
+def equation_chart(equation: Equation) -> Chart:
+    """Measured and predicted over the time of all stretches behind each other, and what is left.
+
+    >>> wave = np.sin(np.arange(500) / 20.0)
+    >>> chart = equation_chart(Equation("pitch acceleration", "rad/s2", 25.0, wave, 0.9 * wave, 0.99, 0.1))
+    >>> [panel.title for panel in chart.panels]
+    ['pitch acceleration', 'measured less predicted']
+    """
+    unit, factor = _SHOWN[equation.unit]
+    time = np.arange(len(equation.measured)) / equation.hertz
+    both = (
+        series("measured", "flown", time, factor * equation.measured),
+        series("predicted", "other", time, factor * equation.predicted),
+    )
+    left = filled_series("difference", "difference", time, factor * (equation.measured - equation.predicted))
+    panels = (
+        Panel(equation.name, unit, both, min_span=0.1),
+        Panel("measured less predicted", unit, (left,), limits=(("", 0.0),), min_span=0.1),
+    )
+    return Chart(f"{equation.name}, R² {equation.explained:.3f}", "time of all stretches", "s", panels)
+
+
+def replay_chart(names: Sequence[str], units: Sequence[str], logged: Floats, identified: Floats, hertz: float) -> Chart:
+    """Some windows of a replay behind each other: a panel a quantity.
+
+    names, units: of the k quantities.  logged, identified: (t, k).
+    """
+    time = np.arange(len(logged)) / hertz
+    panels = tuple(
+        Panel(
+            name,
+            unit.replace("deg", "°"),
+            (series("logged", "flown", time, logged[:, k]), series("replayed", "other", time, identified[:, k])),
+            min_span=1.0,
+        )
+        for k, (name, unit) in enumerate(zip(names, units, strict=True))
+    )
+    return Chart("Windows of 5 s of the check log", "time of the windows", "s", panels)

@@ -1,0 +1,143 @@
+"""The page of an identification: how well equations are explained, what each number is, what was not seen."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from aircraft.identification.estimate import Estimate
+from aircraft.identification.parameters import PARAMETERS
+from logs.views.charts import Chart
+from logs.views.figures import draw_pictures, view_json
+from logs.views.identification import equation_chart, replay_chart
+from logs.views.report.page import CHART_SCRIPTS, page_library, picture_address, script_digest, script_text, style_text
+from logs.views.scene import script_json
+
+Floats = NDArray[np.float64]
+_TWO_SIDED = 1.96
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayedLog:
+    """A check log, replayed by both models.
+
+    file: its name.  windows: how many of 5 s.
+    rows: quantity, unit, and root mean squares of both models' errors.
+    logged, replayed: (t, k) of some windows, as the identified model flew them.  hertz: rows a second.
+    """
+
+    file: str
+    windows: int
+    rows: tuple[tuple[str, str, float, float], ...]
+    logged: Floats
+    replayed: Floats
+    hertz: float
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationFacts:
+    """What the page is made of.
+
+    title: the aircraft's.  logs: name and SHA-256 of each.
+    numbers: what it can do: name, unit, lower end, estimate and upper end (95 %).
+    replay: of a check log; None without one.
+    """
+
+    title: str
+    estimate: Estimate
+    logs: tuple[tuple[str, str], ...]
+    numbers: tuple[tuple[str, str, float, float, float], ...]
+    replay: ReplayedLog | None = None
+
+
+class ParameterRow(NamedTuple):
+    """A row of the table, as text; share: of the interval that is the logs', in percent."""
+
+    title: str
+    name: str
+    prior: str
+    estimate: str
+    low: str
+    high: str
+    share: int
+
+
+def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
+    """Every parameter with its prior, its estimate and its 95 % interval."""
+    shares = np.round(100.0 * estimate.of_log()).astype(int).tolist()
+    rows = []
+    for parameter, value, sd, share in zip(
+        PARAMETERS, estimate.values.tolist(), estimate.sds.tolist(), shares, strict=True
+    ):
+        rows.append(
+            ParameterRow(
+                title=parameter.title,
+                name=parameter.property_name,
+                prior=f"{parameter.prior:g} ± {parameter.sd:g}",
+                estimate=f"{value:.3f}",
+                low=f"{value - _TWO_SIDED * sd:.2f}",
+                high=f"{value + _TWO_SIDED * sd:.2f}",
+                share=share,
+            )
+        )
+    return rows
+
+
+def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
+    """What is held fixed, and which parameters move most with one standard deviation of it."""
+    rows = []
+    sds = np.array([parameter.sd for parameter in PARAMETERS])
+    for name, shift in estimate.shifts.items():
+        order = np.argsort(-np.abs(shift / sds))[:count]
+        said = ", ".join(f"{PARAMETERS[k].title} {shift[k]:+.3f}" for k in order.tolist())
+        rows.append((name, said))
+    return rows
+
+
+def identification_page(facts: IdentificationFacts) -> str:
+    """The page, whole: its pictures, charts and scripts inside."""
+    charts = {f"fit-{k}": equation_chart(one) for k, one in enumerate(facts.estimate.equations)}
+    if facts.replay is not None:
+        names, units = [row[0] for row in facts.replay.rows], [row[1] for row in facts.replay.rows]
+        charts["replay"] = replay_chart(names, units, facts.replay.logged, facts.replay.replayed, facts.replay.hertz)
+    pictures = draw_pictures(charts)
+    script = script_text(CHART_SCRIPTS)
+    environment = Environment(
+        loader=PackageLoader("logs.views.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("identification.html").render(
+        facts=facts,
+        minutes=f"{facts.estimate.seconds / 60.0:.1f}",
+        fits=_fits(facts.estimate, charts, pictures),
+        parameters=parameter_rows(facts.estimate),
+        silent=facts.estimate.silent(),
+        shifts=shift_rows(facts.estimate),
+        replay_picture=picture_address(pictures["replay.png"]) if facts.replay is not None else "",
+        style=Markup(style_text("style", "compare", "identification")),
+        scene=Markup(script_json(None)),
+        flight_data=Markup(script_json({"flights": []})),
+        chart_data=Markup(script_json({name: view_json(chart) for name, chart in charts.items()})),
+        library=page_library(),
+        script=Markup(script),
+        script_digest=script_digest(script),
+    )
+
+
+def _fits(
+    estimate: Estimate, charts: Mapping[str, Chart], pictures: Mapping[str, bytes]
+) -> Sequence[tuple[str, str, str, str]]:
+    """Name of the chart, its words, its picture, and how good the fit is."""
+    made = []
+    for k, equation in enumerate(estimate.equations):
+        name = f"fit-{k}"
+        said = f"R² {equation.explained:.3f}; what is left hangs together for {equation.correlation:.2g} s"
+        made.append((name, charts[name].title, picture_address(pictures[f"{name}.png"]), said))
+    return made

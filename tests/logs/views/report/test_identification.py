@@ -1,0 +1,76 @@
+"""The page of an identification: what it says, and that a browser shows it at both widths without a complaint."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.identification.estimate import Equation, Estimate
+from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means, prior_sds
+from logs.views.report.identification import IdentificationFacts, ReplayedLog, identification_page, parameter_rows
+from tests.browser import Browser
+
+WAVE = np.sin(np.arange(2000) / 40.0)
+
+
+def facts() -> IdentificationFacts:
+    """Of made numbers: thrust is half the prior's as wide, and everything else is the prior."""
+    sds = prior_sds()
+    sds[INDEX["thrust"]] *= 0.5
+    values = prior_means()
+    values[INDEX["thrust"]] = 0.85
+    names = (("angle of attack", "rad"), ("forward acceleration", "m/s2"), ("pitch acceleration", "rad/s2"))
+    equations = tuple(Equation(name, unit, 25.0, WAVE, 0.9 * WAVE, 0.99, 0.4) for name, unit in names)
+    shifts = {"airspeed (1 %)": 0.01 * np.eye(len(PARAMETERS))[INDEX["thrust"]]}
+    estimate = Estimate(values, np.diag(sds**2), (), equations, shifts, seconds=600.0)
+    rows = (("roll rate", "deg/s", 3.1, 0.43), ("airspeed", "m/s", 0.65, 0.041))
+    table = np.column_stack([WAVE, 25.0 + WAVE])
+    replay = ReplayedLog("C<1>.BIN", 40, rows, table, 1.02 * table, 50.0)
+    numbers = (("climb at full throttle", "°", 5.8, 7.7, 9.6), ("power in level flight", "W", 380.0, 485.0, 624.0))
+    return IdentificationFacts("mine", estimate, (("A.BIN", "ab" * 32),), numbers, replay)
+
+
+def test_the_share_of_the_log_is_what_it_takes_off_the_priors_variance() -> None:
+    rows = {row.name: row for row in parameter_rows(facts().estimate)}
+    thrust = rows["ident/thrust"]
+    assert (thrust.prior, thrust.estimate, thrust.share) == ("1 ± 0.2", "0.850", 75)
+    # 0.85 less and more 1.96 times 0.1.
+    assert (thrust.low, thrust.high) == ("0.65", "1.05")
+    assert rows["ident/lift-slope"].share == 0
+
+
+def test_the_page_says_what_was_found_and_what_was_not() -> None:
+    page = identification_page(facts())
+    for said in (
+        "mine, from 10.0 minutes of flight", "climb at full throttle", "7.7", "not seen in these logs",
+        "battery current (BAT)", "0.041", "R² 0.990", "airspeed (1 %)", "thrust +0.010", "ab" * 32, "C&lt;1&gt;.BIN",
+    ):  # fmt: skip
+        assert said in page, said
+    assert "<1>" not in page
+    # Nothing is asked of a network.
+    assert "http" not in page.partition('<script type="application/json"')[0].replace("http-equiv", "")
+    bare = replace(facts(), replay=None, estimate=replace(facts().estimate, dynamics=False))
+    shown = identification_page(bare)
+    assert "The check" not in shown
+    assert "Performance only" in shown
+
+
+@pytest.mark.parametrize(("width", "height", "phone"), [(1280, 900, False), (390, 840, True)])
+def test_a_browser_shows_it(tmp_path: Path, width: int, height: int, phone: bool) -> None:
+    file = tmp_path / "identify.html"
+    file.write_text(identification_page(facts()), encoding="utf-8")
+    with Browser(tmp_path / "profile", width, height, phone=phone) as browser:
+        browser.open(file)
+        browser.settle()
+        assert browser.value("document.querySelectorAll('.chart').length") == 4
+        browser.value("document.querySelector('.chart').scrollIntoView()")
+        # The library is unpacked first.
+        drawn = "document.querySelector('.chart').dataset.drawn"
+        assert browser.value(
+            f"new Promise(done => {{ const look = () => {drawn} ? done(1) : setTimeout(look, 50); look() }})"
+        )
+        # No part of the page is wider than the screen.
+        assert browser.value("document.documentElement.scrollWidth") <= width
+        assert browser.problems == []
+        assert browser.requests == []
