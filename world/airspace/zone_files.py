@@ -23,10 +23,18 @@ _LIKE_OURS = ("floor", "ceiling", "radius")
 # https://docs.openaip.net, and the results in https://github.com/openAIP/openaip-openair-parser
 _LIMITS = {"lowerLimit": "floor", "lowerCeiling": "floor", "upperLimit": "ceiling", "upperCeiling": "ceiling"}
 _UNITS = {0: 1.0, "M": 1.0, 1: 0.3048, "FT": 0.3048, 6: 30.48, "FL": 30.48}
-_DATUMS = {0: "agl", "GND": "agl", 1: "amsl", "MSL": "amsl", 2: "standard", "STD": "standard"}
+_DATUMS = {
+    0: "agl", "GND": "agl", "AGL": "agl", "SFC": "agl", 1: "amsl", "MSL": "amsl", 2: "standard", "STD": "standard",
+}  # fmt: skip
 # m.  A flight level is a pressure, not a height: between a low of 965 hPa and a high of 1,060 at the sea it lies up to
 # this far below or above where it is at 1,013.25 hPa (27 ft per hPa, ICAO Doc 7488).
 FLIGHT_LEVEL_ERROR = 400.0
+# m.  Heights that a table takes: no flight is beyond them.
+_LOWEST, _HIGHEST = -500.0, 9000.0
+# The FAA's limits in its open data (Class Airspace, Special Use Airspace): LOWER_VAL, LOWER_UOM, LOWER_CODE, and UPPER.
+_FAA = {"LOWER": "lowerLimit", "UPPER": "upperLimit"}
+# A value that is not applicable there.
+_FAA_NONE = -9998.0
 
 
 def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
@@ -40,7 +48,7 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
     {'kind': 'exclusion', 'ceiling_agl_m': 90.0}
     """
     entries: dict[str, Any] = {"kind": "exclusion"}
-    for key, value in properties.items():
+    for key, value in {**_faa_limits(properties, source), **properties}.items():
         if value is None:
             continue
         if key in _LIMITS:
@@ -49,7 +57,26 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
             entries[key] = value
         elif key.lower().startswith(_LIKE_OURS):
             raise ScenarioError.at(source, key, value, f"unknown; known are {', '.join(_OWN)}", shown="")
+    if entries.get("floor_amsl_m") == _HIGHEST:
+        # All of it is above every flight.
+        entries.pop("ceiling_amsl_m", None)
     return entries
+
+
+def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Limits as the FAA writes them, as openAIP's."""
+    found = {}
+    for side, key in _FAA.items():
+        if (value := properties.get(f"{side}_VAL")) is None:
+            continue
+        try:
+            height = float(value)
+        except (TypeError, ValueError) as error:
+            raise ScenarioError.at(source, f"{side}_VAL", value, "a number is expected", shown="") from error
+        if height != _FAA_NONE:
+            unit, datum = properties.get(f"{side}_UOM"), properties.get(f"{side}_CODE")
+            found[key] = {"value": height, "unit": unit, "referenceDatum": datum}
+    return found
 
 
 def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
@@ -74,10 +101,8 @@ def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
         if kind == "inclusion":
             allowed = "a flight level bounds no inclusion; give a height in metres"
             raise ScenarioError.at(source, key, value, allowed, shown="")
-        # Beyond the heights that a table takes there is no flight to bound.
-        wider = metres + (FLIGHT_LEVEL_ERROR if side == "ceiling" else -FLIGHT_LEVEL_ERROR)
-        return {f"{side}_amsl_m": min(9000.0, max(-500.0, wider))}
-    return {f"{side}_{counted}_m": metres}
+        counted, metres = "amsl", metres + (FLIGHT_LEVEL_ERROR if side == "ceiling" else -FLIGHT_LEVEL_ERROR)
+    return {f"{side}_{counted}_m": min(_HIGHEST, max(_LOWEST, metres))}
 
 
 # ----------------------------------------------------------------------

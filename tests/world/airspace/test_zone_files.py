@@ -58,8 +58,9 @@ FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "no value": ({"upperLimit": {"unit": 1, "referenceDatum": 1}}, "upperLimit.value: a number"),
     "a truth": ({"upperLimit": limit(True, 1, 1)}, "upperLimit.value: a number"),
     "a unit": ({"upperLimit": limit(5, 2, 1)}, "upperLimit.unit: allowed 0, M, 1, FT, 6, FL"),
+    "a height of the FAA's": ({"LOWER_VAL": "SFC", "LOWER_UOM": "FT"}, "LOWER_VAL: a number is expected"),
     "a list of units": ({"upperLimit": limit(5, [1], 1)}, "upperLimit.unit: allowed"),
-    "a datum": ({"lowerLimit": limit(5, 1, "QFE")}, "lowerLimit.referenceDatum: allowed 0, GND, 1, MSL, 2, STD"),
+    "a datum": ({"lowerLimit": limit(5, 1, "QFE")}, "lowerLimit.referenceDatum: allowed 0, GND, AGL, SFC, 1, MSL"),
     "a flight level of an inclusion": ({"kind": "inclusion", "upperLimit": limit(65, 6, 2)}, "bounds no inclusion"),
 }
 
@@ -413,3 +414,84 @@ def test_more_threats_and_zones_than_20000_are_a_line(what: str) -> None:
     with pytest.raises(ScenarioError, match=rf"^s: {what}: .*20,?000") as caught:
         from_spec(spec, "s")
     assert "\n" not in str(caught.value)
+
+
+# ----------------------------------------------------------------------
+# Files in the styles of those that publish airspace, made here: openAIP's, the FAA's, EUROCAE's ED-269 of European
+# authorities, OpenAir, and Google Earth's KML.
+
+
+def openaip(upper: tuple[float, str, str], lower: tuple[float, str, str]) -> dict[str, Any]:
+    keys = ("value", "unit", "referenceDatum")
+    limits = {"upperCeiling": dict(zip(keys, upper, strict=True)), "lowerCeiling": dict(zip(keys, lower, strict=True))}
+    return feature("Polygon", [RING], **{"class": "R", "name": "lake", **limits})
+
+
+def faa(upper: tuple[object, str, str], lower: tuple[object, str, str]) -> dict[str, Any]:
+    stated = {"UPPER": upper, "LOWER": lower}
+    parts = {f"{side}_{part}": one[k] for side, one in stated.items() for k, part in enumerate(("VAL", "UOM", "CODE"))}
+    return feature("Polygon", [RING], NAME="LAKE CLASS B", CLASS="B", **parts)
+
+
+# A shelf from 1,500 to 10,000 ft; a range to 40,000 ft, above every flight; from the ground; one above every flight.
+SHELF = {"floor_amsl_m": 457.2, "ceiling_amsl_m": 3048.0}
+PUBLISHED: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
+    "openAIP, a shelf": (openaip((10000, "FT", "MSL"), (1500, "FT", "MSL")), SHELF),
+    "openAIP, a firing range": (openaip((40000, "FT", "MSL"), (0, "FT", "GND")), {"ceiling_amsl_m": 9000.0}),
+    "openAIP, upper airspace": (openaip((660, "FL", "STD"), (330, "FL", "STD")), {"floor_amsl_m": 9000.0}),
+    "FAA, a shelf": (faa((10000, "FT", "MSL"), (1500, "FT", "MSL")), SHELF),
+    "FAA, from the surface": (faa(("4000", "FT", "MSL"), ("0", "FT", "SFC")), {"ceiling_amsl_m": 1219.2}),
+    "FAA, without an upper limit": (faa((-9998, "", ""), (700, "FT", "AGL")), {"floor_agl_m": 213.36}),
+}
+
+
+@pytest.mark.parametrize("case", PUBLISHED)
+def test_limits_as_they_are_published(case: str, tmp_path: Path) -> None:
+    published, limits = PUBLISHED[case]
+    path = tmp_path / "z.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [published]}), encoding="utf-8")
+    (zone,) = zone_files.read_zone_file(path, "z.geojson")
+    found = {name: value for name, value in zone.model_dump().items() if "_m" in name and value is not None}
+    assert found == pytest.approx(limits)
+
+
+ED_269 = {
+    "title": "zones",
+    "features": [
+        {
+            "identifier": "LAKE", "restriction": "PROHIBITED",
+            "geometry": [{"upperLimit": 120, "horizontalProjection": {"type": "Polygon", "coordinates": [RING]}}],
+        }
+    ],
+}  # fmt: skip
+OPENAIR = "AC R\nAN LAKE\nAH 2200ft AMSL\nAL GND\nV X=46:00:00 N 008:00:00 E\nDC 1.10\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("ed269.json", json.dumps(ED_269), "ed269.json: geometry (zone 1): geometry null: a Polygon"),
+        ("lake.txt", OPENAIR, "lake.txt: suffix '.txt': a file of zones is .geojson, .json or .kml"),
+        ("lake.geojson", OPENAIR, "lake.geojson: not valid JSON"),
+        ("lake.kml", OPENAIR, "lake.kml: not valid XML"),
+    ],
+)
+def test_forms_that_are_not_read_are_a_line(name: str, text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    with pytest.raises(ScenarioError) as caught:
+        zone_files.read_zone_file(tmp_path / name, name)
+    assert str(caught.value).startswith(said)
+
+
+def test_a_placemark_of_google_earth_with_its_styles() -> None:
+    """As it saves one: styles and their maps, an icon, and a ring that is closed, in one line of coordinates."""
+    style = (
+        '<Style id="pin"><IconStyle><Icon><href>http://maps.google.com/pin.png</href></Icon></IconStyle></Style>'
+        '<StyleMap id="map"><Pair><key>normal</key><styleUrl>#pin</styleUrl></Pair></StyleMap>'
+    )
+    corners = "8,46,0 8.1,46,0 8.1,46.1,0 8,46,0 "
+    around = f"<outerBoundaryIs><LinearRing><coordinates>{corners}</coordinates></LinearRing></outerBoundaryIs>"
+    inside = f"<name>lake</name><styleUrl>#map</styleUrl><Polygon><tessellate>1</tessellate>{around}</Polygon>"
+    text = f"<kml {NAMESPACE}><Document>{style}<Placemark>{inside}</Placemark></Document></kml>"
+    ((_, entries),) = kml_zones(text, "z.kml")
+    assert entries == {"name": "lake", "kind": "exclusion", "rings_deg": [[*OUTLINE, OUTLINE[0]]]}
