@@ -155,6 +155,8 @@ WINDMILL = 0.5
 _RESISTANCE_SHARE, _IDLE_SHARE = 0.026, 0.055
 # Of a propeller: least diameter, m, and largest by the span.
 _LEAST_DIAMETER, _DIAMETER_SHARE = 0.06, 0.6
+# An engine's propeller by the span, at most.
+_USUAL_SHARE = 0.18
 # An engine's friction by its largest torque.
 _FRICTION_SHARE = 0.08
 
@@ -396,17 +398,20 @@ def _motor(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMot
             return motor, flown
         # What hangs on its propeller climbs as steeply as anybody asks for.
         return _solved(stated, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
-    if not stated.trim_throttle or stated.top:
+    if (stated.climb and stated.top) or not (stated.top or stated.trim_throttle):
         return _solved(stated, sheet, drag, ["climb", "top"])
     if stated.climb:
         with contextlib.suppress(FlightError):
             return _solved(stated, sheet, drag, ["climb", "trim_throttle"])
         # What the autopilot is told of its climb is often less than the motor gives.
         return _solved(stated, sheet, drag, ["climb", "top"])
-    # A propeller of the usual size, and the speed per volt that the throttle tells.
-    usual, _ = _solved(replace(stated, trim_throttle=0.0), sheet, drag, ["climb", "top"])
+    # A propeller of the usual size, and the speed per volt that the top speed or the throttle tells: either says more
+    # of the climb than a guess.
+    plain = replace(stated, top=0.0, trim_throttle=0.0)
+    usual, _ = _solved(plain, replace(sheet, top=USUAL_TOP * sheet.cruise), drag, ["climb", "top"])
     size = stated.propeller if stated.propeller[0] else (usual.propeller.diameter, 0.0)
-    motor, flown = _solved(replace(stated, propeller=size), sheet, drag, ["trim_throttle"])
+    wanted = ["top"] if stated.top else ["trim_throttle"]
+    motor, flown = _solved(replace(stated, propeller=size), sheet, drag, wanted)
     if flown.climb <= STEEPEST_CLIMB:
         return motor, flown
     return _solved(replace(stated, trim_throttle=0.0), sheet, drag, ["climb", "top"])
@@ -422,7 +427,7 @@ def _solved(stated: DataSheet, sheet: DataSheet, drag: Drag, wanted: list[str]) 
     first_size = 1.0 if diameter else math.sqrt(sheet.mass / 11.0)
     # A guess to start from: unloaded a little beyond the top speed, rad/s.
     first_turns = 1.2 * sheet.top / base.zero_thrust_ratio / (base.diameter * first_size) * 2.0 * math.pi
-    single = wanted == ["trim_throttle"]
+    single = len(wanted) == 1 and wanted != ["climb"]
 
     def made(free: Sequence[float]) -> ElectricMotor:
         size, speed = (1.0, free[0]) if single else (*free, 1.0, 1.0)[:2]
@@ -454,14 +459,15 @@ def _on_battery(propeller: Propeller, volts: float, emf: float, cruise: float) -
 
 
 def _engine(stated: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
-    """An engine whose torque meets the climb, and a propeller whose pitch meets the top speed where that is stated."""
+    """An engine whose torque meets the climb or the top speed; where both are stated, a propeller's pitch, too."""
     pull = drag(sheet.cruise) + _weight(sheet) * math.sin(sheet.climb)
     diameter, pitch = sheet.propeller
     steep = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if diameter else 1.0
-    usual = min(math.sqrt(sheet.mass / 11.0), 0.25 * sheet.span / BOOK_PROPELLER.diameter)
+    usual = min(math.sqrt(sheet.mass / 11.0), _USUAL_SHARE * sheet.span / BOOK_PROPELLER.diameter)
     base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else usual, pitch=steep)
     first_torque = 0.12 * pull * base.diameter
-    wanted = ["climb", "top"] if stated.top else ["climb"]
+    # A top speed says more of the climb than a guess.
+    wanted = [name for name in ("climb", "top") if getattr(stated, name)] or ["climb"]
 
     def made(free: Sequence[float]) -> FuelEngine:
         torque, steeper = (*free, 1.0)[:2]

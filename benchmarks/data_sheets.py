@@ -16,13 +16,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.catalog import Aircraft
-from aircraft.data_sheet import DataSheet, check_sheet
+from aircraft.catalog import Aircraft, load_aircraft
+from aircraft.data_sheet import FUEL_HEAT, TAIL, WING, AircraftClass, DataSheet, check_sheet, size_aircraft
+from aircraft.uncertainty import read_draws
 from benchmarks.flight import errors_of
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import load_parameters
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import full_throttle, idle, straight
+from flight.dynamics.trim import fastest, full_throttle, idle, straight
 from flight.simulation.simulate import simulate
 from planfly.data_sheets import make_data_sheet_folder
 from tests.setups import setup_maker
@@ -154,12 +155,72 @@ def performance(aircraft: Aircraft, variation: Variation | None = None) -> Perfo
     )
 
 
+# Data sheets of published aircraft as their makers would print them: mass, span, area, speeds and bank; climb, sink and
+# power are what is asked for.  The class of each leaves the aircraft itself out: the other flying wing, the other tail.
+_OTHER_WING = {
+    "zagi": {"lift_slope": 0.893, "drag": 0.0194, "oswald": 0.829},
+    "x8": {"lift_slope": 0.717, "drag": 0.0257, "oswald": 0.9},
+}
+_OTHER_TAIL = {"aerosonde": {"drag": 0.0426, "oswald": 0.75}}
+SHEETS_OF: dict[str, AircraftClass] = {
+    "aerosonde": replace(TAIL, **_OTHER_TAIL["aerosonde"]),  # the Ultra Stick's
+    "zagi": replace(WING, **_OTHER_WING["zagi"]),
+    "x8": replace(WING, **_OTHER_WING["x8"]),
+    "c172x": TAIL,
+}
+# JSBSim's Cessna flies level more slowly than a Cessna's handbook has it stall: 48 knots without flaps.
+STALL = {"c172x": 24.7}
+# Each quantity of `Performance`, and its interval's two-sided share.
+INSIDE = 0.95
+
+
+def sheet_of(name: str) -> DataSheet:
+    """The data sheet of a published aircraft; a Cessna's numbers are no small aircraft's, and taken all the same."""
+    known = load_aircraft(name)
+    top = fastest(Fdm(known), AMSL)
+    return DataSheet(
+        mass=known.mass, span=known.wing_span, area=known.wing_area, cruise=known.airspeed,
+        stall=STALL.get(name, known.stall_speed), top=0.0 if top is None else top.airspeed, bank=known.max_bank,
+        volts=known.battery_voltage, energy=known.battery_energy if known.battery_voltage else 0.0,
+        fuel=known.battery_energy / FUEL_HEAT if not known.battery_voltage else 0.0,
+        layout="wing" if name in ("zagi", "x8") else "tail",
+    )  # fmt: skip
+
+
+def check_intervals(draws: int) -> int:
+    """How many of climb, sink and power of the published models lie within their data sheet's intervals."""
+    print(f"data sheets of published aircraft: intervals of {100.0 * INSIDE:.0f} %, {draws} draws each")
+    inside = 0
+    with tempfile.TemporaryDirectory() as place:
+        for name, kind in SHEETS_OF.items():
+            published = performance(load_aircraft(name))
+            sheet = sheet_of(name)
+            sized = size_aircraft(sheet, name, kind)
+            made = make_data_sheet_folder(Path(place) / f"{name}-sheet", sheet, made=sized)
+            drawn = read_draws(made.folder / "draws.csv")
+            found = [performance(made, Variation(properties=drawn.properties(k))) for k in range(draws)]
+            for what, unit, factor in (("climb", "deg", 180.0 / math.pi), ("sink", "m/s", 1.0), ("power", "W", 1.0)):
+                values = factor * np.array([getattr(one, what) for one in found])
+                # A drawn aircraft that cannot fly level has no power; it climbs below the least.
+                low, high = np.nanquantile(values, (0.5 - 0.5 * INSIDE, 0.5 + 0.5 * INSIDE)).tolist()
+                true = factor * getattr(published, what)
+                inside += (good := low <= true <= high)
+                said = "inside" if good else "OUTSIDE"
+                estimate = factor * getattr(performance(made), what)
+                interval = f"{estimate:.3g} ({low:.3g} to {high:.3g})"
+                print(f"  {name:<10} {what:<6} {true:8.3g} {unit:4} sheet {interval}: {said}")
+    print(f"  {inside} of {3 * len(SHEETS_OF)} inside")
+    return inside
+
+
 def main() -> None:
     """Print both parts."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.data_sheets")
     parser.add_argument("--sheets", type=int, default=SHEETS)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--draws", type=int, default=200)
     args = parser.parse_args()
+    check_intervals(args.draws)
     fly_random_sheets(args.sheets, args.seed)
 
 

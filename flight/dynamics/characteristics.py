@@ -19,6 +19,8 @@ TRIM_AMSL = 500.0
 _POSITION = (45.0, 0.0)
 _RATE_HZ = 120.0
 _STEP_AT = 1.0
+# A control that changes nothing by more than this (rad, m) is none.
+_NOTHING = 1e-4
 # Columns of the longitudinal states in (u, v, w, p, q, r, roll, pitch); the other half is lateral.
 _LONGITUDINAL = np.array([True, False, True, False, True, False, False, True])
 
@@ -148,7 +150,7 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 
     Each moves by a tenth of its travel: less would be lost in the play of some models' actuators.  Elevator (up) and
     throttle (down where there is not that much left) stay; aileron and rudder come back after a second, because no
-    aircraft stays upright with them held.
+    aircraft stays upright with them held.  A control that moves nothing, as a flying wing's rudder, is left out.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for step in step_responses(load_aircraft("aerosonde")):
@@ -165,12 +167,13 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     level = straight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
     along, across = ("pitch", "alpha", "airspeed", "amsl"), ("roll", "roll_rate", "beta", "yaw")
-    return (
+    responses = (
         _respond(aircraft, "elevator", -elevator, math.inf, 20.0, along),
         _respond(aircraft, "throttle", throttle, math.inf, 20.0, along),
         _respond(aircraft, "aileron", aileron, 1.0, 15.0, across),
         _respond(aircraft, "rudder", rudder, 1.0, 15.0, ("roll", "yaw_rate", "beta", "yaw")),
     )
+    return tuple(response for response in responses if float(np.abs(response.change).max()) > _NOTHING)
 
 
 def _respond(

@@ -86,7 +86,7 @@ def _sheet_options(parser: CommandParser) -> None:
         "stall": ("M/S", "airspeed of slowest level flight"),
         "top": ("M/S", "airspeed of fastest level flight (default: 1.4 times the cruise's)"),
         "bank": ("DEG", "steepest bank in turns (default: 35)"),
-        "climb": ("DEG", "steepest climb at cruise (default: 12)"),
+        "climb": ("DEG", "steepest climb at cruise (default: 12, or what goes with the top speed)"),
         "motor": ("KV", "rpm a volt"),
         "fuel": ("KG", "fuel carried, for an aircraft without a battery"),
     }
@@ -240,6 +240,11 @@ def _print_limits(chosen: "Aircraft", envelope: "Envelope") -> None:
         f" {_deg(chosen.max_elevator):.0f}, aileron {_deg(chosen.max_aileron):.0f}, rudder"
         f" {_deg(chosen.max_rudder):.0f} deg either way; {braking}"
     )
+    if envelope.source:
+        climb, descent = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
+        print(
+            f"  known    from {envelope.source}: climbs to {climb:.1f} deg, descents to {descent:.1f} (one deviation)"
+        )
 
 
 def _print_trims(trims: "tuple[TrimRow, ...]", amsl: float) -> None:

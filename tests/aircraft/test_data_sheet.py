@@ -39,7 +39,8 @@ def test_level_at_cruise_it_stands_as_it_is_rigged() -> None:
         replace(FOAM, layout="wing", climb=math.radians(9.0), top=19.0),
         replace(FOAM, propeller=(0.28, 0.15)),
         replace(FOAM, volts=14.8, motor=900.0),
-        replace(FOAM, fuel=0.3, top=22.0),
+        replace(FOAM, fuel=0.3, climb=math.radians(14.0), top=26.0),
+        replace(FOAM, fuel=0.3, climb=math.radians(9.0)),
     ],
 )
 def test_thrust_is_what_climb_and_top_speed_take(sheet: DataSheet) -> None:
@@ -54,7 +55,8 @@ def test_thrust_is_what_climb_and_top_speed_take(sheet: DataSheet) -> None:
 
     climb = sheet.climb or math.radians(12.0)
     assert motor.thrust(1.0, 15.0, 1.1673) == pytest.approx(drag(15.0) + 2.1 * G * math.sin(climb), rel=1e-6)
-    top = sheet.top or 21.0
+    # An engine's torque alone cannot meet both: the top speed follows from the climb where it is not stated.
+    top = sheet.top or (made.sheet.top if sheet.fuel else 21.0)
     assert motor.thrust(1.0, top, 1.1673) == pytest.approx(drag(top), rel=1e-6)
 
 
@@ -70,6 +72,20 @@ def test_a_stated_motor_and_propeller_stay() -> None:
     pressure = 0.5 * 1.1673 * 225.0 * made.numbers.area
     spare = pull - pressure * (made.numbers.aero.drag_min + made.numbers.aero.drag_lift * (2.1 * G / pressure) ** 2)
     assert made.sheet.climb == pytest.approx(math.asin(spare / (2.1 * G)), rel=1e-9)
+
+
+@pytest.mark.parametrize("fuel", [0.0, 0.3])
+def test_a_top_speed_alone_says_what_it_climbs(fuel: float) -> None:
+    slow, fast = (size_aircraft(replace(FOAM, top=top, fuel=fuel)) for top in (18.0, 24.0))
+    for made, top in ((slow, 18.0), (fast, 24.0)):
+        motor = made.numbers.propulsion
+        assert isinstance(motor, ElectricMotor | FuelEngine)
+        pressure = 0.5 * 1.1673 * top**2 * made.numbers.area
+        drag = pressure * (made.numbers.aero.drag_min + made.numbers.aero.drag_lift * (2.1 * G / pressure) ** 2)
+        assert motor.thrust(1.0, top, 1.1673) == pytest.approx(drag, rel=1e-6)
+        assert made.sheet.top == pytest.approx(top, rel=1e-6)
+        assert "climb" in made.guessed
+    assert slow.sheet.climb < fast.sheet.climb
 
 
 def test_a_throttle_at_cruise_is_met() -> None:
