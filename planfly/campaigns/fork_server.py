@@ -12,8 +12,26 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-for _needed in ("planfly.campaigns.report", "planfly.pipeline", "scipy.stats"):
-    import_module(_needed)
+from planfly.kernel_units.ready_kernels import UNITS
+from planfly.kernel_units.unit_kernels import BOTH
+from planfly.process_setup import prepare_child
+from world.compile_events import tell_before_compiling
+
+
+class _NotCompiledYet(Exception):
+    """A kernel is in no cache."""
+
+
+def load_kernels() -> None:
+    """Load the compiled kernels of a default plan and flight, as far as they are in the cache."""
+
+    def refuse() -> None:
+        raise _NotCompiledYet
+
+    # Who plans or flies first compiles them, and says so.
+    with contextlib.suppress(_NotCompiledYet), tell_before_compiling(refuse):
+        for unit in BOTH:
+            UNITS[unit]()
 
 
 def socket_folders() -> list[Path]:
@@ -35,5 +53,9 @@ def end(folders: list[Path]) -> None:
 
 
 if "multiprocessing.forkserver" in " ".join(sys.orig_argv):
+    prepare_child()
+    for needed in ("planfly.campaigns.report", "planfly.pipeline", "scipy.stats"):
+        import_module(needed)
+    load_kernels()
     # The processes that are forked from this one forget it.
     atexit.register(end, socket_folders())
