@@ -32,6 +32,8 @@ HOLD = {
     # Asks the system for ports that are free, and closes them.
     "flight/autopilots/arduplane_sitl/process.py": "`fly`, `run` with `--autopilot`",
     "flight/live/link.py": "`serve`",
+    # Looks at the sockets that its process was given.
+    "planfly/campaigns/fork_server.py": "`campaign`, `winds`",
     "planfly/campaigns/worker_pool.py": "`campaign`, `winds`",
     "planfly/replays/live.py": "`replay --foxglove`",
     "planfly/replays/origin_gate.py": "`replay --foxglove`",
