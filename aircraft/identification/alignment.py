@@ -135,29 +135,28 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
     return Signals(**joined, edges=tuple(edges), block=np.concatenate(blocks))
 
 
-# Where the search begins, its steps and its limits, s: lag and delay of the accelerometers, lag of the servos.
-_START = np.array([0.03, 0.02, 0.06])
+# The grid that the search begins on, and its limits, s: lag and delay of the accelerometers, lag of the servos.
+_LAGS, _DELAY, _SERVOS = (0.0, 0.03, 0.06, 0.09), 0.015, (0.02, 0.06, 0.1, 0.15)
 _LIMITS = np.array([[0.0, -0.04, 0.0], [0.12, 0.1, 0.25]])
+_STEPS = np.diag([0.02, 0.02, 0.03])
 
 
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
-    """The clocks with the least misfit: a search along each axis with shrinking steps.
+    """The clocks with the least misfit: the best of a grid, and from there a simplex (Nelder and Mead 1965).
 
     >>> found = find_clocks(lambda clock: (clock.lag - 0.05) ** 2 + (clock.delay - 0.03) ** 2 + clock.servo_lag)
-    >>> round(found.lag, 2), round(found.delay, 2), found.servo_lag
+    >>> round(found.lag, 2), round(found.delay, 2), round(found.servo_lag, 2)
     (0.05, 0.03, 0.0)
     """
     from scipy.optimize import minimize
 
     def cost(values: Floats) -> float:
         inside = np.clip(values, *_LIMITS)
-        return misfit(Clocks(*inside.tolist())) * (1.0 + 100.0 * float(np.abs(values - inside).sum()))
+        return misfit(Clocks(*inside.tolist())) + 100.0 * float(np.abs(values - inside).sum())
 
-    simplex = np.vstack([_START, *(_START + step for step in np.diag([0.03, 0.03, 0.05]))])
-    found = minimize(
-        cost,
-        _START,
-        method="Nelder-Mead",
-        options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-6, "maxfev": 90},
-    )
+    grid = [np.array([lag, _DELAY, servo]) for lag in _LAGS for servo in _SERVOS]
+    start = min(grid, key=cost)
+    simplex = np.vstack([start, *(start + step for step in _STEPS)])
+    options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "maxfev": 70}
+    found = minimize(cost, start, method="Nelder-Mead", options=options)
     return Clocks(*np.clip(found.x, *_LIMITS).tolist())

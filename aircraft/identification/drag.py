@@ -26,7 +26,10 @@ NUISANCES = {
     "idle current of the motor": 0.3,
     "voltage of the battery": 0.02,
     "drag of the elevator": 1.0,
+    "angle of attack": 1.0,
+    "angle of attack by lift": 1.0,
 }
+# The last two count in standard deviations of `AlphaDoubt`.
 # Where the battery's voltage is logged it is known this much better.
 _LOGGED_VOLTAGE = 0.25
 # What no model gets right, m/s^2 and A, and over how long it hangs together, s.
@@ -38,28 +41,43 @@ _MOST_STEPS, _CLOSE = 12, 0.01
 
 
 @dataclass(frozen=True, slots=True)
+class AlphaDoubt:
+    """How sure the angle of attack of the lift curve is.
+
+    angle: standard deviation at a coefficient of lift, middle, rad.  by_lift: of its change by that coefficient, rad.
+    """
+
+    angle: float = float(np.radians(0.3))
+    by_lift: float = 0.02
+    middle: float = 0.6
+
+
+@dataclass(frozen=True, slots=True)
 class _Forces:
     """Thinned signals, and what of the forward force each unknown makes.
 
-    known: (n,) N, of lift.  drags: (2, n) N, of zero-lift and induced drag.  elevator: (n,) N, of its drag.
+    known: (n,) N, of lift.  tilts: (2, n) N, of a standard deviation of each doubt about the angle of attack.
+    drags: (2, n) N, of zero-lift and induced drag.  elevator: (n,) N, of its drag.
     """
 
     signals: Signals
     base: BaseModel
     known: Floats
+    tilts: Floats
     drags: Floats
     elevator: Floats
     volts: Floats | float
 
     def predicted(self, unknown: Floats) -> tuple[Floats, Floats]:
         """Forward acceleration (n,), m/s^2, and current (n,), A, low-passed; unknown: parameters, then nuisances."""
-        zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, of_elevator = unknown
+        zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, of_elevator, *tilts = unknown
         motor = self.base.motor.changed(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
         signals = self.signals
         pull, current = motor.thrust_and_current(
             signals.airspeed, signals.throttle, signals.density, self.volts * (1.0 + voltage)
         )
         force = self.known + np.array([zero_lift, induced]) @ self.drags + (1.0 + of_elevator) * self.elevator + pull
+        force = force + np.array(tilts) @ self.tilts
         return signals.smooth(force / self.base.mass + bias, FORCE_BAND), signals.smooth(current, FORCE_BAND)
 
     def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
@@ -73,12 +91,14 @@ class _Forces:
         return np.column_stack(forces), np.column_stack(currents)
 
 
-def fit_drag(signals: Signals, base: BaseModel, values: Floats, flow: Flow) -> tuple[Fit, Floats, Floats]:
+def fit_drag(
+    signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt | None = None
+) -> tuple[Fit, Floats, Floats]:
     """Fit, values (5,) of the parameters of drag and motor, and their covariance (5, 5).
 
-    values: (n,) of all parameters, of which those of lift count.
+    values: (n,) of all parameters, of which those of lift count.  doubt: about the lift curve.
     """
-    forces = _forces(signals, base, values, flow)
+    forces = _forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)
     thin = forces.signals
     with_current = bool(np.isfinite(thin.current).all())
     nuisances = np.array(list(NUISANCES.values()))
@@ -132,16 +152,18 @@ def _search(forces: _Forces, goal: _Goal, means: Floats, sds: Floats, start: Flo
     return Fit(now, fit.covariance, fit.predicted, fit.residual, fit.explained)
 
 
-def _forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow) -> _Forces:
+def _forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt) -> _Forces:
     c, (slope, zero) = base.coefficients, lift_curve(base, values)
     thin = signals.thinned(FORCE_THINNING, {"alpha": flow.alpha})
     alpha, pressure = thin.extra["alpha"], pressure_of(thin, base)
     lift = slope * alpha + zero
     ahead = -pressure * np.cos(alpha)
+    tilt = pressure * lift * np.cos(alpha)
     return _Forces(
         signals=thin,
         base=base,
         known=pressure * (lift + other_lift(thin, base)) * np.sin(alpha),
+        tilts=tilt * np.vstack([np.full(len(alpha), doubt.angle), doubt.by_lift * (lift - doubt.middle)]),
         drags=ahead * np.vstack([np.full(len(alpha), c.drag_zero), c.drag_induced * np.square(lift)]),
         elevator=ahead * c.drag_elevator * thin.surfaces[:, 0],
         volts=voltage_of(thin, base),

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Clocks, Signals, align, find_clocks
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.drag import FORCE_THINNING, fit_drag
+from aircraft.identification.drag import FORCE_THINNING, AlphaDoubt, fit_drag
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import motor_of, vane
 from aircraft.identification.held_fixed import HELD_FIXED
-from aircraft.identification.level import levelled
+from aircraft.identification.level import LEVEL_SD, levelled
 from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
 from aircraft.identification.parameters import PARAMETERS, Group, prior_means, prior_sds
@@ -34,6 +34,8 @@ ALIGNED_SECONDS = 200.0
 _ROUNDS = 2
 # Share of an interval below which the logs say next to nothing of a parameter.
 SILENT = 0.2
+# An axis whose fit explains less of what is measured keeps its prior.
+LEAST_EXPLAINED = 0.6
 # How much wider than computed the interval of a fast motion is.
 FAST_WIDENING = 2.0
 # Title, unit and samples a second of each equation.
@@ -155,7 +157,8 @@ def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Cloc
         def misfit(clock: Clocks, part: FlightRecord = part) -> float:
             signals = align([part], [clock], base.motor_lag)
             alpha, beta, _ = vane(signals, base, prior_means())
-            fits = fit_moments(signals, base, alpha, beta)
+            # The clocks are to fit, not the prior.
+            fits = fit_moments(signals, base, alpha, beta, spread=10.0)
             return sum(float(np.log(1.0 - fits[axis].explained + 1e-6)) for axis in AXES)
 
         found[source] = find_clocks(misfit)
@@ -172,6 +175,8 @@ def fit_all(
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}
 
+    doubt: AlphaDoubt | None = None
+
     def take(group: Group, estimate: Floats, spread: Floats) -> None:
         own = np.array([parameter.group == group for parameter in PARAMETERS])
         values[own] = estimate
@@ -184,17 +189,27 @@ def fit_all(
         if lift is None:
             fits["lift"], curve, spread = fit_lift(signals, base, flow.lift, level)
             take("lift", curve, spread)
+            doubt = alpha_doubt(fits["lift"], flow.lift)
             flow = vane(signals, base, values)
-        fits["drag"], five, spread = fit_drag(signals, base, values, flow)
+        fits["drag"], five, spread = fit_drag(signals, base, values, flow, doubt)
         take("drag", five, spread)
     moments = fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values)) if dynamics else {}
     for axis, fit in moments.items():
         fits[axis] = fit
+        if fit.explained < LEAST_EXPLAINED:
+            # Sensors too noisy, or a structure that the model lacks: the prior stays.
+            continue
         count = sum(parameter.group == axis for parameter in PARAMETERS)
         take(axis, fit.estimate[:count], fit.covariance[:count, :count])
     equations = tuple(_equation(group, fit) for group, fit in fits.items())
     known = bool(np.isfinite(signals.current).all())
     return Estimate(values, covariance, (), equations, with_current=known, dynamics=dynamics)
+
+
+def alpha_doubt(fit: Fit, lift: Floats) -> AlphaDoubt:
+    """What a fit of the lift curve leaves unknown of the angle of attack, and the autopilot's level with it."""
+    by_lift, angle = np.sqrt(np.diag(fit.covariance)).tolist()
+    return AlphaDoubt(float(np.hypot(angle, LEVEL_SD)), by_lift, float(lift.mean()))
 
 
 def _equation(group: Group, fit: Fit) -> Equation:

@@ -24,11 +24,16 @@ _ASYMMETRY = 0.01
 
 
 def fit_moments(
-    signals: Signals, base: BaseModel, alpha: Floats, beta: Floats, motor: ElectricMotor | None = None
+    signals: Signals,
+    base: BaseModel,
+    alpha: Floats,
+    beta: Floats,
+    motor: ElectricMotor | None = None,
+    spread: float = 1.0,
 ) -> dict[Group, Fit]:
     """The three fits by their axis; roll and yaw have a constant behind their parameters that is not kept.
 
-    alpha, beta: (n,) rad.  motor: whose torque rolls; None for the base's.
+    alpha, beta: (n,) rad.  motor: whose torque rolls; None for the base's.  spread: factor on the priors' deviations.
     """
     thin = signals.thinned(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
     pressure = pressure_of(thin, base)
@@ -45,7 +50,7 @@ def fit_moments(
         scale = pressure * length / inertia
         table = thin.smooth(np.column_stack([scale * column for column in columns]), MOMENT_BAND)
         goal = thin.smooth(turning[axis] / inertia - scale * known, MOMENT_BAND)
-        fits[axis] = fit_with_prior(table, goal, np.array(means), np.array(sds), thin.block)
+        fits[axis] = fit_with_prior(table, goal, np.array(means), spread * np.array(sds), thin.block)
     return fits
 
 
