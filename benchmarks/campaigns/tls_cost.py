@@ -34,6 +34,9 @@ def tls_cost(base: CampaignBase, rounds: int = ROUNDS, flights: int = FLIGHTS) -
     for number in range(rounds):
         rates = {private: rate(private=private) for private in ((True, False) if number % 2 else (False, True))}
         ratios.append(rates[False] / rates[True])
+        print(
+            f"  round {number + 1}: {rates[False]:.0f} flights a minute without TLS, {rates[True]:.0f} with", flush=True
+        )
     return {
         "flights a minute without TLS / with it": statistics.median(ratios),
         "  least of all rounds": min(ratios),
