@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
-from aircraft.tracking import TrackingError
+from aircraft.tracking import TrackingError, air_density_factor
 from world.by_reference import by_reference
 from world.geometry import wrap
 from world.kernels import compiled, compiled_inline, inlined
@@ -86,8 +86,24 @@ class Limits:
         return float(climb), float(dive)
 
     def surely(self) -> "Limits":
-        """The limits with the slopes that the aircraft can for certain, as far as that is known: what plans keep to."""
+        """The limits with the slopes that the aircraft can for certain, as far as that is known."""
         return replace(self, envelope=self.envelope.surely())
+
+    def for_plans(self) -> "Limits":
+        """The limits that plans keep to: those of an aircraft that is not known for certain leave nothing open.
+
+        An autopilot that takes airspeeds for equivalent ones flies faster with height, where the aircraft climbs less.
+        """
+        sure = self.surely()
+        if sure.envelope is self.envelope or self.tracking is None:
+            return sure
+        table, speeds = sure.envelope.climb, sure.envelope.airspeed
+        faster = [
+            np.interp(speeds * air_density_factor(float(amsl)), speeds, table[:, j])
+            for j, amsl in enumerate(sure.envelope.amsl)
+        ]
+        climb = np.minimum(table, np.column_stack(faster))
+        return replace(sure, envelope=replace(sure.envelope, climb=climb))
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
         """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed in the turn."""

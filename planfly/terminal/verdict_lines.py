@@ -29,10 +29,11 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
             lines.append(coloured("          would pass: ", "hint") + suggestions_text(finding.suggestions))
     if len(failed) > _LISTED:
         lines.append(coloured("  failed  ", "bad") + f"and {len(failed) - _LISTED} more")
-    for finding in left_open(verdict.findings)[:_LISTED]:
-        lines.append(f"  open    {_noun(finding)} at {place_text(finding.place)}: {finding.reason}")
-        if finding.suggestions:
-            lines.append(coloured("          would tell: ", "hint") + suggestions_text(finding.suggestions))
+    still_open = left_open(verdict.findings)
+    lines += [f"  open    {_noun(one)} at {place_text(one.place)}: {one.reason}" for one in still_open[:_LISTED]]
+    # The same flight tells of them all.
+    telling = dict.fromkeys(suggestions_text(one.suggestions) for one in still_open if one.suggestions)
+    lines += [coloured("          would tell: ", "hint") + text for text in telling]
     for rule in RULES.values():
         mine = [finding for finding in verdict.findings if finding.rule == rule.name]
         if mine:

@@ -1,6 +1,7 @@
 """Slopes and turn radii in wind, against hand calculation and dense sampling."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from aircraft.path_limits import (
     turn_tangents,
     wind_speed_at,
 )
+from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError, air_density_factor
+from tests.setups import falling_envelope
 from world.wind import Wind
 
 G = 9.80665
@@ -154,3 +157,20 @@ def test_turning_the_world_turns_nothing(speed: float, source: float, angle: flo
     assert turn_radius_between(there, 0.3 + angle, 1.7 + angle, 400.0) == pytest.approx(
         turn_radius_between(here, 0.3, 1.7, 400.0), rel=1e-7
     )
+
+
+def test_plans_leave_nothing_open_at_the_airspeeds_that_are_flown() -> None:
+    # At 1,000 m: 12.5 degrees at 25 m/s and 3.6 at 30, known to 2 degrees; ArduPlane flies 25 m/s as 26.24 there.
+    known = falling_envelope()
+    unsure = replace(known, source="a data sheet", climb_sd=math.radians(2.0), descent_sd=math.radians(1.0))
+    flat = np.zeros((TURNS.size, SPEED_SHARES.size))
+    tracking = TrackingError(25.0, flat, flat, flat, flat, across=1.0, up=1.0, lag=0.0, step=0.0)
+    limits = Limits(None, None, None, 30.0, unsure, 25.0, 0.5, Wind(), tracking)
+    climb, descent = (math.degrees(angle) for angle in limits.for_plans().slopes(0.0, 1000.0))
+    factor = air_density_factor(1000.0)
+    assert climb == pytest.approx(12.5 - 8.9 * 25.0 * (factor - 1.0) / 5.0 - 1.645 * 2.0, abs=1e-6)
+    assert descent == pytest.approx(7.8 - 1.645, abs=1e-6)
+    # What is certain at the airspeed itself, without an autopilot's; and an aircraft that is known stays as it is.
+    exact = replace(limits, tracking=None).for_plans()
+    assert math.degrees(exact.slopes(0.0, 1000.0)[0]) == pytest.approx(12.5 - 1.645 * 2.0, abs=1e-6)
+    assert replace(limits, envelope=known).for_plans().envelope is known

@@ -233,6 +233,7 @@ class RouteRequirements:
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
     turn_limit: (w,) rad, as `TurnRequirements.limit`; inf where the envelope is left out.
     climb, dive: (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out.
+    sure_climb, sure_dive: (w - 1,) what of them is certain of an aircraft that is not known for certain; else the same.
     ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
     envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
     airspace: the zones of scenario and mission.
@@ -255,6 +256,8 @@ class RouteRequirements:
     turn_limit: Floats
     climb: Floats
     dive: Floats
+    sure_climb: Floats
+    sure_dive: Floats
     ground_speed: Floats
     path: PlannedPath
     envelope: bool
@@ -315,6 +318,10 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     turning = turn_requirements(route, tables)
     courses, runs = leg_courses(points), leg_runs(points)
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
+    certain = limits.surely()
+    sure_climb, sure_dive = climb, dive
+    if certain.envelope is not limits.envelope:
+        sure_climb, sure_dive, _ = _leg_limits(route, performance_tables(route, certain), points, courses)
     if not envelope:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
     return RouteRequirements(
@@ -335,6 +342,8 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         turn_limit=turning.limit if envelope else np.full(len(points), math.inf),
         climb=climb,
         dive=dive,
+        sure_climb=sure_climb,
+        sure_dive=sure_dive,
         ground_speed=speeds,
         path=_planned_path(setup.path, route, speeds),
         envelope=envelope,

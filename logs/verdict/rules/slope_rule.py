@@ -103,22 +103,16 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
 def _in_doubt(requirements: RouteRequirements, leg: int, limit: float) -> str:
     """Why a slope within the limit is undecided, where the limit is not known for certain; "" where it is decided.
 
-    limit: rad, over the ground; its deviation is that to the air, as a share of the limit there.
+    limit: rad, over the ground.
     """
-    envelope, planned = requirements.setup.envelope, float(requirements.slopes[leg])
-    speed = float(requirements.route.airspeed[leg])
-    up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
-    rising = planned >= 0.0
-    to_air = envelope.air_angles(speed, up)[0 if rising else 1]
-    deviation = envelope.climb_sd if rising else envelope.descent_sd
-    if abs(planned) <= LEVEL or not deviation or not to_air > 0.0:
+    planned = float(requirements.slopes[leg])
+    sure = float((requirements.sure_climb if planned >= 0.0 else requirements.sure_dive)[leg])
+    if abs(planned) <= LEVEL or not sure < limit or abs(planned) <= sure:
         return ""
-    deviation *= limit / to_air
-    if abs(planned) <= limit - UNDECIDED * deviation:
-        return ""
-    asked, known, off = (math.degrees(angle) for angle in (abs(planned), limit, deviation))
-    verb = "climbs" if rising else "falls"
-    return f"{verb} {asked:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {off:.1f}°"
+    verb = "climbs" if planned >= 0.0 else "falls"
+    asked, known, off = (math.degrees(angle) for angle in (abs(planned), limit, (limit - sure) / UNDECIDED))
+    source = requirements.setup.envelope.source
+    return f"{verb} {asked:.1f}°, and what {source} says of the limit is {known:.1f}° give or take {off:.1f}°"
 
 
 def _steep_arc(requirements: RouteRequirements, leg: int) -> list[Message]:

@@ -285,3 +285,14 @@ def test_a_failure_comes_before_what_is_open() -> None:
     verdict = judge_geometry(make_setup(high, table=unsure()))
     assert verdict.headline.startswith("not flyable: slope on leg 4")
     assert not verdict.undecided
+
+
+def test_what_is_sure_goes_with_the_wind() -> None:
+    # 13.7 - 1.645 x 3 = 8.765 degrees to the air: in 10 m/s of headwind tan = 25 sin / (25 cos - 10), 14.5 degrees.
+    air = math.radians(13.7 - 1.645 * 3.0)
+    sure = math.degrees(math.atan2(25.0 * math.sin(air), 25.0 * math.cos(air) - 10.0))
+    assert 14.4 < sure < 14.6
+    for slope, ok in ((sure - 0.05, True), (sure + 0.05, None)):
+        way = [[e, n, u + 400] for e, n, u in hill(slope)]
+        setup = make_setup(way, table=unsure(), wind={"speed_mps": 10.0, "from_deg": 0.0})
+        assert of(judge_geometry(setup), "slope", leg(1)).ok is ok
