@@ -1,5 +1,6 @@
 """`planfly aircraft`: its tables, its pictures, and a second and a third aircraft flown by the same commands."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -167,3 +168,55 @@ def test_a_folder_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     # The log and the plan are enough to go on from.
     assert main(["check", "out/flight.mcap"]) == 0
     assert main(["fly", "out/plan.json", "--log", "again.mcap"]) == 0
+
+
+# ----------------------------------------------------------------------
+# From a data sheet.
+
+SIX = ("--mass", "2.1", "--span", "1.6", "--cruise", "15", "--stall", "10")
+
+
+@pytest.mark.parametrize(
+    ("more", "climb", "sd"),
+    # 3.75 m/s at 15 m/s: 14.5 degrees, which somebody measured.
+    [(("--layout", "vtail", "--battery", "14.8V,5Ah"), 12.0, 5.0), (("--params", "own.parm"), 14.5, 3.0)],
+)
+def test_a_data_sheet_makes_a_folder_that_is_described(
+    more: tuple[str, ...], climb: float, sd: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("own.parm").write_text("TECS_CLMB_MAX 3.75\nTRIM_THROTTLE 45\n")
+    assert main(["aircraft", "--new", "./foam", *SIX, *more]) == 0
+    text = capsys.readouterr().out
+    assert "uncertainty.toml), from a data sheet" in text
+    said = re.search(r"climb ([0-9.]+) degrees, give or take ([0-9.]+);", text)
+    assert said is not None
+    assert [float(number) for number in said.groups()] == pytest.approx([climb, sd], abs=0.2)
+    made = planfly.aircraft(Path("foam"))
+    assert (made.mass, made.wing_span, made.airspeed) == (2.1, 1.6, 15.0)
+
+
+@pytest.mark.parametrize(
+    ("argv", "told"),
+    [
+        (("--mass", "2.1"), "--span: a data sheet needs it: 0.5..6 m"),
+        ((*SIX, "--mass", "60"), "--mass 60.0 kg: allowed 0.5..25 kg"),
+        ((*SIX, "--stall", "14"), "--stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s"),
+        ((*SIX, "--battery", "12"), "--battery 12: volts and capacity are expected, such as 14.8V,5Ah"),
+        ((*SIX, "--prop", "12"), "--prop 12: inches of diameter and pitch are expected, such as 12x6"),
+        ((*SIX, "--from", "c172x"), "--from c172x: goes without mass"),
+        ((*SIX, "--params", "none.parm"), "none.parm: cannot be read"),
+        ((*SIX, "--climb", "nan"), "--climb nan degrees: allowed 2..35 degrees"),
+    ],
+)
+def test_a_bad_data_sheet_is_one_line(argv: tuple[str, ...], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["aircraft", "--new", "./foam", *argv]) == 2
+    captured = capsys.readouterr()
+    lines = captured.err.strip().splitlines()
+    assert len(lines) == 1
+    assert told in lines[0]
+    assert list(Path().iterdir()) == []
+
+
+def test_a_data_sheet_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["aircraft", *SIX]) == 2
+    assert "--mass: goes with --new FOLDER" in capsys.readouterr().err

@@ -188,3 +188,12 @@ def test_what_was_not_flown_again_is_named_with_its_reason() -> None:
     assert line == "Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order"
     (line,) = left_lines((AGAIN,), (AGAIN.stretch, other), 1)
     assert line.endswith("in order, or 1 longer ones were")
+
+
+def test_a_level_that_leaves_something_open_neither_passes_nor_fails() -> None:
+    lines = ("not judged in full: slope on leg 1 is within what is not known of the aircraft",)
+    levels = (LevelAnswer("geometry", False, lines[0], undecided=True),)
+    verdict = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1")
+    (row,) = level_rows(verdict, ArduPlane(default_parameters()))
+    assert (row.state, row.sign) == ("unjudged", "? not judged")
+    assert badge_of(verdict).word == "Not judged in full"
