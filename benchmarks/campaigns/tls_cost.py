@@ -1,51 +1,79 @@
-"""What TLS between a campaign's client, scheduler and workers costs, as flights a minute without it over those with it.
+"""What TLS between a campaign's client, scheduler and workers costs: flights a minute, and processor time of a flight.
 
-``python -m benchmarks.campaigns.tls_cost [ROUNDS] [FLIGHTS]``.  Both are flown in each round, in turn first, so that a
-machine that is not idle slows both.
+``python -m benchmarks.campaigns.tls_cost [ROUNDS] [FLIGHTS]``.  Campaigns with and without it take turns in one run.
+Other programs change the flights a minute of a round; the processor time of a flight they hardly change.
 """
 
 import statistics
 import sys
 import tempfile
+import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from unittest import mock
+
+import psutil
 
 from planfly.campaigns import worker_pool
 from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.worker_pool import FlightRequest, Workers
 
 ROUNDS, FLIGHTS = 9, 60
 # Of workers at a time.
 _WORKERS = 2
 
 
+class Flown(NamedTuple):
+    """Flights a minute, and processor seconds that client, scheduler and workers took for a flight."""
+
+    a_minute: float
+    cpu: float
+
+
+def _cpu() -> float:
+    """Processor seconds of this process and all that it started."""
+    processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
+    return sum(sum(one.cpu_times()[:2]) for one in processes)
+
+
+def fly(base: CampaignBase, flights: int) -> Flown:
+    """Fly so many flights, counted from the first that came back of each worker on."""
+    requests: Iterator[FlightRequest] = (FlightRequest(index) for index in range(flights))
+    began = cpu = 0.0
+    with worker_pool.worker_pool(Workers(_WORKERS), base) as pool:
+        for number, _ in enumerate(pool.fly(lambda: next(requests, None)), 1):
+            if number == _WORKERS:
+                began, cpu = time.perf_counter(), _cpu()
+        seconds, cpu = time.perf_counter() - began, _cpu() - cpu
+    return Flown(60.0 * (flights - _WORKERS) / seconds, cpu / (flights - _WORKERS))
+
+
 def tls_cost(base: CampaignBase, rounds: int = ROUNDS, flights: int = FLIGHTS) -> dict[str, Any]:
-    """The median ratio of all rounds, and the least and the largest."""
-    # Imported here: the rows of campaigns import this.
-    from benchmarks.campaigns.campaign_rows import flights_a_minute
-
-    def rate(*, private: bool) -> float:
-        if private:
-            return flights_a_minute(base, _WORKERS, flights)
-        with mock.patch.object(worker_pool, "private_security", return_value=None):
-            return flights_a_minute(base, _WORKERS, flights)
-
-    ratios = []
+    """The median ratios of all rounds."""
+    rates, cpus = [], []
     for number in range(rounds):
-        rates = {private: rate(private=private) for private in ((True, False) if number % 2 else (False, True))}
-        ratios.append(rates[False] / rates[True])
-        print(
-            f"  round {number + 1}: {rates[False]:.0f} flights a minute without TLS, {rates[True]:.0f} with", flush=True
-        )
+        flown: dict[bool, Flown] = {}
+        for private in (True, False) if number % 2 else (False, True):
+            plain = mock.patch.object(worker_pool, "private_security", return_value=None)
+            if private:
+                flown[True] = fly(base, flights)
+            else:
+                with plain:
+                    flown[False] = fly(base, flights)
+        without, with_it = flown[False], flown[True]
+        rates.append(without.a_minute / with_it.a_minute)
+        cpus.append(with_it.cpu / without.cpu)
+        print(f"  round {number + 1}: without TLS {without}, with {with_it}", flush=True)
     return {
-        "flights a minute without TLS / with it": statistics.median(ratios),
-        "  least of all rounds": min(ratios),
-        "  largest of all rounds": max(ratios),
+        "flights a minute without TLS / with it": statistics.median(rates),
+        "processor time of a flight with TLS / without it": statistics.median(cpus),
     }
 
 
 def main() -> None:
     """Measure, and print a line each."""
+    # Imported here: the rows of campaigns import this.
     from benchmarks.campaigns.campaign_rows import mission_13_km
 
     rounds = int(sys.argv[1]) if len(sys.argv) > 1 else ROUNDS

@@ -85,6 +85,10 @@ def test_32_descriptors(name: str, inputs: Path, tmp_path: Path) -> None:
     shutil.copytree(inputs, folder)
     done = give(given, folder, change=limited(resource.RLIMIT_NOFILE, 32), limit=120.0)
     seen(given, done, "32 descriptors")
+    if name in ("campaign", "winds"):
+        # A worker and its leader take 31, give or take what happens at once: asyncio's traceback came now and then.
+        assert done.code == 1
+        assert done.lines[-1].startswith("planfly: 1 worker: take 48 file descriptors, and the limit is 32 (ulimit -n)")
     whole(folder, inputs)
 
 
