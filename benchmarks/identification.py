@@ -125,7 +125,7 @@ def too_steep_is_refused(folder: Path, truth: Aircraft, estimate: Estimate, base
     return not verdict.flyable
 
 
-def one_variant(seed: int, repeats: int) -> dict[str, Any]:
+def one_variant(seed: int, repeats: int, shorts: int) -> dict[str, Any]:
     """All rows of one variant."""
     truth = drawn_truth(seed)
     values = true_values(truth)
@@ -148,7 +148,7 @@ def one_variant(seed: int, repeats: int) -> dict[str, Any]:
                 "too_steep_refused": too_steep_is_refused(own, changed, estimate, base, log),
             }
         made["five_minutes"] = []
-        for other in (1, 2):
+        for other in range(1, shorts + 1):
             short, _ = fly_identification(folder, truth, seed, repeats=1, wind=2.0 + 3.0 * other)
             estimate, _, _ = identify(short, changed, base, seed + 10_000 * other, battery=False)
             made["five_minutes"].append(errors(base, values, estimate))
@@ -160,12 +160,13 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=1001)
     parser.add_argument("--count", type=int, default=10)
     parser.add_argument("--repeats", type=int, default=4)
+    parser.add_argument("--shorts", type=int, default=2)
     parser.add_argument("--out", default="build/identification.json")
     args = parser.parse_args()
     rows = []
     Path(args.out).parent.mkdir(parents=True, exist_ok=True)
     for seed in range(args.first, args.first + args.count):
-        rows.append(one_variant(seed, args.repeats))
+        rows.append(one_variant(seed, args.repeats, args.shorts))
         print(json.dumps(rows[-1]), flush=True)
         Path(args.out).write_text(json.dumps(rows, indent=1), encoding="utf-8")
     print(json.dumps(summary(rows), indent=1))
