@@ -1,5 +1,6 @@
 """The command line: arguments in, one line for an error, an exit code out.  Heavy imports wait for the command."""
 
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +14,9 @@ from planfly.terminal.output import asked_output, open_standard_streams, printab
 from planfly.terminal.signal_watch import end_process, ended_by_signals
 from world.errors import CrashError, PlanflyError
 from world.interruption import Interrupted
+
+# Too few descriptors, of this process or of all, too little memory, and a disk that fails.
+_MACHINES = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -41,14 +45,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _outcome(argv: Sequence[str] | None) -> int:
-    line = build_parser()
     try:
+        line = build_parser()
         args = line.parse_args(argv)
         try:
             with tolerate_closed_output(), asked_output(args):
                 return find_command(args.command)(args)
         except PlanflyError as error:
-            code = FAULT if isinstance(error, CrashError) else BAD_INPUT
+            code = FAULT if isinstance(error, CrashError) or _is_machines(error.__cause__) else BAD_INPUT
             return _fail(code, error_text(error, line.commands[args.command]))
     except OSError as error:
         return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
@@ -59,6 +63,11 @@ def _outcome(argv: Sequence[str] | None) -> int:
         return _fail(128 + interrupted.number, "interrupted")
     except KeyboardInterrupt:
         return _fail(INTERRUPTED, "interrupted")
+
+
+def _is_machines(cause: BaseException | None) -> bool:
+    """Whether a file could not be read for want of what the machine gives, whatever the file holds."""
+    return isinstance(cause, OSError) and cause.errno in _MACHINES
 
 
 def _fail(code: int, message: object) -> int:

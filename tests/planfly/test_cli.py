@@ -2,9 +2,11 @@
 
 import argparse
 import errno
+import os
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -80,3 +82,17 @@ def test_help_loads_nothing_heavy() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert done.stdout.endswith("code 0 []\n")
+
+
+@pytest.mark.parametrize(("number", "code"), [(errno.EMFILE, 1), (errno.EIO, 1), (errno.ENOENT, 2), (errno.EACCES, 2)])
+def test_a_file_that_the_machine_cannot_read_is_no_bad_input(
+    number: int, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    (tmp_path / "a.waypoints").write_text("QGC WPL 110", encoding="ascii")
+    monkeypatch.setattr("world.files.read_at_most", fail)
+    assert main(["check", str(tmp_path / "a.waypoints")]) == code
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.endswith(f"a.waypoints: cannot be read: {os.strerror(number)}")
