@@ -144,7 +144,7 @@ _STEPS = np.diag([0.02, 0.02, 0.03])
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
     """The clocks with the least misfit: the best of a grid, and from there a simplex (Nelder and Mead 1965).
 
-    >>> found = find_clocks(lambda clock: (clock.lag - 0.05) ** 2 + (clock.delay - 0.03) ** 2 + clock.servo_lag)
+    >>> found = find_clocks(lambda clock: abs(clock.lag - 0.05) + abs(clock.delay - 0.03) + clock.servo_lag)
     >>> round(found.lag, 2), round(found.delay, 2), round(found.servo_lag, 2)
     (0.05, 0.03, 0.0)
     """

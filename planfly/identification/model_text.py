@@ -171,6 +171,28 @@ def _reactions(motor: ElectricMotor, values: Floats, kept: list[ElementTree.Elem
         for parameter in PARAMETERS
     )
     old = "\n".join(ElementTree.tostring(one, encoding="unicode").strip() for one in kept)
+    functions = _motor_functions(motor)
+    body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
+    return f"""<external_reactions>
+{old}
+{own}
+<property value="{number(motor.voltage)}"> motor/battery-v </property>
+<property value="0"> motor/braking </property>
+{body}
+<force name="thrust" frame="BODY">
+  <function> <product> <p> motor/thrust-n </p> <v> 0.2248089430997105 </v> </product> </function>
+  <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
+  <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
+</force>
+<moment name="torque" frame="BODY">
+  <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
+  <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
+</moment>
+</external_reactions>"""
+
+
+def _motor_functions(motor: ElectricMotor) -> dict[str, str]:
+    """The inside of each JSBSim function ``motor/NAME``, in the order in which they are computed."""
     q2, q1, q0 = (number(value) for value in motor.torque)
     kv, r = motor.back_voltage, motor.resistance
     # Over the factor on motor speed: KV is divided by it, and its square is KQ KV.
@@ -192,7 +214,7 @@ def _reactions(motor: ElectricMotor, values: Floats, kept: list[ElementTree.Elem
     ]
     torque = "<p> ident/propeller-torque </p>"
     back = f"<quotient> <product> <v> {number(kv)} </v> {_SPEED} </product> {speed} </quotient>"
-    functions = {
+    return {
         "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
         "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",
         "input-v": "<product> <p> motor/battery-v </p> <p> motor/throttle-norm </p> </product>",
@@ -215,20 +237,3 @@ def _reactions(motor: ElectricMotor, values: Floats, kept: list[ElementTree.Elem
         "torque-n_m": f"<sum> <product> <p> motor/q2 </p> {_SPEED} {_SPEED} </product>"
         f" <product> <p> motor/q1 </p> {_SPEED} </product> <p> motor/q0 </p> </sum>",
     }
-    body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
-    return f"""<external_reactions>
-{old}
-{own}
-<property value="{number(motor.voltage)}"> motor/battery-v </property>
-<property value="0"> motor/braking </property>
-{body}
-<force name="thrust" frame="BODY">
-  <function> <product> <p> motor/thrust-n </p> <v> 0.2248089430997105 </v> </product> </function>
-  <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
-  <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
-</force>
-<moment name="torque" frame="BODY">
-  <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
-  <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
-</moment>
-</external_reactions>"""
