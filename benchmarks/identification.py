@@ -188,7 +188,7 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         made[f"{kind}.cpu_s"] = max(row["cpu_s"] for row in chosen)
     short = [one for row in rows for one in row["five_minutes"]]
     made["five_minutes.inside"] = f"{sum(one['climb_inside'] for one in short)} of {len(short)}"
-    made["five_minutes.within_1.5_deg"] = sum(abs(one["climb_deg"]) < 1.5 for one in short)
+    made["five_minutes.within_1.5_deg"] = int(sum(abs(one["climb_deg"]) < 1.5 for one in short))
     made["five_minutes.interval_deg"] = float(np.median([one["climb_interval_deg"] for one in short]))
     return made
 
