@@ -30,7 +30,7 @@ LINUX_ALONE = {
     "signal.SIGKILL": {"flight/autopilots/arduplane_sitl/process.py"},
     "select.select": set(),
     "import fcntl": {"world/files.py"},
-    "import resource": set(),
+    "import resource": {"planfly/campaigns/worker_pool.py", "planfly/process_setup.py"},
     "import select": set(),
     "import pwd": set(),
     "import termios": set(),
