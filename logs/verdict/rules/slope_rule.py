@@ -23,7 +23,6 @@ from logs.verdict.tolerances import (
     SATURATED,
     SHOWN_TOLERANCE,
     SURE,
-    UNDECIDED,
 )
 from logs.verdict.wording import place_text
 from world.wind import W20
@@ -74,7 +73,7 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
             method = f"{how} over {fit.run:.0f} m"
     ok: bool | None = not faults
     check = ""
-    if not faults and source == "aircraft" and (doubt := _in_doubt(requirements, leg, limit)):
+    if not faults and (doubt := _in_doubt(requirements, leg)):
         ok, check = None, UNKNOWN_AIRCRAFT
         facts.insert(0, doubt)
     if measure is not None and not measure.finished:
@@ -100,19 +99,23 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
     )
 
 
-def _in_doubt(requirements: RouteRequirements, leg: int, limit: float) -> str:
-    """Why a slope within the limit is undecided, where the limit is not known for certain; "" where it is decided.
+def _in_doubt(requirements: RouteRequirements, leg: int) -> str:
+    """Why a slope within every limit is undecided, where the aircraft's is not known for certain; "" if it is decided.
 
-    limit: rad, over the ground.
+    A scenario's tighter limit says nothing of what the aircraft can.
     """
-    planned = float(requirements.slopes[leg])
-    sure = float((requirements.sure_climb if planned >= 0.0 else requirements.sure_dive)[leg])
-    if abs(planned) <= LEVEL or not sure < limit or abs(planned) <= sure:
+    planned, envelope = float(requirements.slopes[leg]), requirements.setup.envelope
+    limits, certain, verb, off = (
+        (requirements.climb, requirements.sure_climb, "climbs", envelope.climb_sd)
+        if planned >= 0.0
+        else (requirements.dive, requirements.sure_dive, "falls", envelope.descent_sd)
+    )
+    limit, sure = float(limits[leg]), float(certain[leg])
+    # Judged without the aircraft's limits, there is none to be in doubt of.
+    if abs(planned) <= max(LEVEL, sure) or not sure < limit < math.inf:
         return ""
-    verb = "climbs" if planned >= 0.0 else "falls"
-    asked, known, off = (math.degrees(angle) for angle in (abs(planned), limit, (limit - sure) / UNDECIDED))
-    source = requirements.setup.envelope.source
-    return f"{verb} {asked:.1f}°, and what {source} says of the limit is {known:.1f}° give or take {off:.1f}°"
+    asked, known, give = (math.degrees(angle) for angle in (abs(planned), limit, off))
+    return f"{verb} {asked:.1f}°, and what {envelope.source} says of the limit is {known:.1f}° give or take {give:.1f}°"
 
 
 def _steep_arc(requirements: RouteRequirements, leg: int) -> list[Message]:

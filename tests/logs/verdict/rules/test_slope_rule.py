@@ -267,9 +267,27 @@ def test_what_is_sure_of_an_unsure_aircraft_is_judged() -> None:
         assert not verdict.undecided
 
 
-def test_the_scenarios_limit_is_known() -> None:
-    setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure(), limits={"max_climb_deg": 11.0})
-    assert of(judge_geometry(setup), "slope", leg(1)).ok is True
+def test_a_scenarios_tighter_limit_does_not_make_the_aircraft_known() -> None:
+    # 8.8 degrees are sure of 13.7; the scenario allows 11.
+    for slope, ok in ((8.0, True), (10.0, None), (11.5, False)):
+        way = [[e, n, u + 400] for e, n, u in hill(slope)]
+        verdict = judge_geometry(make_setup(way, table=unsure(), limits={"max_climb_deg": 11.0}))
+        item = of(verdict, "slope", leg(1))
+        assert (item.ok, item.limit_source) == (ok, "scenario")
+        assert item.limit == pytest.approx(11.0)
+        assert item.check == ("unknown aircraft" if ok is None else "")
+        assert verdict.undecided is (ok is None)
+        if ok is None:
+            # What the aircraft can, not what the scenario allows.
+            assert "says of the limit is 13.7° give or take 3.0°" in item.reason
+
+
+def test_the_deviation_that_is_told_is_the_aircrafts() -> None:
+    # 13.7 less 1.645 x 9 is below 0, where what is sure stops; the deviation does not.
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure(climb_sd=9.0))
+    item = of(judge_geometry(setup), "slope", leg(1))
+    assert item.ok is None
+    assert "13.7° give or take 9.0°" in item.reason
 
 
 def test_a_glide_would_tell_of_a_descent() -> None:
