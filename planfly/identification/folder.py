@@ -16,6 +16,7 @@ from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
 from aircraft.identification.performance import Performance, performance
 from aircraft.uncertainty import Draws, draws_text
+from flight.autopilots.arduplane.parameters import DEFINITIONS, logged_parameters
 from flight.dynamics.envelope_tables import load_envelope
 from flight.guidance.model_gains import gains_of_model, gains_text
 from flight.mission_files.wpl import waypoints_text
@@ -69,7 +70,7 @@ def make_identified(
     outputs: Mapping[str, ServoOutput],
 ) -> Identified:
     """With 512 draws, at the cruise speed of the last log."""
-    cruise = logs[-1].parameters.get("AIRSPEED_CRUISE", base.airspeed)
+    cruise = flown_parameters(logs[-1]).get("AIRSPEED_CRUISE", base.airspeed)
     return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise)
 
 
@@ -113,7 +114,7 @@ def _home(log: MotionLog) -> tuple[float, float, float]:
 
 def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast: float = math.inf) -> str:
     """The text of ``name.toml``; slow, fast: of level flight, m/s."""
-    base, value = found.base, found.logs[-1].parameters.get
+    base, value = found.base, flown_parameters(found.logs[-1]).get
     ratio = math.sqrt(1.225 / DENSITY)
     cruise = found.cruise
     least = max(min(value("AIRSPEED_MIN", base.airspeed_min), cruise), slow + 0.1)
@@ -138,9 +139,25 @@ def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast
     return "\n".join(lines) + "\n"
 
 
+def flown_parameters(log: MotionLog) -> dict[str, float]:
+    """Parameters of a log that say how it flew, by their present names and units.
+
+    The log may have those of ArduPlane's law by the names of 4.4 and before; values out of range are left out.
+    """
+    old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
+    present = {definition.name for definition in DEFINITIONS.values()}
+    law, _ = logged_parameters(log.parameters, log.source)
+    others = {
+        name: value
+        for name, value in log.parameters.items()
+        if name.startswith(_FLYING) and name not in old and name not in present
+    }
+    return others | law.by_origin("file")
+
+
 def _parameters(log: MotionLog) -> str:
     lines = [f"# As {Path(log.source).name} was flown: parameters of flying; those of its hardware are left out."]
-    lines += [f"{name} {value:.9g}" for name, value in sorted(log.parameters.items()) if name.startswith(_FLYING)]
+    lines += [f"{name} {value:.9g}" for name, value in sorted(flown_parameters(log).items())]
     return "\n".join(lines) + "\n"
 
 

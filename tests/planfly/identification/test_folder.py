@@ -1,0 +1,62 @@
+"""The folder of an identified aircraft says how its log was flown, and where."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import load_aircraft
+from aircraft.identification.estimate import Estimate
+from aircraft.identification.parameters import prior_means, prior_sds
+from logs.importers.motion_log import MotionLog
+from planfly.identification.base_numbers import base_model
+from planfly.identification.folder import Identified, flown_parameters, folder_files, make_identified
+from planfly.identification.records import log_outputs
+from tests.instrumented_flights import PARAMETERS, short_motion
+
+BASE = load_aircraft("aerosonde")
+# As ArduPlane 4.4 and older call them, in their units.
+OLD = {
+    "TRIM_ARSPD_CM": 2400.0,
+    "ARSPD_FBW_MIN": 17.0,
+    "ARSPD_FBW_MAX": 30.0,
+    "LIM_ROLL_CD": 4200.0,
+    "NAVL1_PERIOD": 15.0,
+}
+
+
+def flown(parameters: Mapping[str, float], **fields: Any) -> MotionLog:
+    rigged = {name: value for name, value in PARAMETERS.items() if name.startswith("SERVO")}
+    return replace(short_motion(), parameters=rigged | dict(parameters), **fields)
+
+
+def found(log: MotionLog) -> Identified:
+    """As if its estimate were the prior, ten times as sure."""
+    estimate = Estimate(prior_means(), np.diag(np.square(0.1 * prior_sds())), (), ())
+    return make_identified(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE))
+
+
+def files(log: MotionLog) -> dict[str, str]:
+    return folder_files(found(log), "mine", (BASE.battery_voltage, BASE.battery_energy))
+
+
+def test_parameters_of_an_old_release_count_by_their_present_names() -> None:
+    stated = flown_parameters(flown(OLD))
+    assert (stated["AIRSPEED_CRUISE"], stated["AIRSPEED_MIN"], stated["AIRSPEED_MAX"]) == (24.0, 17.0, 30.0)
+    assert (stated["ROLL_LIMIT_DEG"], stated["NAVL1_PERIOD"]) == (42.0, 15.0)
+    assert not (set(OLD) - {"NAVL1_PERIOD"}) & set(stated)
+
+
+def test_the_folder_of_an_old_log_has_its_speeds_and_its_bank() -> None:
+    made = files(flown(OLD))
+    table = tomllib.loads(made["mine.toml"])
+    # The base's cruise is 25 m/s, its bank another.
+    assert table["airspeed_mps"] == pytest.approx(24.0, rel=0.03)
+    assert table["max_bank_deg"] == pytest.approx(42.0)
+    assert math.degrees(BASE.max_bank) != pytest.approx(42.0)
+    assert "AIRSPEED_CRUISE 24\n" in made["ardupilot.parm"]
+    assert "TRIM_ARSPD_CM" not in made["ardupilot.parm"]
