@@ -244,8 +244,8 @@ def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) ->
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 # Names that files in every folder have.
-_TAKEN = ("ardupilot", "gains", "README")
-_SUFFIXES = frozenset({".xml", ".toml", ".parm", ".md"})
+_TAKEN = ("ardupilot", "draws", "gains", "posterior", "uncertainty", "README")
+_SUFFIXES = frozenset({".xml", ".toml", ".parm", ".md", ".csv"})
 _SHIPPED = re.compile(r"^(\s*shipped_by_jsbsim\s*=\s*)true\b", re.MULTILINE)
 
 

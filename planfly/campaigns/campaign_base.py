@@ -20,7 +20,7 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from planfly.airframe import Airframe, choose_seed, load_airframe, with_tracking
-from planfly.campaigns.dispersions import DEFAULT, Dispersions, Draw, SpreadError
+from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
 from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission
 from planfly.pipeline import Advance, OffNominal, make_plan, make_setup
 from planner.plan import Plan, plan_json, read_plan
@@ -176,9 +176,13 @@ def _check_draws(base: CampaignBase) -> None:
 
 
 def _with_own_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
-    """Default dispersions with the draws that stand beside an aircraft's model, where there are any."""
+    """Dispersions with the draws that stand beside an aircraft's model, where there are any.
+
+    A file of dispersions that names other draws, or says itself how drag or control power vary, is left as it is.
+    """
     file = aircraft.folder / DRAWS_FILE
-    if dispersions.name != DEFAULT or dispersions.draws is not None or not file.is_file():
+    stated = dispersions.name != DEFAULT and any(one.quantity.name in DRAWN for one in dispersions.varying)
+    if stated or dispersions.draws is not None or not file.is_file():
         return dispersions
     return dispersions.with_draws(read_draws(file, SpreadError))
 
@@ -218,9 +222,10 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
     if values["terrain_height"] and scenario.terrain is not None:
         scenario = replace(scenario, terrain=_raised(scenario.terrain, values["terrain_height"]))
     battery = base.airframe.battery * values["battery"]
-    airframe = replace(base.airframe, limits=_limits(base.airframe, scenario), battery=battery)
-    setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed)
     draws = base.dispersions.draws
+    limits = _limits(base.airframe, scenario, drawn=draws is not None)
+    airframe = replace(base.airframe, limits=limits, battery=battery)
+    setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed)
     properties = () if draws is None else draws.properties(draw.seed)
     variation = Variation(
         mass=values["mass"], drag=values["drag"], control=values["control_power"], properties=properties
@@ -247,10 +252,10 @@ def _raised(terrain: Terrain, by: float) -> Terrain:
     return replace(terrain, heights=(terrain.heights + np.float32(by)).astype(np.float32))
 
 
-def _limits(airframe: Airframe, scenario: Scenario) -> Limits:
-    """The airframe's limits in another wind."""
+def _limits(airframe: Airframe, scenario: Scenario, *, drawn: bool) -> Limits:
+    """The airframe's limits in another wind; drawn: whether the flight's aircraft is one of several draws."""
     old = airframe.limits
-    # What is not known of the aircraft is what the flights are drawn from; each of them is decided.
-    envelope = replace(old.envelope, climb_sd=0.0, descent_sd=0.0)
+    # A drawn aircraft is one that is known: each of its flights is decided.
+    envelope = replace(old.envelope, climb_sd=0.0, descent_sd=0.0) if drawn else old.envelope
     limits = make_limits(scenario, envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
     return with_tracking(limits, airframe.autopilot, scenario)

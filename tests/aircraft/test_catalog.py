@@ -201,7 +201,7 @@ def test_a_folder_made_from_a_folder_brings_its_engines(tmp_path: Path) -> None:
         ("there", "there: exists; name a folder that does not"),
         ("nowhere/mine", "its folder .*nowhere does not exist"),
         ("my plane", "a folder's name of letters, digits"),
-        ("gains", "none of ardupilot, gains, README"),
+        ("gains", "none of ardupilot, draws, gains, posterior, uncertainty, README"),
         ("link", "link: exists"),
     ],
 )

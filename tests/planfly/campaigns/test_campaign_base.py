@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aircraft.catalog import make_own_folder, read_aircraft
 from aircraft.data_sheet import DataSheet
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, check_middle, open_campaign, vary
 from planfly.campaigns.dispersions import (
@@ -160,6 +161,12 @@ def test_an_aircraft_brings_its_draws(sheet: Path) -> None:
     assert (varied.setup.envelope.climb_sd, varied.setup.envelope.descent_sd) == (0.0, 0.0)
 
 
+def test_a_copy_of_an_aircraft_has_its_draws(sheet: Path) -> None:
+    names = make_own_folder(sheet / "copy", read_aircraft(sheet / "foam"))
+    assert {"draws.csv", "uncertainty.toml"} <= set(names)
+    assert (sheet / "copy" / "draws.csv").read_bytes() == (sheet / "foam" / "draws.csv").read_bytes()
+
+
 def test_a_file_of_dispersions_names_draws(sheet: Path) -> None:
     spread = sheet / "spread.toml"
     spread.write_text('[aircraft]\ndraws = "foam/draws.csv"\n')
@@ -168,6 +175,21 @@ def test_a_file_of_dispersions_names_draws(sheet: Path) -> None:
     assert made.dispersions.varying == ()
     other = replace(made.dispersions.draws, values=made.dispersions.draws.values + 0.01)
     assert replace(made, dispersions=replace(made.dispersions, draws=other)).world_hash() != made.world_hash()
+
+
+@pytest.mark.parametrize(("quantity", "drawn"), [("wind_speed", True), ("drag", False)])
+def test_a_file_without_draws_flies_the_folders_or_leaves_slopes_open(sheet: Path, quantity: str, drawn: bool) -> None:
+    spread = sheet / f"{quantity}.toml"
+    spread.write_text(f'[{quantity}]\ndistribution = "norm"\nloc = 1\nscale = 0.05\nsource = "x"\n')
+    made = _opened(sheet, read_dispersions(spread))
+    assert [one.quantity.name for one in made.dispersions.varying] == [quantity]
+    varied = vary(made, Draw(0, 1, {one.name: one.nominal for one in QUANTITIES}))
+    assert (made.dispersions.draws is not None) is drawn
+    assert bool(varied.off_nominal.variation.properties) is drawn
+    # What is not known is either flown or left open.
+    envelope = varied.setup.envelope
+    assert (envelope.climb_sd == 0.0, envelope.descent_sd == 0.0) == (drawn, drawn)
+    assert drawn or envelope.climb_sd == made.airframe.limits.envelope.climb_sd > 0.0
 
 
 @pytest.mark.parametrize(
