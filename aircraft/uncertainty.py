@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.errors import FlightError, PlanflyError
-from world.files import read_small_file, read_toml, utf8_text
+from world.files import did_you_mean, read_small_file, read_toml, utf8_text
 
 Floats = NDArray[np.float64]
 
@@ -25,6 +25,10 @@ DRAWS_FILE = "draws.csv"
 DRAWS = 512
 MAX_BYTES = 4 * 2**20
 _PREFIX = "ident/"
+# Keys that must be there, those that may, and those of what else `posterior.toml` says of the logs.
+_NEEDED = frozenset({"climb_sd_deg", "descent_sd_deg"})
+_OPTIONAL = frozenset({"source", "quantity"})
+_OF_LOGS = frozenset({"base", "mass_kg", "seconds", "battery_current", "dynamics", "held_fixed", "log", "correlation"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,22 +82,39 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     source = table.get("source", "flight logs" if file.name == FILES[0] else "a data sheet")
     if not isinstance(source, str) or not source.strip():
         raise FlightError.at(str(file), "source", source, "a text is expected", shown=repr(source))
+    _check_keys(table, file)
     climb, descent = (math.radians(_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg"))
-    entries = [entry for value in table.values() if isinstance(value, list) for entry in value]
-    quantities = tuple(_quantity(entry, file) for entry in entries if isinstance(entry, dict) and "property" in entry)
-    return Uncertainty(source, climb, descent, quantities)
+    entries = table.get("quantity", [])
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise FlightError.at(
+            str(file), "quantity", entries, "[[quantity]] tables are expected", shown=repr(entries)[:60]
+        )
+    return Uncertainty(source, climb, descent, tuple(_quantity(entry, file) for entry in entries))
+
+
+def _check_keys(table: dict[str, Any], file: Path) -> None:
+    """Refuse a file without a deviation, which would be known for certain, or with a key that says nothing."""
+    known = _NEEDED | _OPTIONAL | (_OF_LOGS if file.name == FILES[0] else frozenset())
+    missing, unknown = sorted(_NEEDED - table.keys()), sorted(table.keys() - known)
+    near = did_you_mean(unknown[0], sorted(known - table.keys())) if unknown else ""
+    # A misspelt key is missing as well; the spelling is the better message.
+    if missing and not near:
+        raise FlightError(f"{file}: missing {', '.join(missing)}", file=file, field=missing[0])
+    if unknown:
+        message = f"{file}: unknown key {', '.join(unknown)}{near}"
+        raise FlightError(message, file=file, field=unknown[0], value=table[unknown[0]])
 
 
 def _number(table: dict[str, Any], key: str, file: Path, low: float, high: float) -> float:
-    """A number of a table, 0 where it is not stated.  Raises FlightError."""
-    value = table.get(key, 0.0)
+    """A number of a table.  Raises FlightError for one that is missing or out of range."""
+    value = table.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise FlightError.at(str(file), key, value, f"a number from {low:g} to {high:g} is expected", shown=repr(value))
     return float(value)
 
 
 def _quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
-    name = entry["property"]
+    name = entry.get("property")
     _check_name(name, str(file), "property")
     estimate, sd = (_number(entry, key, file, low, 1e6) for key, low in (("estimate", -1e6), ("sd", 0.0)))
     return UncertainQuantity(name, str(entry.get("unit", "factor")), estimate, sd, str(entry.get("reason", "")))
@@ -180,15 +201,21 @@ def draws_text(draws: Draws) -> str:
 def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
     """Read a ``draws.csv``.  Raises the error, with the line, for one that cannot be read or used."""
     text = utf8_text(read_small_file(path, MAX_BYTES, "draws", error), path, error)
-    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    reader = csv.reader(io.StringIO(text))
+    try:
+        rows = [(reader.line_num, row) for row in reader if row]
+    except csv.Error:
+        allowed = f"lines end with LF or CR LF, and a field has at most {csv.field_size_limit()} characters"
+        raise error(f"{path}:{reader.line_num}: {allowed}", file=path, allowed=allowed) from None
     if len(rows) < 2:
         message = f"{path}: a line of properties and at least one of values are expected"
         raise error(message, file=path)
-    names = tuple(name.strip() for name in rows[0])
+    first, header = rows[0]
+    names = tuple(name.strip() for name in header)
     for name in names:
-        _check_name(name, f"{path}:1", "property", error)
+        _check_name(name, f"{path}:{first}", "property", error)
     values = []
-    for number, row in enumerate(rows[1:], 2):
+    for number, row in rows[1:]:
         try:
             line = [float(value) for value in row]
         except ValueError:

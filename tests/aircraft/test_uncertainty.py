@@ -18,6 +18,7 @@ from aircraft.uncertainty import (
 from world.errors import FlightError
 
 THRUST = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2, "a guess")
+KNOWN = "climb_sd_deg = 3\ndescent_sd_deg = 1\n"
 LEVEL = UncertainQuantity("ident/level", "rad", -0.1, 0.02)
 
 
@@ -34,10 +35,12 @@ def test_it_is_read_as_written(tmp_path: Path) -> None:
 
 def test_a_posterior_comes_first(tmp_path: Path) -> None:
     (tmp_path / "uncertainty.toml").write_text('source = "a data sheet"\n', encoding="utf-8")
-    text = '[[parameter]]\nproperty = "ident/thrust"\nunit = "factor"\nestimate = 0.9\nsd = 0.1\n'
+    text = KNOWN + '[[quantity]]\nproperty = "ident/thrust"\nunit = "factor"\nestimate = 0.9\nsd = 0.1\n'
     (tmp_path / "posterior.toml").write_text(text, encoding="utf-8")
     found = read_uncertainty(tmp_path)
-    assert found == Uncertainty("flight logs", 0.0, 0.0, (UncertainQuantity("ident/thrust", "factor", 0.9, 0.1),))
+    assert found == Uncertainty(
+        "flight logs", math.radians(3.0), math.radians(1.0), (UncertainQuantity("ident/thrust", "factor", 0.9, 0.1),)
+    )
 
 
 def test_draws_have_mean_and_deviation_and_are_the_same_again(tmp_path: Path) -> None:
@@ -66,11 +69,14 @@ def test_draws_have_mean_and_deviation_and_are_the_same_again(tmp_path: Path) ->
         ("ident/a b\n1\n", "a property ident/NAME is expected"),
         ("ident/thrust\n1\nnan\n", ":3: nan: 1 finite numbers are expected"),
         ("ident/thrust,ident/b\n1\n", ":2: 1: 2 finite numbers are expected"),
+        ("ident/thrust\n\n\nnan\n", ":4: nan: 1 finite numbers are expected"),
+        ("ident/thrust\r1\r", ":1: lines end with LF or CR LF"),
+        ("ident/thrust\n" + 140_000 * "1" + "\n", ":2: lines end with LF or CR LF, and a field has at most 131072"),
     ],
 )
 def test_bad_draws_are_refused(tmp_path: Path, text: str, told: str) -> None:
     file = tmp_path / "draws.csv"
-    file.write_text(text, encoding="utf-8")
+    file.write_bytes(text.encode())
     with pytest.raises(FlightError, match=r"draws\.csv") as caught:
         read_draws(file)
     assert told in str(caught.value)
@@ -79,9 +85,17 @@ def test_bad_draws_are_refused(tmp_path: Path, text: str, told: str) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("climb_sd_deg = -1", "climb_sd_deg: -1: a number from 0 to 45 is expected"),
+        ("climb_sd_deg = -1\ndescent_sd_deg = 1", "climb_sd_deg: -1: a number from 0 to 45 is expected"),
         ("source = 3", "source: 3: a text is expected"),
-        ('[[quantity]]\nproperty = "x"\n', "a property ident/NAME is expected"),
+        (KNOWN + '[[quantity]]\nproperty = "x"\n', "a property ident/NAME is expected"),
+        (KNOWN + "[[quantity]]\nsd = 1\n", "a property ident/NAME is expected"),
+        (KNOWN + '[[quantity]]\nproperty = "ident/thrust"\nestimate = 1\n', "sd: None: a number from 0 to"),
+        (KNOWN + "quantity = 3", "quantity: 3: [[quantity]] tables are expected"),
+        # What is not stated is not known for certain.
+        ("", "missing climb_sd_deg, descent_sd_deg"),
+        ("climb_sd_deg = 3", "missing descent_sd_deg"),
+        ("climb_sd_dg = 3\ndescent_sd_deg = 1", "unknown key climb_sd_dg: did you mean 'climb_sd_deg'?"),
+        (KNOWN + "weather = 3", "unknown key weather"),
         ("x = ", "uncertainty.toml"),
     ],
 )
