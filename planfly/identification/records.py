@@ -18,8 +18,8 @@ Flags = NDArray[np.bool_]
 LEAST_HZ = 10.0
 # Flight that a log must have after what cannot be used is cut, s; and a stretch, s.
 LEAST_SECONDS, LEAST_STRETCH = 180.0, 30.0
-# A pause between rows that parts two stretches, s.
-_GAP = 0.5
+# A pause between rows that parts two stretches, s; of airspeed and wind, which come more slowly.
+_GAP, _AIR_GAP = 0.5, 1.0
 # After taking off or being let go, s.
 _SETTLING = 15.0
 # Flight: faster than this share of AIRSPEED_MIN.
@@ -67,11 +67,8 @@ def flight_records(
         controls[:, :2] = _elevons(log, aircraft, pulses)
     ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
     height = _at(log.height, grid)[:, 0]
-    velocity, wind = _at(log.velocity, grid), _wind(log, grid)
-    if len(log.airspeed.time):
-        airspeed = _at(log.airspeed, grid)[:, 0] * ratio
-    else:
-        airspeed = np.linalg.norm(velocity - np.column_stack([wind, np.zeros(len(grid))]), axis=1)
+    velocity, wind = _at(log.velocity, grid), _at(log.wind, grid)
+    airspeed = _at(log.airspeed, grid)[:, 0] * ratio
     inertial = _at(log.inertial, grid)
     attitude = np.column_stack([np.interp(grid, log.attitude.time, np.unwrap(a)) for a in log.attitude.values.T])
     unknown = np.full(len(grid), np.nan)
@@ -126,6 +123,12 @@ def _refuse(log: MotionLog) -> None:
     ):
         if len(samples.time) < 2:
             raise LogError(f"{log.source}: no {what}", file=log.source)
+    air = (
+        (log.airspeed, "ARSP of a sensor in use (U = 1), the airspeed"),
+        (log.wind, "XKF2, the wind"),
+    )
+    if lacking := [what for samples, what in air if len(samples.time) < 2]:
+        raise LogError(f"{log.source}: no {'; no '.join(lacking)}", file=log.source)
     for number, kind in _functions(log).items():
         if kind in _FLAPS:
             lowest, highest = _range(log, number)
@@ -209,7 +212,7 @@ def _elevons(log: MotionLog, aircraft: Aircraft, pulses: Floats) -> Floats:
 
 def _grid(log: MotionLog) -> Floats:
     """Times that all series cover."""
-    series = (log.inertial, log.outputs, log.attitude, log.velocity, log.height)
+    series = (log.inertial, log.outputs, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     first, last = max(one.time[0] for one in series), min(one.time[-1] for one in series)
     return np.arange(first, last, 1.0 / GRID_HZ)
 
@@ -222,10 +225,6 @@ def _held(samples: Samples, grid: Floats) -> Floats:
     """ServoOutput keep their value until the next."""
     rows = np.clip(np.searchsorted(samples.time, grid, side="right") - 1, 0, len(samples.time) - 1)
     return np.asarray(samples.values[rows])
-
-
-def _wind(log: MotionLog, grid: Floats) -> Floats:
-    return _at(log.wind, grid) if len(log.wind.time) else np.zeros((len(grid), 2))
 
 
 def _ratio_of_height(height: Floats) -> Floats:
@@ -250,12 +249,13 @@ def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
 
 
 def _usable(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) -> Flags:
-    """Rows in free flight on the wing, without a pause of the sensors."""
+    """Rows in free flight on the wing, without a pause of the sensors, of airspeed or of wind."""
     least = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     flying = (equivalent > _FLYING * least) & ~_vtol_rows(log, grid, pulses)
-    for samples in (log.inertial, log.outputs, log.attitude, log.velocity):
+    sensors = [(samples, _GAP) for samples in (log.inertial, log.outputs, log.attitude, log.velocity)]
+    for samples, longest in (*sensors, (log.airspeed, _AIR_GAP), (log.wind, _AIR_GAP)):
         steps = np.diff(samples.time)
-        for k in np.flatnonzero(steps > _GAP):
+        for k in np.flatnonzero(steps > longest):
             flying &= ~((grid > samples.time[k]) & (grid < samples.time[k + 1]))
     made = flying.copy()
     for first, last in _stretches(flying, 0.0):

@@ -28,6 +28,9 @@ def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
         (lambda: changed(inertial=NONE), "no IMU, the inertial sensors: LOG_BITMASK 65535 records them (it is 65535)"),
         (lambda: changed(outputs=NONE), "no RCOU, the servo outputs: LOG_BITMASK 65535"),
         (lambda: changed(attitude=NONE), "no ATT"),
+        (lambda: changed(airspeed=NONE), "no ARSP of a sensor in use (U = 1), the airspeed"),
+        (lambda: changed(wind=NONE), "no XKF2, the wind"),
+        (lambda: changed(airspeed=NONE, wind=NONE), "U = 1), the airspeed; no XKF2, the wind"),
         (lambda: changed(vehicle="copter", program="ArduCopter V4.5.7"), "flown by a copter (ArduCopter V4.5.7)"),
         (lambda: changed(vehicle="rover", program="ArduRover V4.5.7"), "flown by a rover"),
         (lambda: changed({"SERVO1_FUNCTION": 24.0}), "output 1 (SERVO1_FUNCTION 24, flaperon) moves"),
@@ -56,6 +59,18 @@ def test_a_pause_of_the_sensors_parts_two_stretches() -> None:
     keep = (log.inertial.time < 150.0) | (log.inertial.time > 153.0)
     parts = flight_records(replace(log, inertial=Samples(log.inertial.time[keep], log.inertial.values[keep])), PRIOR)
     assert [part.time[0] > 150.0 for part in parts] == [False, True]
+
+
+@pytest.mark.parametrize("name", ["airspeed", "wind"])
+def test_air_that_was_not_measured_is_not_used(name: str) -> None:
+    """A sensor out of use for two seconds parts two stretches, and one that fails for good ends the last."""
+    log = changed()
+    air = getattr(log, name)
+    keep = ((air.time < 150.0) | (air.time > 152.0)) & (air.time < 330.0)
+    parts = flight_records(replace(log, **{name: Samples(air.time[keep], air.values[keep])}), PRIOR)
+    assert [part.time[0] > 150.0 for part in parts] == [False, True]
+    assert parts[0].time[-1] <= 150.0
+    assert parts[-1].time[-1] <= 330.0 < log.inertial.time[-1]
 
 
 def test_outputs_are_read_off_the_logs_parameters() -> None:
