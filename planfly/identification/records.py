@@ -29,7 +29,7 @@ _FLYING = 0.8
 _VTOL_MODES = frozenset({17, 18, 19, 20, 21, 22, 23, 25})
 # SERVOn_FUNCTION (ArduPilot's parameter list).
 _AILERON, _ELEVATOR, _RUDDER, _THROTTLE = 4, 19, 21, 70
-_ELEVON_LEFT, _ELEVON_RIGHT, _VTAIL_LEFT, _VTAIL_RIGHT = 77, 78, 79, 80
+_MIXED = {77: "a flying wing's elevons", 78: "a flying wing's elevons", 79: "a V-tail", 80: "a V-tail"}
 _FLAPS = {
     2: "flap",
     3: "automatic flap",
@@ -63,8 +63,6 @@ def flight_records(
             for name in ("elevator", "aileron", "rudder", "throttle")
         ]
     )
-    if log.parameters.get(f"SERVO{_first(log, _ELEVON_LEFT)}_FUNCTION") == _ELEVON_LEFT and servos is None:
-        controls[:, :2] = _elevons(log, aircraft, pulses)
     ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
     height = _at(log.height, grid)[:, 0]
     velocity, wind = _at(log.velocity, grid), _at(log.wind, grid)
@@ -165,8 +163,8 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     """
     functions = _functions(log)
     for number, kind in functions.items():
-        if kind in (_VTAIL_LEFT, _VTAIL_RIGHT):
-            message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of a V-tail"
+        if kind in _MIXED:
+            message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of {_MIXED[kind]}"
             raise LogError(f"{log.source}: {message}: its mix is not modelled", file=log.source)
     made = {}
     for name, function, largest in (
@@ -182,9 +180,7 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     if number:
         lowest, _, highest, _ = _travel(log, number)
         made["throttle"] = ServoOutput(number, (lowest, highest), (0.0, 1.0))
-    elevons = bool(_first(log, _ELEVON_LEFT) and _first(log, _ELEVON_RIGHT))
-    needed = ("throttle",) if elevons else ("elevator", "aileron", "throttle")
-    for name in needed:
+    for name in ("elevator", "aileron", "throttle"):
         if name not in made:
             raise LogError(f"{log.source}: no SERVOn_FUNCTION is the {name}'s", file=log.source)
     return made
@@ -196,18 +192,6 @@ def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
     lowest, highest = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
     middle = min(max(value(f"SERVO{number}_TRIM", 1500.0), lowest + 1.0), highest - 1.0)
     return lowest, middle, highest, -1.0 if value(f"SERVO{number}_REVERSED", 0.0) > 0.0 else 1.0
-
-
-def _elevons(log: MotionLog, aircraft: Aircraft, pulses: Floats) -> Floats:
-    """Elevator and ailerons (n, 2), rad, of two elevons: half their sum and half their difference."""
-    sides = []
-    for function in (_ELEVON_LEFT, _ELEVON_RIGHT):
-        number = _first(log, function)
-        lowest, middle, highest, sign = _travel(log, number)
-        sides.append(sign * np.interp(pulses[:, number - 1], (lowest, middle, highest), (-1.0, 0.0, 1.0)))
-    left, right = sides
-    # ArduPlane: left is elevator less ailerons, right is their sum; its elevator is up positive.
-    return np.column_stack([-0.5 * (left + right) * aircraft.max_elevator, 0.5 * (right - left) * aircraft.max_aileron])
 
 
 def _grid(log: MotionLog) -> Floats:

@@ -50,3 +50,20 @@ def test_an_engine_that_burns_fuel_is_refused_in_one_line() -> None:
     with pytest.raises(FlightError, match="its motor cannot be identified") as refused:
         base_model(load_aircraft("c172x"))
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["x8", "zagi"])
+def test_a_flying_wing_is_refused_in_one_line(name: str) -> None:
+    with pytest.raises(FlightError, match="a flying wing, or without the propeller's torque") as refused:
+        base_model(load_aircraft(name))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_motor_like_the_aerosondes_without_its_torque_is_refused(tmp_path: Path) -> None:
+    """As `planfly aircraft --new --layout wing` writes it: the motor can be read, and no trim would be left."""
+    aircraft = changed_aerosonde(tmp_path / "own", Truth())
+    text = aircraft.model_file.read_text(encoding="utf-8")
+    start, end = text.index("<moment name"), text.index("</moment>") + len("</moment>")
+    aircraft.model_file.write_text(text[:start] + text[end:], encoding="utf-8")
+    with pytest.raises(FlightError, match="a flying wing, or without the propeller's torque"):
+        base_model(aircraft)

@@ -35,6 +35,7 @@ def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
         (lambda: changed(vehicle="rover", program="ArduRover V4.5.7"), "flown by a rover"),
         (lambda: changed({"SERVO1_FUNCTION": 24.0}), "output 1 (SERVO1_FUNCTION 24, flaperon) moves"),
         (lambda: changed({"SERVO2_FUNCTION": 79.0}), "V-tail"),
+        (lambda: changed({"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0}), "a flying wing's elevons"),
         (lambda: changed({"SERVO2_FUNCTION": 0.0}), "no SERVOn_FUNCTION is the elevator's"),
         (lambda: changed(modes=((0.0, 10), (120.0, 19))), "flight on its lifting motors is cut"),
     ],
@@ -80,16 +81,3 @@ def test_outputs_are_read_off_the_logs_parameters() -> None:
     assert np.degrees(found["aileron"].control(pulses)[[0, 3]]) == pytest.approx([30.0, -30.0])
     assert np.degrees(found["elevator"].control(pulses)[[0, 1, 3]]) == pytest.approx([30.0, 0.0, -30.0])
     assert found["throttle"].control(np.array([1000.0, 1770.0])) == pytest.approx([0.0, 0.77])
-
-
-def test_elevons_are_half_sum_and_half_difference() -> None:
-    log = flown_truth().log
-    values = log.outputs.values.copy()
-    # Both up by half their travel, and the right one down by a quarter more: ArduPlane's elevon_left is 77.
-    values[:, 0], values[:, 1] = 1700.0, 1900.0
-    flying = replace(
-        log, outputs=Samples(log.outputs.time, values),
-        parameters=PARAMETERS | {"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0},
-    )  # fmt: skip
-    controls = flight_records(flying, PRIOR)[0].controls[0]
-    assert np.degrees(controls[:2]) == pytest.approx([-22.5, 7.5])
