@@ -110,7 +110,11 @@ def identify_aircraft(
 
 def _base(base: str | Path) -> Aircraft:
     text = str(base.absolute()) if isinstance(base, Path) else base
-    return find_aircraft(whole_path(Path(text)) if names_folder(text) else text)
+    found = find_aircraft(whole_path(Path(text)) if names_folder(text) else text)
+    if (found.folder / "posterior.toml").is_file():
+        allowed = "identified from flight logs itself: name the base that it came from, as its posterior.toml has it"
+        raise FlightError.of_argument("base", str(base), allowed)
+    return found
 
 
 def _check_stated(stated: dict[str, float], prior: Aircraft) -> None:

@@ -1,5 +1,6 @@
 """`planfly aircraft --identify`: from a log to a folder that flies, and what is refused."""
 
+import shutil
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aircraft.catalog import read_aircraft
+from aircraft.catalog import load_aircraft, read_aircraft
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.dynamics.fdm import Fdm
 from planfly.cli import main
@@ -89,3 +90,22 @@ def test_bad_input_is_one_line_and_leaves_nothing(
     assert len(lines) == 1
     assert said in lines[0]
     assert not Path("mine").exists()
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """What is said, in one line, of input that is refused, with nothing written."""
+    assert main(["aircraft", *arguments]) == 2
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("planfly: ")]
+    assert not Path("mine").exists()
+    return line
+
+
+def test_an_identified_aircraft_is_no_base(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its motor's factors are properties of its model, which the numbers of a base leave out."""
+    shutil.copytree(load_aircraft("aerosonde").folder, "known", ignore=shutil.ignore_patterns("__pycache__", "*.py"))
+    for file in Path("known").glob("aerosonde.*"):
+        file.rename(file.with_stem("known"))
+    Path("known/posterior.toml").write_text('base = "aerosonde"\n', encoding="utf-8")
+    write_motion(Path("a.BIN"), short_motion())
+    said = refused(["--identify", "a.BIN", *ARGUMENTS, "--base", "./known", "--out", "./mine"], capsys)
+    assert "--base ./known: identified from flight logs itself: name the base that it came from" in said
