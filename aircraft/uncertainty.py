@@ -117,7 +117,7 @@ def _quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
     name = entry.get("property")
     _check_name(name, str(file), "property")
     estimate, sd = (_number(entry, key, file, low, 1e6) for key, low in (("estimate", -1e6), ("sd", 0.0)))
-    return UncertainQuantity(name, str(entry.get("unit", "factor")), estimate, sd, str(entry.get("reason", "")))
+    return UncertainQuantity(str(name), str(entry.get("unit", "factor")), estimate, sd, str(entry.get("reason", "")))
 
 
 def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = FlightError) -> None:

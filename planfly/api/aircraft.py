@@ -113,9 +113,9 @@ def new_aircraft(
         "mass": mass, "span": span, "area": area, "cruise": cruise, "stall": stall, "top": top, "bank": bank,
         "climb": climb, "motor": motor, "fuel": fuel,
     }  # fmt: skip
-    given = [name for name, value in (numbers | {"battery": battery, "prop": prop, "params": params}).items() if value]
-    given += ["layout"] if layout is not None else []
-    if not given and not any(value is not None for value in numbers.values()):
+    texts = {"battery": battery, "prop": prop, "params": params, "layout": layout}
+    given = [name for name, value in (numbers | texts).items() if value is not None]
+    if not given:
         make_own_folder(Path(folder), _opened("aerosonde" if source is None else source))
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:

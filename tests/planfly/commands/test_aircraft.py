@@ -204,6 +204,12 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
         ((*SIX, "--battery", "12"), "--battery 12: volts and capacity are expected, such as 14.8V,5Ah"),
         ((*SIX, "--prop", "12"), "--prop 12: inches of diameter and pitch are expected, such as 12x6"),
         ((*SIX, "--from", "c172x"), "--from c172x: goes without mass"),
+        # Given as nothing is given all the same.
+        (("--from", "c172x", "--mass", "0"), "--from c172x: goes without mass"),
+        (("--from", "c172x", "--prop", ""), "--from c172x: goes without prop"),
+        ((*SIX, "--fuel", "0"), "--fuel 0.0 kg: allowed 0.05..12 kg"),
+        (("--battery", ""), "--battery : volts and capacity are expected"),
+        ((*SIX, "--params", ""), "cannot be read"),
         ((*SIX, "--params", "none.parm"), "none.parm: cannot be read"),
         ((*SIX, "--climb", "nan"), "--climb nan degrees: allowed 2..35 degrees"),
     ],
