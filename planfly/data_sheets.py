@@ -24,6 +24,7 @@ from aircraft.model_writer import FACTORS, Layout, model_xml
 from aircraft.uncertainty import (
     DRAWS,
     DRAWS_FILE,
+    Floats,
     UncertainQuantity,
     Uncertainty,
     draw_quantities,
@@ -179,19 +180,23 @@ _SPREADS = {
     "aileron-power": (0.20, "ailerons from published aircraft of the class"),
 }
 # Of the steepest climb, rad: guessed, and stated.  Measured on three aircraft of known truth, a scaled model was off by
-# 4.8 degrees on average (docs/measured.md).
-GUESSED_CLIMB, STATED_CLIMB = math.radians(5.0), math.radians(3.0)
+# 4.8 degrees on average (docs/measured.md); of a normal distribution that is sqrt(2 / pi) = 0.8 of the deviation.
+GUESSED_CLIMB, STATED_CLIMB = math.radians(6.0), math.radians(3.0)
 # Of the least drag where a sink without power is stated.
 STATED_DRAG = 0.15
 _PROPULSION = ("thrust", "motor-speed")
 
 
-def _uncertainty(made: SizedAircraft, aircraft: Aircraft, climb: float) -> Uncertainty:
-    """Standard deviations such that the steepest climb has the one that it is to have (rad)."""
+def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", climb: float) -> Uncertainty:
+    """Standard deviations such that the steepest climb has the one that it is to have (rad), or a larger one.
+
+    flown: by the aircraft as estimated.
+    """
+    middle = np.array([flown.climb.climb, flown.idle.climb])
     spreads = {name: sd for name, (sd, _) in _SPREADS.items()}
     if made.sheet.sink:
         spreads["zero-lift-drag"] = STATED_DRAG
-    moved = {name: _moved(aircraft, name, spreads[name]) for name in spreads}
+    moved = {name: _moved(aircraft, middle, name, spreads[name]) for name in spreads}
     driven = math.hypot(*(moved[name][0] for name in _PROPULSION))
     other = math.hypot(*(change for name, (change, _) in moved.items() if name not in _PROPULSION))
     wanted = math.sqrt(max((0.3 * climb) ** 2, climb**2 - other**2))
@@ -201,19 +206,38 @@ def _uncertainty(made: SizedAircraft, aircraft: Aircraft, climb: float) -> Uncer
     quantities = tuple(
         UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
     )
-    return Uncertainty("a data sheet", math.hypot(other, share * driven), descent, quantities)
+    # The factors of motor and propeller go only so far; what is said of the climb does not shrink with them.
+    return Uncertainty("a data sheet", max(climb, math.hypot(other, share * driven)), descent, quantities)
 
 
-def _moved(aircraft: Aircraft, name: str, sd: float) -> tuple[float, float]:
-    """How far one standard deviation of a factor moves the steepest climb and descent at cruise, rad."""
+def _moved(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float]:
+    """How far one standard deviation of a factor moves the steepest climb and descent at cruise, rad.
+
+    middle: (2,) both path angles of the aircraft as estimated.
+    """
     angles = []
     for sign in (1.0, -1.0):
         fdm = Fdm(aircraft, tried=True, variation=Variation(properties=((f"ident/{name}", 1.0 + sign * sd),)))
         found = (steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle))
         angles.append([math.nan if trim is None else trim.climb for trim in found])
-    changes = 0.5 * np.abs(np.array(angles[0]) - np.array(angles[1]))
-    climb, descent = np.nan_to_num(changes, nan=0.0).tolist()
+    climb, descent = angle_change(np.array(angles[0]), np.array(angles[1]), middle).tolist()
     return climb, descent
+
+
+def angle_change(more: Floats, less: Floats, middle: Floats) -> Floats:
+    """(n,) how far a factor moves path angles, from those with more and with less of it, rad.
+
+    An angle is NaN where the aircraft does not trim: the change to the one that there is then counts, and the whole
+    angle if there is neither.  middle: (n,) angles as estimated.
+
+    >>> more, less = np.array([0.3, math.nan, math.nan]), np.array([0.1, 0.05, math.nan])
+    >>> angle_change(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
+    [0.1, 0.15, 0.2]
+    """
+    one_sided = np.fmax(np.abs(more - middle), np.abs(less - middle))
+    one_sided = np.where(np.isnan(one_sided), np.abs(middle), one_sided)
+    both: Floats = 0.5 * np.abs(more - less)
+    return np.where(np.isnan(both), one_sided, both)
 
 
 # ----------------------------------------------------------------------
@@ -285,7 +309,7 @@ def _files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, flo
     aircraft = read_aircraft(draft)
     fdm = Fdm(aircraft, tried=True)
     guessed = "climb" in made.guessed
-    known = _uncertainty(made, aircraft, GUESSED_CLIMB if guessed else STATED_CLIMB)
+    known = _uncertainty(made, aircraft, flown, GUESSED_CLIMB if guessed else STATED_CLIMB)
     return {
         f"{name}.xml": model,
         f"{name}.toml": metadata,
