@@ -74,6 +74,7 @@ STALL_SHARE = (0.35, 0.87)  # stall by cruise
 TOP_SHARE = (1.05, 2.5)  # top by cruise
 LIFT_RANGE = (0.5, 2.4)  # lift coefficient at the stall
 ASPECT_RANGE = (2.5, 25.0)  # span^2 / area
+MOST_BATTERY = 300.0 * 3600.0  # J by the aircraft's mass, kg: no cell that is sold holds more by its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,6 +198,10 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         raise _refused("fuel", sheet.fuel, "goes without --battery and --motor", "kg")
     if sheet.fuel > 0.6 * sheet.mass:
         raise _refused("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
+    if not sheet.fuelled and sheet.energy > MOST_BATTERY * sheet.mass:
+        most = MOST_BATTERY / 3600.0
+        allowed = f"allowed up to {most * sheet.mass:g} Wh with a mass of {sheet.mass:g} kg, {most:g} Wh/kg"
+        raise _refused("battery", sheet.energy / 3600.0, allowed, "Wh")
     return sheet
 
 
