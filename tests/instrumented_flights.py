@@ -264,6 +264,7 @@ def sensed(track: Track, aircraft: Aircraft, sensors: Sensors, seed: int) -> Mot
         else Samples(np.zeros(0), np.zeros((0, 2))),
         modes=((float(time[0]), 10),),
         parameters=dict(PARAMETERS),
+        home=HOME,
     )
 
 
@@ -360,6 +361,9 @@ def write_motion(path: Path, log: MotionLog) -> Path:
     put(log.height, "POS", "f", "Alt")
     put(log.battery, "BAT", "Bff", "Inst,Volt,Curr", (0,))
     out.message("MSG", "QZ", "TimeUS,Message", 1, log.program)
+    if log.home is not None:
+        lat, lon, amsl = log.home
+        out.message("ORGN", "QBLLf", "TimeUS,Type,Lat,Lng,Alt", 1, 1, lat, lon, amsl)
     for name, value in log.parameters.items():
         out.message("PARM", "QNf", "TimeUS,Name,Value", 1, name, value)
     for time, mode in log.modes:

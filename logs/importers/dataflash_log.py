@@ -63,12 +63,12 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
         made = logged_mission(logged, source, "CMD")
         if made is not None:
             mission = made.mission
-            home = mission.home if mission.home is not None else _home(origins)
+            home = mission.home if mission.home is not None else logged_home(origins)
             yield replace(made, mission=replace(mission, home=home, warnings=(*mission.warnings, *notes)))
 
 
-def _home(origins: Messages) -> Home | None:
-    """Home as the vehicle last had it."""
+def logged_home(origins: Messages) -> Home | None:
+    """Home as the vehicle last had it, of the messages ORGN; None where they do not say."""
     if not origins.has("Type", "Lat", "Lng", "Alt"):
         return None
     homes = origins.only(origins.column("Type") == _HOME)

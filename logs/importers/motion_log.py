@@ -13,15 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
-from logs.importers.dataflash_log import program_and_vehicle
+from logs.importers.dataflash_log import logged_home, program_and_vehicle
 from logs.importers.raw_log import VehicleKind
 from world.errors import LogError
 
 Floats = NDArray[np.float64]
 
-
-# Where a log flew that does not say where.
-_NOWHERE = (46.0, 8.0)
+# Slower than this it stands on the ground, m/s.
+_STANDING = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +47,8 @@ class MotionLog:
     airspeed: (n, 1) equivalent, m/s, of a sensor that was in use.  ratio: (n, 1) true by equivalent airspeed.
     height: (n, 1) m above sea level.  battery: (n, 2) V and A.
     modes: time and number of the flight mode.  parameters: by name; those that changed in flight keep the last.
-    place: latitude and longitude of its first position, degrees; in Switzerland where it has none.
+    home: latitude and longitude, degrees, and m above sea level: as the vehicle had it last (ORGN), or its first
+        position on the ground; None where neither is logged.
     """
 
     source: str
@@ -66,13 +66,13 @@ class MotionLog:
     battery: Samples
     modes: tuple[tuple[float, int], ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
-    place: tuple[float, float] = _NOWHERE
+    home: tuple[float, float, float] | None = None
 
 
 _DEGREE = math.pi / 180.0
 _NAMES = (
     "IMU", "RCOU", "ATT", "XKF1", "NKF1", "XKF2", "NKF2", "ARSP", "CTUN", "POS", "BAT", "CURR", "MODE", "PARM", "MSG",
-    "VER",
+    "VER", "ORGN",
 )  # fmt: skip
 _INSTANCES = ("I", "C", "Inst", "Instance")
 OUTPUTS = 14
@@ -109,6 +109,7 @@ class _Dataflash:
         events = self._index.messages("MSG")
         texts = events.texts("Message") if events.has("Message") else []
         program, vehicle = program_and_vehicle(texts, self._index.messages("VER"))
+        velocity = self._first((name, ("VN", "VE", "VD")) for name in ("XKF1", "NKF1"))
         inertial = self._first((("IMU", ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ")),))
         return MotionLog(
             source=self._source,
@@ -118,7 +119,7 @@ class _Dataflash:
             inertial=inertial,
             outputs=self._first((("RCOU", tuple(f"C{k}" for k in range(1, OUTPUTS + 1))),)),
             attitude=self._first((("ATT", ("Roll", "Pitch", "Yaw")),), _DEGREE),
-            velocity=self._first((name, ("VN", "VE", "VD")) for name in ("XKF1", "NKF1")),
+            velocity=velocity,
             wind=self._first((name, ("VWN", "VWE")) for name in ("XKF2", "NKF2")),
             airspeed=self._airspeed(),
             ratio=self._first((("CTUN", ("E2T",)),)),
@@ -126,7 +127,7 @@ class _Dataflash:
             battery=self._first((("BAT", ("Volt", "Curr")), ("CURR", ("Volt", "Curr")))),
             modes=tuple(self._modes()),
             parameters=self._parameters(),
-            place=self._place(),
+            home=self._home(velocity),
         )
 
     def _messages(self, name: str) -> Messages:
@@ -175,16 +176,32 @@ class _Dataflash:
         values = zip(found.texts("Name"), found.column("Value").tolist(), strict=True)
         return {name: value for name, value in values if math.isfinite(value)}
 
-    def _place(self) -> tuple[float, float]:
-        found = self._messages("POS")
-        if not found.has("Lat", "Lng"):
-            return _NOWHERE
-        place = np.column_stack([found.column("Lat"), found.column("Lng")])
-        good = np.isfinite(place).all(axis=1) & (np.abs(place) < [90.0, 180.0]).all(axis=1)
-        if not good.any():
-            return _NOWHERE
-        lat, lon = place[int(np.argmax(good))].tolist()
-        return lat, lon
+    def _home(self, velocity: Samples) -> tuple[float, float, float] | None:
+        home = logged_home(self._index.messages("ORGN"))
+        if home is not None:
+            return home.lat_deg, home.lon_deg, home.alt
+        return first_on_ground(self._first((("POS", ("Lat", "Lng", "Alt")),)), velocity)
+
+
+def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
+    """The first position at which a vehicle stood still; None of a log that begins in flight.
+
+    position: (n, 3) latitude, longitude (degrees) and height (m).  velocity: (n, 3) m/s.
+
+    >>> place = Samples(np.array([1.0, 2.0]), np.array([[48.0, 11.0, 520.0], [48.0, 11.001, 540.0]]))
+    >>> first_on_ground(place, Samples(np.array([0.0, 3.0]), np.zeros((2, 3))))
+    (48.0, 11.0, 520.0)
+    """
+    if not len(position.time) or not len(velocity.time):
+        return None
+    time, place = position.time, position.values
+    speed = np.interp(time, velocity.time, np.linalg.norm(velocity.values, axis=1), left=np.inf, right=np.inf)
+    known = (np.abs(place[:, :2]) <= [90.0, 180.0]).all(axis=1) & (place[:, :2] != 0.0).any(axis=1)
+    standing = np.flatnonzero(known & (speed < _STANDING))
+    if not len(standing):
+        return None
+    lat, lon, height = place[standing[0]].tolist()
+    return lat, lon, height
 
 
 def _rising(time: Floats, values: Floats) -> Samples:

@@ -182,6 +182,8 @@ def _identify(args: argparse.Namespace) -> int:
         print("  performance only: under 10 rows of IMU or RCOU a second tell nothing of the moments")
     for line in estimate.silent():
         print(f"  not seen {line}")
+    if "identify.waypoints" not in files_made:
+        print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
     for replay in found.replays:
         shown = ", ".join(f"{name} {value:.2g}" for name, value in replay.rms.items())
         print(f"  replay   {replay.model}: {shown} (rms of {replay.windows} windows of 5 s; deg/s, deg, m/s)")

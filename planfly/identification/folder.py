@@ -77,6 +77,7 @@ def make_identified(
 def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
     """The files of its folder but for the page, by their names; battery: V and J.
 
+    The mission of manoeuvres begins at the logs' home, and is left out where none of them says where that is.
     Raises FlightError for an aircraft that does not trim.
     """
     xml = identified_xml(found.base, name, found.numbers, found.estimate.values)
@@ -90,13 +91,15 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
         slow, fast = envelope.level_speeds(0.0)
         toml.write_text(_metadata(found, battery, slow, fast), encoding="utf-8")
         aircraft = read_aircraft(folder)
-        mission = identification_mission(aircraft, envelope, *_home(found.logs[-1]))
+        home = next((log.home for log in reversed(found.logs) if log.home is not None), None)
         files = {
             f"{name}.xml": xml,
             f"{name}.toml": toml.read_text(encoding="utf-8"),
             "gains.toml": gains_text(gains_of_model(aircraft)),
-            "identify.waypoints": waypoints_text(mission),
         }
+        if home is not None:
+            mission = identification_mission(aircraft, envelope, *home)
+            files["identify.waypoints"] = waypoints_text(mission)
     properties = tuple(parameter.property_name for parameter in PARAMETERS)
     return files | {
         "ardupilot.parm": _parameters(found.logs[-1]),
@@ -104,12 +107,6 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
         "posterior.toml": posterior_text(found),
         "draws.csv": draws_text(Draws(properties, found.draws)),
     }
-
-
-def _home(log: MotionLog) -> tuple[float, float, float]:
-    """Latitude, longitude and height of where the log was flown; a place of its own where it does not say."""
-    lowest = float(log.height.values.min()) if len(log.height.time) else 0.0
-    return (*log.place, max(0.0, lowest - 100.0))
 
 
 def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast: float = math.inf) -> str:

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs.importers.motion_log import read_motion
+from logs.importers.motion_log import Samples, first_on_ground, read_motion
 from tests.instrumented_flights import short_motion, write_motion
 from world.errors import LogError
 
@@ -43,3 +43,19 @@ def test_rows_out_of_order_doubled_or_no_numbers_are_left_out(tmp_path: Path) ->
     )
     assert len(read.height.time) == len(time) - 2
     assert (np.diff(read.height.time) > 0.0).all()
+
+
+def test_home_is_what_the_vehicle_had_and_nowhere_without(tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    placed = replace(short_motion(), home=(47.25, -8.5, 430.0))
+    assert read_motion(write_motion(tmp_path / "a.BIN", placed)).home == pytest.approx((47.25, -8.5, 430.0))
+    assert read_motion(write_motion(tmp_path / "b.BIN", short_motion())).home is None
+
+
+def test_the_first_position_on_the_ground_is_where_it_stood_still() -> None:
+    position = Samples(np.arange(4.0), np.array([[0, 0, 0], [48, 11, 520], [48, 11.1, 521], [48, 12, 700]], np.float64))
+    taking_off = Samples(np.array([0.0, 1.0, 2.0, 3.0]), np.array([[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0], [20, 0, 0.0]]))
+    assert first_on_ground(position, taking_off) == (48.0, 11.0, 520.0)
+    in_flight = Samples(taking_off.time, taking_off.values + np.array([15.0, 0.0, 0.0]))
+    assert first_on_ground(position, in_flight) is None

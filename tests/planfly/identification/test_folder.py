@@ -52,7 +52,10 @@ def test_parameters_of_an_old_release_count_by_their_present_names() -> None:
 
 
 def test_the_folder_of_an_old_log_has_its_speeds_and_its_bank() -> None:
-    made = files(flown(OLD))
+    made = files(flown(OLD, home=(48.0, 11.0, 520.0)))
+    # Its mission begins where it flew.
+    home = made["identify.waypoints"].splitlines()[1].split("\t")
+    assert [float(value) for value in home[8:11]] == pytest.approx([48.0, 11.0, 520.0])
     table = tomllib.loads(made["mine.toml"])
     # The base's cruise is 25 m/s, its bank another.
     assert table["airspeed_mps"] == pytest.approx(24.0, rel=0.03)
@@ -60,3 +63,7 @@ def test_the_folder_of_an_old_log_has_its_speeds_and_its_bank() -> None:
     assert math.degrees(BASE.max_bank) != pytest.approx(42.0)
     assert "AIRSPEED_CRUISE 24\n" in made["ardupilot.parm"]
     assert "TRIM_ARSPD_CM" not in made["ardupilot.parm"]
+
+
+def test_no_mission_is_made_of_a_log_that_does_not_say_where_it_flew() -> None:
+    assert "identify.waypoints" not in files(flown(PARAMETERS))
