@@ -107,7 +107,9 @@ def _levels(
         airframe = reference.airframe
         passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
         differing = _differing("airframe", passed, flown)
-        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing))
+        # What is not flyable although nothing of it failed was left open.
+        unsure = not airframe.flyable and not airframe.failed
+        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing, undecided=unsure))
     undecided = bool(left_open(flown)) and not any(item.ok is False for item in flown)
     own = LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable, source), undecided=undecided)
     return (*levels, own)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import MissionStretch
-from logs.verdict.findings import Finding, Verdict, closest_to_limit
+from logs.verdict.findings import Finding, Verdict, closest_to_limit, left_open
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.places import DecidingParameter, Suggestion
 from logs.verdict.rules.registry import RULES
@@ -313,7 +313,7 @@ def rule_rows(findings: Iterable[Finding]) -> list[RuleRow]:
 def _rule_row(rule: str, group: list[Finding]) -> RuleRow:
     failed = sum(finding.ok is False for finding in group)
     judged = sum(finding.ok is not None for finding in group)
-    state = "fail" if failed else "pass" if judged else "unjudged"
+    state = "fail" if failed else "pass" if judged and not left_open(group) else "unjudged"
     parts: list[str] = [f"{failed} of {judged} fail" if failed else f"{judged} ok"] if judged else []
     if judged < len(group):
         parts.append(f"{len(group) - judged} not judged")

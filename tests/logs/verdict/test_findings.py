@@ -15,7 +15,15 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import SCHEMA, Finding, Verdict, closest_to_limit, make_finding, verdict_json
+from logs.verdict.findings import (
+    SCHEMA,
+    UNKNOWN_AIRCRAFT,
+    Finding,
+    Verdict,
+    closest_to_limit,
+    make_finding,
+    verdict_json,
+)
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.places import (
     FLIGHT,
@@ -273,3 +281,10 @@ def test_a_failed_finding_is_closest_to_its_limit_everywhere(
 def test_a_finding_that_fails_within_its_tolerance_fails_by_other_evidence(margin: float, kept: float | None) -> None:
     item = make_finding("slope", Place("leg", 1), ok=False, reason="too weak", margin=margin, tolerance=1.1, unit="deg")
     assert item.margin == kept
+
+
+def test_a_rule_with_a_finding_left_open_is_not_called_ok_in_the_report() -> None:
+    passed = make_finding("slope", Place("leg", 0), ok=True, reason="", margin=1.0, unit="deg")
+    unsure = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
+    assert [row.state for row in rule_rows([passed])] == ["pass"]
+    assert [(row.state, row.counts) for row in rule_rows([passed, unsure])] == [("unjudged", "1 ok, 1 not judged")]
