@@ -69,8 +69,8 @@ def make_identified(
     logs: Sequence[MotionLog],
     outputs: Mapping[str, ServoOutput],
 ) -> Identified:
-    """With 512 draws, at the cruise speed of the last log."""
-    cruise = flown_parameters(logs[-1]).get("AIRSPEED_CRUISE", base.airspeed)
+    """With 512 draws, at the cruise speed (true, at `AMSL`) of the last log."""
+    cruise = _airspeeds(logs[-1], base)[0]
     return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise)
 
 
@@ -109,14 +109,31 @@ def folder_files(found: Identified, name: str, battery: tuple[float, float]) -> 
     }
 
 
+def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
+    """Cruise, least and largest true airspeed at `AMSL`, m/s; the base's where the log does not say.
+
+    ArduPlane's are equivalent airspeeds.
+    """
+    stated = flown_parameters(log)
+    ratio = math.sqrt(1.225 / DENSITY)
+    cruise, least, most = (
+        stated[name] * ratio if name in stated else own
+        for name, own in (
+            ("AIRSPEED_CRUISE", base.airspeed),
+            ("AIRSPEED_MIN", base.airspeed_min),
+            ("AIRSPEED_MAX", base.airspeed_max),
+        )
+    )
+    return cruise, least, most
+
+
 def _metadata(found: Identified, battery: tuple[float, float], slow: float, fast: float = math.inf) -> str:
     """The text of ``name.toml``; slow, fast: of level flight, m/s."""
     base, value = found.base, flown_parameters(found.logs[-1]).get
-    ratio = math.sqrt(1.225 / DENSITY)
-    cruise = found.cruise
-    least = max(min(value("AIRSPEED_MIN", base.airspeed_min), cruise), slow + 0.1)
-    cruise = max(cruise, least)
-    most = max(cruise, min(value("AIRSPEED_MAX", base.airspeed_max) * ratio, fast))
+    _, lowest, highest = _airspeeds(found.logs[-1], base)
+    least = max(min(lowest, found.cruise), slow + 0.1)
+    cruise = max(found.cruise, least)
+    most = max(cruise, min(highest, fast))
     stall = min(slow if slow > 0.0 else base.stall_speed, least)
     volts, energy = battery
     rows = {
