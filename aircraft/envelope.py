@@ -11,9 +11,9 @@ from world.kernels import compiled
 Floats = NDArray[np.float64]
 
 GRAVITY = 9.80665
-# Standard deviations by which a slope that is not known for certain counts as sure: 95 % one-sided, of a normal
-# distribution.
-SURE = 1.645
+# Standard deviations.  A slope nearer than this to a limit that is not known for certain is undecided: 95 % one-sided,
+# of a normal distribution.
+UNDECIDED = 1.645
 # Names of the tables of an `Envelope`, and of its power tables.
 TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
 POWERS = ("power_idle", "power_level", "power_full")
@@ -76,7 +76,7 @@ class Envelope:
         )
 
     def surely(self) -> "Envelope":
-        """The slopes that the aircraft can for certain, as far as that is known: `SURE` deviations less, 0 at least.
+        """The slopes that the aircraft can for certain, as far as is known: `UNDECIDED` deviations less, 0 at least.
 
         >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
         >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
@@ -86,7 +86,7 @@ class Envelope:
         """
         if not (self.climb_sd or self.descent_sd):
             return self
-        less = {name: SURE * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
+        less = {name: UNDECIDED * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
         # What loses height stays as it is.
         climb, descent = (
             np.where(table > 0.0, np.maximum(0.0, table - less[name]), table)

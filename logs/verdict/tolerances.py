@@ -6,6 +6,8 @@ aircraft are not here: they come with the flight.
 
 import math
 
+from aircraft import envelope
+
 # What a plan's numbers are known to
 
 # rad.  A planned angle: 1e-7 degrees of latitude (1 cm) on a 130 m leg, and rounding.
@@ -76,8 +78,8 @@ OFF_SPEED = 1.0
 # ground.
 GUST_SHARE = 0.15
 # Standard deviations.  A slope is undecided where the limit of an aircraft that is not known for certain lies nearer:
-# 95 % one-sided, of a normal distribution.  Plans keep as far away (`aircraft.envelope.SURE`).
-UNDECIDED = 1.645
+# 95 % one-sided, of a normal distribution.  Plans keep as far away, so that it is the envelope's.
+UNDECIDED = envelope.UNDECIDED
 # s.  So long a climb at full throttle, or a glide without, tells what an aircraft can: the speed settles in 5 s, and
 # the gusts of 15 s average out.
 TELLING_FLIGHT = 20.0

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.envelope import GRAVITY, SURE, Envelope, _at, ground_slope, ground_speed, turn_radius
-from logs.verdict.tolerances import UNDECIDED
+from aircraft.envelope import GRAVITY, UNDECIDED, Envelope, _at, ground_slope, ground_speed, turn_radius
+from logs.verdict import tolerances
 from tests.setups import falling_envelope
 
 
@@ -116,5 +116,10 @@ def test_level_speeds_lie_between_those_of_the_heights() -> None:
         envelope.climb[0, 0] = 1.0
 
 
-def test_plans_keep_as_far_from_what_is_not_known_as_the_verdict() -> None:
-    assert SURE == UNDECIDED
+def test_the_verdict_publishes_what_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+    # 2 deviations of 0.05 rad, and not 1.645, once the one constant says so.
+    monkeypatch.setattr("aircraft.envelope.UNDECIDED", 2.0)
+    known = replace(falling_envelope(), climb=np.full_like(falling_envelope().climb, 0.2), climb_sd=0.05)
+    assert known.surely().climb == pytest.approx(0.1)
+    monkeypatch.undo()
+    assert tolerances.UNDECIDED == UNDECIDED == 1.645
