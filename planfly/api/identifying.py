@@ -21,7 +21,7 @@ from planfly.identification.records import LEAST_HZ, flight_records, log_outputs
 from planfly.identification.replay import QUANTITIES, UNITS, Replay, replay_log
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.stages import stage
-from world.errors import FlightError, PlanflyError
+from world.errors import FlightError, LogError, PlanflyError
 from world.files import whole_path, write_folder
 from world.scenario_tables import names_folder
 
@@ -91,8 +91,11 @@ def identify_aircraft(
         volts, energy = sheet.volts, sheet.energy
     numbers = scaled(base_model(prior), stated["mass"], stated["span"], stated["area"], volts)
     with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}"):
-        read = [(log, *_stretches(log, prior)) for log in map(read_motion, paths)]
-        checked = None if check is None else _stretches(read_motion(Path(check)), prior)[0]
+        motions = [read_motion(path) for path in paths]
+        motion = None if check is None else read_motion(Path(check))
+        _refuse_equal([*motions, *([] if motion is None else [motion])])
+        read = [(log, *_stretches(log, prior)) for log in motions]
+        checked = None if motion is None else _stretches(motion, prior)[0]
     records = [record for _, stretches, _ in read for record in stretches]
     log, _, outputs = read[-1]
     with stage("estimating"):
@@ -128,6 +131,18 @@ def _check_stated(stated: dict[str, float], prior: Aircraft) -> None:
             allowed = f"{own / _FARTHEST:.3g}..{own * _FARTHEST:.3g} is near enough to {prior.name}"
             advice = "planfly aircraft --new FOLDER makes a base from a data sheet, for `base`"
             raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g}")
+
+
+def _refuse_equal(logs: Sequence[MotionLog]) -> None:
+    """Refuse the same log twice, and a check log that was identified from.  Raises LogError."""
+    first: dict[str, str] = {}
+    for log in logs:
+        if log.sha256 in first:
+            allowed = "each log is expected once, and another one to check with"
+            raise LogError(
+                f"{log.source}: the same bytes as {first[log.sha256]}: {allowed}", file=log.source, allowed=allowed
+            )
+        first[log.sha256] = log.source
 
 
 def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:

@@ -37,7 +37,7 @@ UNITS = ("deg/s", "deg/s", "deg/s", "deg", "deg", "m/s")
 class Replay:
     """A log replayed by one model.
 
-    model: which, for people.
+    model: which, for people: the base's name, or "identified".
     rms: by quantity of `QUANTITIES`, in `UNITS`: root mean square of replayed less logged, over all windows.
     windows: how many.  shown: (2, k, 6) logged and replayed values over the time of some windows, behind each other.
     """
@@ -61,7 +61,7 @@ def replay_log(
         for file, text in files.items():
             (folder / file).write_text(text, encoding="utf-8")
         aircraft = read_aircraft(folder)
-        before = _replayed("data sheet", aircraft, prior_means(), signals, flow, folder)
+        before = _replayed(found.base.name, aircraft, prior_means(), signals, flow, folder)
         after = _replayed("identified", aircraft, found.estimate.values, signals, flow, folder)
     return before, after
 

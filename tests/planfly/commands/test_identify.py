@@ -34,7 +34,9 @@ def identify(*more: str) -> int:
 
 def test_a_log_becomes_a_folder_that_flies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("a.BIN").write_bytes(log_bytes())
-    assert identify("--battery", "44.4V,888Wh", "--check", "a.BIN") == 0
+    # The same flight in a file of other bytes.
+    write_motion(Path("b.BIN"), replace(flown_truth().log, program="ArduPlane V4.6.1"))
+    assert identify("--battery", "44.4V,888Wh", "--check", "b.BIN") == 0
     said = capsys.readouterr().out
     assert "at cruise" in said
     folder = tmp_path / "mine"
@@ -61,6 +63,7 @@ def test_a_log_becomes_a_folder_that_flies(tmp_path: Path, capsys: pytest.Captur
     assert joint[thrust, speed] < -0.5
     # The replay: far nearer than the base, whose ailerons and mass are others.
     rows = [line for line in said.splitlines() if line.strip().startswith("replay")]
+    assert [row.split(":")[0].split()[1] for row in rows] == ["aerosonde", "identified"]
     roll = [float(row.split("roll ")[2].split(",")[0]) for row in rows]
     assert roll[1] < 0.4 * roll[0]
     # Nothing of the mission is beyond the model; of six minutes of log its slopes may stay undecided.
@@ -109,3 +112,11 @@ def test_an_identified_aircraft_is_no_base(capsys: pytest.CaptureFixture[str]) -
     write_motion(Path("a.BIN"), short_motion())
     said = refused(["--identify", "a.BIN", *ARGUMENTS, "--base", "./known", "--out", "./mine"], capsys)
     assert "--base ./known: identified from flight logs itself: name the base that it came from" in said
+
+
+@pytest.mark.parametrize("again", [["--identify", "a.BIN", "b.BIN"], ["--identify", "a.BIN", "--check", "b.BIN"]])
+def test_the_same_log_twice_is_refused(again: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    write_motion(Path("a.BIN"), short_motion())
+    shutil.copy("a.BIN", "b.BIN")
+    said = refused([*again, *ARGUMENTS, "--out", "./mine"], capsys)
+    assert "b.BIN: the same bytes as a.BIN: each log is expected once" in said
