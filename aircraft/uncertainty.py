@@ -27,7 +27,7 @@ MAX_BYTES = 4 * 2**20
 _PREFIX = "ident/"
 # Keys that must be there, those that may, and those of what else `posterior.toml` says of the logs.
 _NEEDED = frozenset({"climb_sd_deg", "descent_sd_deg"})
-_OPTIONAL = frozenset({"source", "quantity"})
+_OPTIONAL = frozenset({"source", "quantity", "battery_guessed"})
 _OF_LOGS = frozenset({"base", "mass_kg", "seconds", "battery_current", "dynamics", "held_fixed", "log", "correlation"})
 
 
@@ -53,12 +53,14 @@ class Uncertainty:
     source: what it was made from: "a data sheet", "flight logs".
     climb, descent: standard deviations of the steepest climb and descent at cruise, rad.
     quantities: of the model.
+    battery_guessed: whether nobody stated what its battery holds.
     """
 
     source: str
     climb: float
     descent: float
     quantities: tuple[UncertainQuantity, ...] = ()
+    battery_guessed: bool = False
 
 
 def read_uncertainty(folder: Path) -> Uncertainty | None:
@@ -84,12 +86,16 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
         raise FlightError.at(str(file), "source", source, "a text is expected", shown=repr(source))
     _check_keys(table, file)
     climb, descent = (math.radians(_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg"))
+    guessed = table.get("battery_guessed", False)
+    if not isinstance(guessed, bool):
+        raise FlightError.at(str(file), "battery_guessed", guessed, "true or false is expected", shown=repr(guessed))
     entries = table.get("quantity", [])
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise FlightError.at(
             str(file), "quantity", entries, "[[quantity]] tables are expected", shown=repr(entries)[:60]
         )
-    return Uncertainty(source, climb, descent, tuple(_quantity(entry, file) for entry in entries))
+    quantities = tuple(_quantity(entry, file) for entry in entries)
+    return Uncertainty(source, climb, descent, quantities, guessed)
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
@@ -135,6 +141,8 @@ def uncertainty_text(known: Uncertainty) -> str:
         f"climb_sd_deg = {math.degrees(known.climb):.2f}    # of the steepest climb at cruise, one standard deviation",
         f"descent_sd_deg = {math.degrees(known.descent):.2f}  # of the steepest descent",
     ]
+    if known.battery_guessed:
+        lines.append("battery_guessed = true  # no energy is judged until battery_wh is stated and this line is gone")
     for one in known.quantities:
         reason = one.reason.replace("\\", "/").replace('"', "'")
         lines += [

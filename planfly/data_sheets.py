@@ -207,7 +207,8 @@ def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", 
         UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
     )
     # The factors of motor and propeller go only so far; what is said of the climb does not shrink with them.
-    return Uncertainty("a data sheet", max(climb, math.hypot(other, share * driven)), descent, quantities)
+    deviation = max(climb, math.hypot(other, share * driven))
+    return Uncertainty("a data sheet", deviation, descent, quantities, "energy" in made.guessed)
 
 
 def _moved(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import load_parameters
 from flight.dynamics.characteristics import modes_at
+from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest, full_throttle, slowest, straight
 from flight.simulation.simulate import simulate
@@ -91,6 +92,12 @@ def test_what_is_said_of_the_climb_is_not_capped_with_the_propulsion(
     # Thrust goes to twice its 20 %, which comes to less than 30 degrees.
     assert {one.name: one.sd for one in known.quantities}["ident/thrust"] == pytest.approx(0.4)
     assert math.degrees(known.climb) == pytest.approx(30.0, abs=0.01)
+
+
+@pytest.mark.parametrize("energy", [0.0, 74.0 * 3600.0])
+def test_a_battery_that_nobody_stated_is_a_guess(tmp_path: Path, energy: float) -> None:
+    made = make_data_sheet_folder(tmp_path / "foam", replace(FOAM, volts=14.8, energy=energy))
+    assert load_envelope(made).battery_guessed is (energy == 0.0)
 
 
 def test_parameters_are_data(tmp_path: Path) -> None:

@@ -18,11 +18,15 @@ from logs.verdict.tolerances import RESERVE
 def energy_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding: the energy used against the battery less its reserve; a jump without end needs more than any."""
+    """One finding: the energy used against the battery less its reserve; a jump without end needs more than any.
+
+    A battery that was guessed is not judged.
+    """
     setup = requirements.setup
     usable = (1.0 - RESERVE) * setup.battery
     predicted, peak = predicted_energy(requirements)
     faults = [_never_ends(requirements, usable)] if setup.route.endless >= 0 else []
+    guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     used, current = predicted, peak
     if not geometric:
         used = math.nan if aligned is None else float(aligned.track.energy.max())
@@ -33,13 +37,17 @@ def energy_findings(
         reason = _used_text(requirements, used, current) + (" by prediction" if geometric else "")
         if not geometric and math.isfinite(predicted):
             reason += f"; {predicted:.1f} Wh by prediction"
-        if used > usable:
+        if guessed:
+            reason = (
+                f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
+            )
+        elif used > usable:
             reason += f"; {RESERVE:.0%} are to be left"
     return [
         make_finding(
             "energy",
             FLIGHT,
-            ok=False if faults else None if math.isnan(used) else used <= usable,
+            ok=False if faults else None if guessed or math.isnan(used) else used <= usable,
             reason=reason_of(faults, [reason]),
             faults=faults,
             planned=predicted,
@@ -47,7 +55,7 @@ def energy_findings(
             limit=usable,
             source="aircraft" if setup.scenario.flight.battery_wh is None else "scenario",
             tolerance=0.0,
-            margin=usable - used,
+            margin=math.nan if guessed else usable - used,
             unit="Wh",
             method="power of steady flight on each leg over its time" if geometric else "power over time",
         )

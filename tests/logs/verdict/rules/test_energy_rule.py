@@ -70,6 +70,19 @@ def test_a_battery_with_less_than_its_reserve_left_fails(setup: FlightSetup) -> 
     assert of(verdict, "energy").limit == pytest.approx(24.0)
 
 
+def test_a_guessed_battery_is_not_judged() -> None:
+    guess = replace(load_envelope(AEROSONDE), battery_guessed=True)
+    # Neither a battery that would do nor one that would not.
+    for battery in (1.0, 5000.0):
+        setup = replace(real_setup(table=guess), battery=battery)
+        flown = [judge(setup, fly_path(setup)), judge_geometry(setup)]
+        for item in (of(verdict, "energy") for verdict in flown):
+            assert (item.ok, item.margin) == (None, None)
+            assert item.reason.startswith("the battery is guessed: state --battery")
+    stated = make_scenario(ROUTE, battery_wh=1.0)
+    assert of(judge_geometry(replace(real_setup(table=guess, scenario=stated), battery=1.0)), "energy").ok is False
+
+
 def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() -> None:
     calm, _ = predicted_energy(route_requirements(real_setup()))
     scenario = make_scenario(ROUTE, wind={"speed_mps": 8.0, "from_deg": 20.0})
