@@ -17,6 +17,7 @@ from planfly.first_start import with_warm_up
 from planfly.identification.base_numbers import base_model, scaled
 from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
+from planfly.identification.model_text import check_base
 from planfly.identification.records import LEAST_HZ, flight_records, log_outputs
 from planfly.identification.replay import QUANTITIES, UNITS, Replay, replay_log
 from planfly.identification.servos import ServoOutput, read_servos
@@ -42,6 +43,7 @@ class IdentifiedAircraft:
     climb, sink: steepest at cruise, full throttle and idle, degrees: lower end, estimate and upper end (95 %).
     power: of level flight at cruise, W, likewise.
     replays: of the check log, by the base and by the identified model; none without one.
+    without_current: logs without the battery's current where others have it: it is used of none then.
     """
 
     aircraft: Aircraft
@@ -50,6 +52,7 @@ class IdentifiedAircraft:
     sink: tuple[float, float, float]
     power: tuple[float, float, float]
     replays: tuple[Replay, ...] = ()
+    without_current: tuple[str, ...] = ()
 
 
 @with_warm_up()
@@ -90,6 +93,7 @@ def identify_aircraft(
         sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
         volts, energy = sheet.volts, sheet.energy
     numbers = scaled(base_model(prior), stated["mass"], stated["span"], stated["area"], volts)
+    check_base(prior)
     with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}"):
         motions = [read_motion(path) for path in paths]
         motion = None if check is None else read_motion(Path(check))
@@ -108,7 +112,7 @@ def identify_aircraft(
     with stage("drawing"):
         files["identify.html"] = _page(found, replays, None if check is None else Path(check).name, target.name)
     write_folder(target, {name: text.encode() for name, text in files.items()})
-    return _answer(read_aircraft(target), found, replays)
+    return _answer(read_aircraft(target), found, replays, without_current(records))
 
 
 def _base(base: str | Path) -> Aircraft:
@@ -210,6 +214,14 @@ def _intervals(found: Identified) -> tuple[Interval, Interval, Interval]:
     )
 
 
-def _answer(aircraft: Aircraft, found: Identified, replays: tuple[Replay, ...]) -> IdentifiedAircraft:
+def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
+    """Logs without the battery's current, where another has it."""
+    lacking = {record.source: None for record in records if not record.has_current}
+    return tuple(lacking) if any(record.has_current for record in records) else ()
+
+
+def _answer(
+    aircraft: Aircraft, found: Identified, replays: tuple[Replay, ...], lacking: tuple[str, ...]
+) -> IdentifiedAircraft:
     climb, sink, power = _intervals(found)
-    return IdentifiedAircraft(aircraft, found.estimate, climb, sink, power, replays)
+    return IdentifiedAircraft(aircraft, found.estimate, climb, sink, power, replays, lacking)

@@ -170,6 +170,13 @@ def _identify(args: argparse.Namespace) -> int:
     if given or args.name is not None or args.folder is not None:
         field = "name" if args.name is not None else f"--{given[0]}" if given else "--new"
         raise PlanflyError(f"--identify goes without {field}: the logs have that", field=field)
+    for field, is_given, instead in (
+        ("--params", args.params is not None, "the logs have the parameters"),
+        ("--from", args.source is not None, "--base names the aircraft to begin with"),
+        ("--motor-braking", args.motor_braking, "it is a choice of each flight"),
+    ):
+        if is_given:
+            raise PlanflyError(f"--identify goes without {field}: {instead}", field=field)
     found = call(planfly.identify_aircraft, args, folder=args.out)
     made, estimate = found.aircraft, found.estimate
     files_made = sorted(file.name for file in made.folder.iterdir())
@@ -182,6 +189,8 @@ def _identify(args: argparse.Namespace) -> int:
         print("  performance only: under 10 rows of IMU or RCOU a second tell nothing of the moments")
     for line in estimate.silent():
         print(f"  not seen {line}")
+    for log in found.without_current:
+        print(f"  current  not used, as {log} has none (BAT): identify from the other logs alone to use theirs")
     if "identify.waypoints" not in files_made:
         print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
     for replay in found.replays:

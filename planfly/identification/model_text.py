@@ -15,6 +15,7 @@ from aircraft.identification.base_model import BaseModel
 from aircraft.identification.electric_motor import ElectricMotor
 from aircraft.identification.parameters import INDEX, PARAMETERS
 from aircraft.xml_text import number
+from world.errors import FlightError
 
 Floats = NDArray[np.float64]
 
@@ -34,19 +35,16 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
     text = text.replace("ident/", "base/")
     root = ElementTree.fromstring(text, parser=ElementTree.XMLParser(target=ElementTree.TreeBuilder()))
     root.set("name", name)
-    _set_sizes(root, numbers)
+    _set_sizes(root, numbers, base)
     kept = [one for one in root.iter("property") if (one.text or "").strip().startswith("base/")]
-    old = root.find("external_reactions")
+    old = _part(root, "external_reactions", base)
     reactions = ElementTree.fromstring(_reactions(numbers.motor, values, kept))
-    assert old is not None  # noqa: S101 - `planfly.identification.base_numbers.read_motor` found its motor there
     root.remove(old)
     # Its properties are read by what follows.
-    position = next(k for k, one in enumerate(root) if one.tag == "flight_control")
-    root.insert(position, reactions)
-    aerodynamics = root.find("aerodynamics")
-    assert aerodynamics is not None  # noqa: S101
+    root.insert(list(root).index(_part(root, "flight_control", base)), reactions)
+    aerodynamics = _part(root, "aerodynamics", base)
     shared = f"<a>{_lift_functions(numbers)}</a>"
-    first_axis = next(k for k, one in enumerate(aerodynamics) if one.tag == "axis")
+    first_axis = list(aerodynamics).index(_part(root, "aerodynamics/axis", base))
     for k, function in enumerate(ElementTree.fromstring(shared)):
         aerodynamics.insert(first_axis + k, function)
     drag = " <p> aero/drag-factor </p>" if "aero/drag-factor" in text else ""
@@ -62,7 +60,37 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
     return head + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _set_sizes(root: ElementTree.Element, numbers: BaseModel) -> None:
+# What of a base's model is written anew, or beside which something is written.
+_PARTS = (
+    *(f"metrics/{name}" for name in ("wingarea", "wingspan", "chord")),
+    *(f"mass_balance/{name}" for name in ("ixx", "iyy", "izz", "ixz", "emptywt")),
+    *("external_reactions", "flight_control", "aerodynamics/axis"),
+)
+
+
+def check_base(base: Aircraft) -> None:
+    """Refuse a base whose model lacks a part that `identified_xml` needs.  Raises FlightError, in one line."""
+    try:
+        root = ElementTree.parse(base.model_file).getroot()
+    except (OSError, ElementTree.ParseError) as error:
+        message = f"{base.model_file}: {' '.join(str(error).split())}: a JSBSim model is expected"
+        raise FlightError(message, file=base.model_file) from None
+    for path in _PARTS:
+        _part(root, path, base)
+
+
+def _part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementTree.Element:
+    found = root.find(path)
+    if found is None:
+        allowed = "a model to identify from needs it, as aircraft/aerosonde/aerosonde.xml has it"
+        raise FlightError(
+            f"{base.model_file}: no <{path.replace('/', '><')}>: {allowed}", file=base.model_file, field=path,
+            allowed=allowed,
+        )  # fmt: skip
+    return found
+
+
+def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) -> None:
     ixx, iyy, izz, ixz = numbers.inertia
     sizes = {
         "metrics/wingarea": (numbers.area, "M2"),
@@ -75,12 +103,9 @@ def _set_sizes(root: ElementTree.Element, numbers: BaseModel) -> None:
         "mass_balance/emptywt": (numbers.mass / _POUND, "LBS"),
     }
     for path, (value, unit) in sizes.items():
-        found = root.find(path)
-        assert found is not None, path  # noqa: S101 - JSBSim loaded the model
+        found = _part(root, path, base)
         found.text, found.attrib = f" {number(value)} ", {"unit": unit}
-    balance = root.find("mass_balance")
-    assert balance is not None  # noqa: S101
-    balance.set("negated_crossproduct_inertia", "false")
+    _part(root, "mass_balance", base).set("negated_crossproduct_inertia", "false")
 
 
 # ----------------------------------------------------------------------

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft, read_aircraft
+from aircraft.identification.flight_record import FlightRecord
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.dynamics.fdm import Fdm
+from planfly.api.identifying import without_current
 from planfly.cli import main
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 from tests.instrumented_flights import short_motion, write_motion
@@ -77,6 +79,9 @@ def test_a_log_becomes_a_folder_that_flies(tmp_path: Path, capsys: pytest.Captur
         (["--identify", "a.BIN", "--mass", "13", "--span", "2.9"], "--identify needs --out, the folder to make"),
         (["--identify", "no.BIN", *ARGUMENTS, "--out", "./mine"], "no.BIN: no such file"),
         (["--identify", "a.BIN", *ARGUMENTS, "--cruise", "20", "--out", "./mine"], "goes without --cruise"),
+        (["--identify", "a.BIN", *ARGUMENTS, "--params", "a.parm", "--out", "./mine"], "goes without --params"),
+        (["--identify", "a.BIN", *ARGUMENTS, "--from", "x8", "--out", "./mine"], "--base names the aircraft"),
+        (["--identify", "a.BIN", *ARGUMENTS, "--motor-braking", "--out", "./mine"], "goes without --motor-braking"),
         (["--identify", "a.BIN", "--mass", "2", "--span", "2.9", "--out", "./mine"], "near enough to aerosonde"),
         (["--identify", "a.BIN", "--mass", "99", "--span", "2.9", "--out", "./mine"], "allowed 0.3..50 kg"),
         (["--identify", "a.BIN", *ARGUMENTS, "--battery", "12", "--out", "./mine"], "volts and capacity"),
@@ -120,3 +125,16 @@ def test_the_same_log_twice_is_refused(again: list[str], capsys: pytest.CaptureF
     shutil.copy("a.BIN", "b.BIN")
     said = refused([*again, *ARGUMENTS, "--out", "./mine"], capsys)
     assert "b.BIN: the same bytes as a.BIN: each log is expected once" in said
+
+
+def test_logs_without_current_among_others_are_named() -> None:
+    def record(source: str, amperes: float) -> FlightRecord:
+        one, two, three, four = (np.zeros((5, n)) for n in (1, 2, 3, 4))
+        flat = one[:, 0]
+        return FlightRecord(
+            flat, three, three, three, three, two, flat, flat, flat, four, flat + amperes, flat, source=source
+        )  # fmt: skip
+
+    known, unknown = record("a.BIN", 3.0), record("b.BIN", np.nan)
+    assert without_current([known, unknown, unknown]) == ("b.BIN",)
+    assert without_current([known, known]) == without_current([unknown, unknown]) == ()

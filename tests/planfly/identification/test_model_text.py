@@ -1,5 +1,6 @@
 """The written model does what the parameters say, as JSBSim flies it."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
 from planfly.identification.base_numbers import _Probe, base_model, scaled
-from planfly.identification.model_text import identified_xml
+from planfly.identification.model_text import check_base, identified_xml
 from tests.instrumented_flights import Truth, changed_aerosonde
+from world.errors import FlightError
 
 BASE = load_aircraft("aerosonde")
 FACTORS = {
@@ -73,3 +75,22 @@ def test_a_draw_is_a_set_of_properties(tmp_path: Path) -> None:
     base = straight(Fdm(BASE), 25.0, 500.0)
     assert base is not None
     assert weaker.throttle > base.throttle + 0.02
+
+
+@pytest.mark.parametrize(
+    ("cut", "said"),
+    [
+        (r"<ixz.*?</ixz>", "no <mass_balance><ixz>"),
+        (r"<flight_control.*</flight_control>", "no <flight_control>"),
+        (r"<external_reactions>.*</external_reactions>", "no <external_reactions>"),
+    ],
+)
+def test_a_base_whose_model_lacks_a_part_is_refused_in_one_line(tmp_path: Path, cut: str, said: str) -> None:
+    own = changed_aerosonde(tmp_path / "own", Truth())
+    check_base(own)
+    text = own.model_file.read_text(encoding="utf-8")
+    own.model_file.write_text(re.sub(cut, "", text, flags=re.DOTALL), encoding="utf-8")
+    with pytest.raises(FlightError) as refused:
+        check_base(own)
+    assert f"own.xml: {said}: " in str(refused.value)
+    assert "\n" not in str(refused.value)
