@@ -35,6 +35,7 @@ class Envelope:
     volts: battery voltage, 0 without one.
     source: what the model was made from where its slopes are not known for certain: "a data sheet"; "" where they are.
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
+    power_sd: standard deviation of power, as a share.
     battery_guessed: whether nobody stated what the battery holds.
     """
 
@@ -55,6 +56,7 @@ class Envelope:
     source: str = ""
     climb_sd: float = 0.0
     descent_sd: float = 0.0
+    power_sd: float = 0.0
     battery_guessed: bool = False
 
     def __post_init__(self) -> None:

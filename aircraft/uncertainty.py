@@ -23,11 +23,13 @@ Floats = NDArray[np.float64]
 FILES = ("posterior.toml", "uncertainty.toml")
 DRAWS_FILE = "draws.csv"
 DRAWS = 512
+# Of the power that an aircraft from a data sheet takes, as a share: that of its least drag, of which most of it comes.
+POWER_SD = 0.25
 MAX_BYTES = 4 * 2**20
 _PREFIX = "ident/"
 # Keys that must be there, those that may, and those of what else `posterior.toml` says of the logs.
 _NEEDED = frozenset({"climb_sd_deg", "descent_sd_deg"})
-_OPTIONAL = frozenset({"source", "quantity", "battery_guessed"})
+_OPTIONAL = frozenset({"source", "quantity", "battery_guessed", "power_sd"})
 _OF_LOGS = frozenset({"base", "mass_kg", "seconds", "battery_current", "dynamics", "held_fixed", "log", "correlation"})
 
 
@@ -53,6 +55,7 @@ class Uncertainty:
     source: what it was made from: "a data sheet", "flight logs".
     climb, descent: standard deviations of the steepest climb and descent at cruise, rad.
     quantities: of the model.
+    power: standard deviation of the power that flight takes, as a share.
     battery_guessed: whether nobody stated what its battery holds.
     """
 
@@ -60,6 +63,7 @@ class Uncertainty:
     climb: float
     descent: float
     quantities: tuple[UncertainQuantity, ...] = ()
+    power: float = 0.0
     battery_guessed: bool = False
 
 
@@ -95,7 +99,10 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
             str(file), "quantity", entries, "[[quantity]] tables are expected", shown=repr(entries)[:60]
         )
     quantities = tuple(_quantity(entry, file) for entry in entries)
-    return Uncertainty(source, climb, descent, quantities, guessed)
+    power = POWER_SD if file.name == FILES[1] else 0.0
+    if "power_sd" in table:
+        power = _number(table, "power_sd", file, 0.0, 1.0)
+    return Uncertainty(source, climb, descent, quantities, power, guessed)
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
@@ -140,6 +147,7 @@ def uncertainty_text(known: Uncertainty) -> str:
         f'source = "{known.source}"',
         f"climb_sd_deg = {math.degrees(known.climb):.2f}    # of the steepest climb at cruise, one standard deviation",
         f"descent_sd_deg = {math.degrees(known.descent):.2f}  # of the steepest descent",
+        f"power_sd = {known.power:.3g}  # of the power that flight takes, as a share",
     ]
     if known.battery_guessed:
         lines.append("battery_guessed = true  # no energy is judged until battery_wh is stated and this line is gone")

@@ -24,6 +24,7 @@ from aircraft.model_writer import FACTORS, Layout, model_xml
 from aircraft.uncertainty import (
     DRAWS,
     DRAWS_FILE,
+    POWER_SD,
     Floats,
     UncertainQuantity,
     Uncertainty,
@@ -208,7 +209,7 @@ def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", 
     )
     # The factors of motor and propeller go only so far; what is said of the climb does not shrink with them.
     deviation = max(climb, math.hypot(other, share * driven))
-    return Uncertainty("a data sheet", deviation, descent, quantities, "energy" in made.guessed)
+    return Uncertainty("a data sheet", deviation, descent, quantities, POWER_SD, "energy" in made.guessed)
 
 
 def _moved(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float]:

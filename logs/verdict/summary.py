@@ -52,7 +52,11 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
     'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
     """
-    found = left_open(findings)
+    every = left_open(findings)
+    found = [item for item in every if item.rule == "slope"]
+    if len(found) < len(every):
+        slopes = f"slopes on {len(found)} legs and energy are" if found else "energy is"
+        return f"{slopes} within what is not known of the aircraft"
     if not found:
         return ""
     if len(found) > _NAMED:

@@ -23,7 +23,9 @@ LEVEL = UncertainQuantity("ident/level", "rad", -0.1, 0.02)
 
 
 def test_it_is_read_as_written(tmp_path: Path) -> None:
-    known = Uncertainty("a data sheet", math.radians(5.0), math.radians(1.25), (THRUST, LEVEL), battery_guessed=True)
+    known = Uncertainty(
+        "a data sheet", math.radians(5.0), math.radians(1.25), (THRUST, LEVEL), power=0.3, battery_guessed=True
+    )
     (tmp_path / "uncertainty.toml").write_text(uncertainty_text(known), encoding="utf-8")
     found = read_uncertainty(tmp_path)
     assert found is not None
@@ -31,6 +33,7 @@ def test_it_is_read_as_written(tmp_path: Path) -> None:
     assert (found.climb, found.descent) == pytest.approx((known.climb, known.descent))
     assert found.quantities == (THRUST, LEVEL)
     assert found.battery_guessed
+    assert found.power == 0.3
     assert read_uncertainty(tmp_path.parent) is None
 
 
@@ -97,6 +100,7 @@ def test_bad_draws_are_refused(tmp_path: Path, text: str, told: str) -> None:
         ("climb_sd_deg = 3", "missing descent_sd_deg"),
         ("climb_sd_dg = 3\ndescent_sd_deg = 1", "unknown key climb_sd_dg: did you mean 'climb_sd_deg'?"),
         (KNOWN + "weather = 3", "unknown key weather"),
+        (KNOWN + "power_sd = 2", "power_sd: 2: a number from 0 to 1 is expected"),
         (KNOWN + "battery_guessed = 1", "battery_guessed: 1: true or false is expected"),
         ("x = ", "uncertainty.toml"),
     ],

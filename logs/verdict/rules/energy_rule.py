@@ -6,13 +6,13 @@ import numpy as np
 
 from aircraft.envelope import ground_speed
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Margin, Rule
 from logs.verdict.suggestions import use_less_energy
-from logs.verdict.tolerances import RESERVE
+from logs.verdict.tolerances import RESERVE, UNDECIDED
 
 
 def energy_findings(
@@ -20,7 +20,8 @@ def energy_findings(
 ) -> list[Finding]:
     """One finding: the energy used against the battery less its reserve; a jump without end needs more than any.
 
-    A battery that was guessed is not judged.
+    A battery that was guessed is not judged, and energy that is not surely within the limit is left open where the
+    aircraft's power is not known for certain; an imported log has it measured.
     """
     setup = requirements.setup
     usable = (1.0 - RESERVE) * setup.battery
@@ -31,6 +32,9 @@ def energy_findings(
     if not geometric:
         used = math.nan if aligned is None else float(aligned.track.energy.max())
         current = math.nan if aligned is None else float(aligned.track.current.max())
+    measured = setup.source is not None and not geometric
+    most = used * (1.0 + (0.0 if measured else UNDECIDED * setup.envelope.power_sd))
+    doubt = not faults and not guessed and used <= usable < most
     if math.isnan(used):
         reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
     else:
@@ -41,13 +45,15 @@ def energy_findings(
             reason = (
                 f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
             )
+        elif doubt:
+            reason += f"; what {setup.envelope.source} says of the power is give or take {setup.envelope.power_sd:.0%}"
         elif used > usable:
             reason += f"; {RESERVE:.0%} are to be left"
     return [
         make_finding(
             "energy",
             FLIGHT,
-            ok=False if faults else None if guessed or math.isnan(used) else used <= usable,
+            ok=False if faults else None if guessed or doubt or math.isnan(used) else used <= usable,
             reason=reason_of(faults, [reason]),
             faults=faults,
             planned=predicted,
@@ -57,6 +63,7 @@ def energy_findings(
             tolerance=0.0,
             margin=math.nan if guessed else usable - used,
             unit="Wh",
+            check=UNKNOWN_AIRCRAFT if doubt else "",
             method="power of steady flight on each leg over its time" if geometric else "power over time",
         )
     ]
@@ -145,7 +152,7 @@ RULE = Rule(
     title="energy",
     asks="Does the flight leave the battery's or the tank's reserve?",
     margin=Margin("energy", "Wh", 50.0),
-    tolerances=("RESERVE",),
+    tolerances=("RESERVE", "UNDECIDED"),
     judge=energy_findings,
     suggest=use_less_energy,
     log=LogNeeds(("battery",), aircraft=True),

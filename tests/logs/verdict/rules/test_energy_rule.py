@@ -83,6 +83,20 @@ def test_a_guessed_battery_is_not_judged() -> None:
     assert of(judge_geometry(replace(real_setup(table=guess, scenario=stated), battery=1.0)), "energy").ok is False
 
 
+@pytest.mark.parametrize(("share", "ok"), [(0.79 / 1.41125, True), (0.81 / 1.41125, None), (0.79, None), (0.81, False)])
+def test_energy_within_what_is_not_known_is_undecided(share: float, ok: bool | None) -> None:
+    """25 % give or take: 1 + 1.645 x 0.25 is 1.41125."""
+    unsure = replace(load_envelope(AEROSONDE), source="a data sheet", power_sd=0.25)
+    setup = real_setup(table=unsure)
+    used, _ = predicted_energy(route_requirements(setup))
+    verdict = judge_geometry(replace(setup, battery=used / share))
+    item = of(verdict, "energy")
+    assert (item.ok, verdict.undecided) == (ok, ok is None)
+    if ok is None:
+        assert "what a data sheet says of the power is give or take 25%" in item.reason
+        assert verdict.headline.startswith("not judged in full: energy is within what is not known of the aircraft")
+
+
 def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() -> None:
     calm, _ = predicted_energy(route_requirements(real_setup()))
     scenario = make_scenario(ROUTE, wind={"speed_mps": 8.0, "from_deg": 20.0})
