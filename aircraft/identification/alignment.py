@@ -95,7 +95,7 @@ _SAMPLED = (
     "acceleration", "rates", "rate_changes", "attitude", "velocity", "wind", "airspeed", "density", "surfaces",
     "throttle", "current", "voltage",
 )  # fmt: skip
-# Length of a block of time within which residuals may hang together, s.
+# Length of a block of time within which residuals may be autocorrelated, s.
 BLOCK_SECONDS = 20.0
 # Airspeed sensors are read 10 times a second; faster than this, Hz, is their noise.
 _AIRSPEED_BAND = 2.0

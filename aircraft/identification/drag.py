@@ -32,7 +32,7 @@ NUISANCES = {
 # The last two count in standard deviations of `AlphaDoubt`.
 # Where the battery's voltage is logged it is known this much better.
 _LOGGED_VOLTAGE = 0.25
-# What no model gets right, m/s^2 and A, and over how long it hangs together, s.
+# What no model gets right, m/s^2 and A, and over how long it is autocorrelated, s.
 _FORCE_FLOOR, _CURRENT_FLOOR, _FLOOR_SECONDS = 0.015, 0.3, 5.0
 _OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
 _STEP = 1e-3

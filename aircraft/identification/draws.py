@@ -1,4 +1,4 @@
-"""Whole aircraft drawn from an estimate: parameters together, as they hang together."""
+"""Whole aircraft drawn from an estimate: parameters together, correlated as they are."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -54,7 +54,7 @@ class Equation:
 
     name: for people.  unit: of both.  hertz: samples a second.
     measured, predicted: (n,), low-passed, all stretches behind each other.
-    explained: R^2.  correlation: s over which residuals hang together.
+    explained: R^2.  correlation: s over which residuals are autocorrelated.
     """
 
     name: str

@@ -52,7 +52,8 @@ _PULLS = "elevator doublets of 1 s"
 _ROLLS = "aileron doublets of 1 s, or an AUTOTUNE flight"
 _YAWS = "rudder doublets of 1 s"
 
-# Priors: 1 sd, of an aircraft scaled from another of its class (docs/your-aircraft.md says what they were tried on).
+# Priors: 1 sd, of an aircraft scaled from another of its class; docs/from-your-log-to-your-verdict.md says what
+# they were tuned on.
 PARAMETERS = (
     Parameter("lift-slope", "lift slope", "factor", 0.12, "lift", (0.5, 1.6), show=_SPEEDS),
     Parameter("lift-offset", "lift at zero angle of attack", "offset", 0.15, "lift", (-0.6, 0.6), show=_SPEEDS),

@@ -1,4 +1,4 @@
-"""Least squares with a prior, and a covariance that allows for residuals that hang together in time."""
+"""Least squares with a prior, and a covariance that allows for residuals that are autocorrelated."""
 
 from dataclasses import dataclass
 
@@ -51,7 +51,7 @@ def fit_with_prior(
     """Most probable coefficients of columns (n, p) for measured (n,), with independent normal priors.
 
     mean, sd: (p,) of the priors; an infinite sd is none.  blocks: (n,) numbers of the blocks of rows.
-    floor: least variance of a residual times the samples over which it hangs together, for what no model gets right.
+    floor: least variance of a residual times the samples over which it is autocorrelated, for what no model gets right.
 
     The data's weight counts independent samples alone, by the residual's autocorrelation; the covariance is the robust
     one over blocks (White 1980, Liang and Zeger 1986), with the prior's share.

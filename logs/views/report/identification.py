@@ -138,6 +138,6 @@ def _fits(
     made = []
     for k, equation in enumerate(estimate.equations):
         name = f"fit-{k}"
-        said = f"R² {equation.explained:.3f}; what is left hangs together for {equation.correlation:.2g} s"
+        said = f"R² {equation.explained:.3f}; its residuals are autocorrelated over {equation.correlation:.2g} s"
         made.append((name, charts[name].title, picture_address(pictures[f"{name}.png"]), said))
     return made
