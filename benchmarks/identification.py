@@ -105,8 +105,11 @@ def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]
     }
 
 
-def too_steep_is_refused(folder: Path, climb: float, estimate: Estimate, base: BaseModel, log: Any) -> bool:
-    """Whether the identified model refuses a leg that is a fifth steeper than the truth climbs; climb: rad."""
+def verdict_of_too_steep(folder: Path, climb: float, estimate: Estimate, base: BaseModel, log: Any) -> str:
+    """What the identified model says of a leg that is a fifth steeper than the truth climbs; climb: rad.
+
+    "refused", "undecided" or "flyable".
+    """
     prior = load_aircraft("aerosonde")
     found = make_identified(prior, base, estimate, [log], read_servos(prior.folder / "ardupilot.toml"))
     place = folder / "mine"
@@ -124,7 +127,7 @@ def too_steep_is_refused(folder: Path, climb: float, estimate: Estimate, base: B
     file = folder / "steep.waypoints"
     file.write_text("\n".join(["QGC WPL 110", *lines]) + "\n", encoding="utf-8")
     verdict = planfly.judge(str(file), aircraft=str(place)).verdict
-    return not verdict.flyable
+    return "undecided" if verdict.undecided else "flyable" if verdict.flyable else "refused"
 
 
 def one_variant(seed: int, repeats: int, shorts: int) -> dict[str, Any]:
@@ -148,7 +151,7 @@ def one_variant(seed: int, repeats: int, shorts: int) -> dict[str, Any]:
             own.mkdir()
             made["with_battery" if battery else "without_battery"] = errors(base, values, estimate) | {
                 "cpu_s": spent,
-                "too_steep_refused": too_steep_is_refused(own, climb, estimate, base, log),
+                "too_steep": verdict_of_too_steep(own, climb, estimate, base, log),
             }
         made["five_minutes"] = []
         for other in range(1, shorts + 1):
@@ -184,7 +187,8 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
             sizes = np.abs([row[name] for row in chosen])
             made[f"{kind}.{name}"] = {"median": float(np.median(sizes)), "worst": float(sizes.max())}
         made[f"{kind}.coverage"] = sum(row["inside"] for row in chosen) / (len(NAMES) * len(chosen))
-        made[f"{kind}.too_steep_refused"] = sum(row["too_steep_refused"] for row in chosen)
+        for answer in ("refused", "undecided", "flyable"):
+            made[f"{kind}.too_steep_{answer}"] = sum(row["too_steep"] == answer for row in chosen)
         made[f"{kind}.cpu_s"] = max(row["cpu_s"] for row in chosen)
     short = [one for row in rows for one in row["five_minutes"]]
     made["five_minutes.inside"] = f"{sum(one['climb_inside'] for one in short)} of {len(short)}"
