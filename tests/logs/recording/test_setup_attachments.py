@@ -99,6 +99,16 @@ def test_the_setup_comes_back_whole(tmp_path: Path, track: Track, with_plan: boo
     assert log.versions["numpy"] == np.__version__
 
 
+def test_what_is_not_known_of_an_aircraft_comes_back(tmp_path: Path, track: Track) -> None:
+    made = make_setup()
+    envelope = dataclasses.replace(
+        made.envelope, source="a data sheet", climb_sd=0.1, descent_sd=0.02, power_sd=0.25, battery_guessed=True
+    )
+    limits = dataclasses.replace(made.limits, envelope=envelope)
+    setup = dataclasses.replace(made, limits=limits)
+    same(read_log(record(tmp_path / "a.mcap", setup, track)).setup, setup)
+
+
 def test_the_real_autopilot_that_flew_comes_back(tmp_path: Path, track: Track) -> None:
     given, changed = {"NAVL1_PERIOD": 15.0, "WP_RADIUS": 90.5}, {"NAVL1_PERIOD": 15.0}
     program = AutopilotProgram("ArduPlane V4.6.0 (0badc0de)", "ab" * 32, given, changed, ("FOO",))
@@ -117,7 +127,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     assert len(names[Limits]) == 9
     assert len(names[Mission]) == 7
     assert len(names[Route]) == 13
-    assert len(names[Envelope]) == 17
+    assert len(names[Envelope]) == 19
     assert len(dataclasses.fields(MissionItem)) == 8
 
 
