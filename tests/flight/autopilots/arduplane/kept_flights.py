@@ -49,6 +49,12 @@ def kept_track(flight: str) -> Floats:
     return np.array([[float(row[name]) for name in ("time_s", "east_m", "north_m", "amsl_m")] for row in rows])
 
 
+def rally(flight: str) -> list[tuple[float, float, float]]:
+    """East, north (m) and height over home of the rally points that a flight had."""
+    points = [row for row in _rows("rally.csv") if row["rally_set"] == KEPT[flight]["rally_set"]]
+    return [(float(one["east_m"]), float(one["north_m"]), float(one["over_home_m"])) for one in points]
+
+
 @functools.cache
 def jacksboro() -> Scenario:
     """The scenario in the flights' wind."""
@@ -96,13 +102,9 @@ def return_mission(flight: str) -> Mission:
         _item(2, Command.NAV_WAYPOINT, (east, north, up), radius=1.0),
         MissionItem(3, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0),
     )
-    points = [row for row in _rows("rally.csv") if row["rally_set"] == KEPT[flight]["rally_set"]]
-    rally = [
-        _item(k, Command.NAV_RALLY_POINT, (float(one["east_m"]), float(one["north_m"]), float(one["over_home_m"])), 3)
-        for k, one in enumerate(points)
-    ]
+    points = [_item(k, Command.NAV_RALLY_POINT, point, 3) for k, point in enumerate(rally(flight))]
     lat, lon = (on_grid(float(value)) for value in to_geo(jacksboro().origin, *HOME[:2]))
-    return Mission(Home(lat, lon, HOME[2]), items, rally=tuple(rally), source=f"{flight}.waypoints")
+    return Mission(Home(lat, lon, HOME[2]), items, rally=tuple(points), source=f"{flight}.waypoints")
 
 
 def return_setup(flight: str, **parameters: float) -> FlightSetup:

@@ -1,0 +1,506 @@
+"""A return to launch within a millisecond: ArduPlane's law steers a point mass, and not an aircraft in JSBSim.
+
+The law is that of `flight.autopilots.arduplane.law`, compiled code and all: L1 to the target, the slope or the climb,
+TECS with its limits.  What it steers is simple: bank and pitch follow their demands with the lags of ArduPlane's
+controllers, the flight path is below the pitch by the angle of attack, which grows with the load, and specific excess
+power is that of trims at this throttle, airspeed and height, less the induced drag of the bank.  A return takes two
+milliseconds so, a hundredth and less of a flight in JSBSim, and its least clearance is within 7 m of 38 flights of
+ArduPlane itself (`tests/flight/autopilots/arduplane/test_swift_return.py`).
+"""
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from aircraft.envelope import GRAVITY, Envelope
+from flight.autopilots.arduplane.law import (
+    ARDUPILOT_MEMORY,
+    NAVIGATION_TICK,
+    PITCH_LAG,
+    ROLL_LAG,
+    SPEED_SUM,
+    demand_height,
+    navigate_legs,
+    roll_demand,
+    true_by_equivalent,
+    update_tecs,
+)
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.state import STATE
+from flight.dynamics.trim import trim
+from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.guidance.navigation_error import MOTION
+from flight.mission.itinerary import UNLIMITED
+from flight.mission.return_path import ReturnCircle
+from flight.simulation.tick import AT_HEIGHT, NEAR
+from world.frames import POLYMAP, PolyMapRecord
+from world.kernels import Record, Records, compiled, inner, record_dtype
+from world.scenario import Scenario
+from world.terrain import Heights, ground_height
+from world.wind import Wind, mean_wind_speed
+
+Floats = NDArray[np.float64]
+
+# Where a return begins: places and velocities in map axes, m and m/s over the ground; bank, rad.
+RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up", "roll")
+
+# How a return ended: in its circle for `flight.mission.itinerary.UNLIMITED` s, in the ground, off the elevation data,
+# or neither in three times the time that its way takes.
+CIRCLED, HIT, OFF_GROUND, NEVER = 1, 2, 3, 4
+# What is told of a return.  Heights above ground and distances outside kill spheres, m; -1 for no threat.
+RETURN_FLOWN = record_dtype(
+    ("ended", np.int64),
+    "seconds",  # to its end
+    "to_circle",  # s, when it is first within `AT_CIRCLE` of its target; NaN for never
+    "clearance",  # least, over all of it
+    "clearance_time",
+    "clearance_east",
+    "clearance_north",
+    "clearance_up",
+    "clearance_before",  # least, before it came to its circle
+    "outside",  # least distance outside any kill sphere
+    ("threat", np.int64),
+    "threat_time",
+    "outside_before",  # before it came to its circle
+    "energy",  # Wh, NaN where the envelope knows no power
+    ("rows", np.int64),  # of the way that was kept
+)
+# Nearer to its target than this (m) a return is at its circle: as far as flights of ArduPlane were compared.
+AT_CIRCLE = 200.0
+# Every so many ticks a place of the way is kept, 1 s.
+KEPT_EVERY = 10
+# The flight path follows the pitch so late, s: the time in which lift turns the velocity of a small aircraft.
+_PATH_LAG = 0.4
+# A return that takes this many times as long as its way and its climb is given up, and so many s at least.
+_TOO_LONG, _SPARE = 3.0, 600.0
+# Grid of the trims: throttles from 0 to 1, airspeeds from the aircraft's slowest to its fastest, heights AMSL (m).
+_THROTTLES, _SPEEDS, _HEIGHTS = 21, 7, (0.0, 2000.0, 4000.0)
+
+# The aircraft as a point mass, for compiled code.  Its tables have a row for each airspeed and a column for each height
+# of the grid.
+POINT_MASS = record_dtype(
+    "airspeed",  # m/s, commanded, equivalent
+    "slowest",  # m/s, true, of the first row
+    "speed_step",
+    "height_step",
+    "alpha",  # rad, angle of attack without lift
+    "alpha_lift",  # rad m^2/s^2, the rest of it in straight flight, times the airspeed's square
+    "induced",  # m^2/s^2, induced drag by weight in straight flight, times the airspeed's square
+    "wind_speed",  # m/s at the reference height
+    "wind_east",  # unit vector that it blows to
+    "wind_north",
+    "wind_gradient",
+    "wind_reference",
+    ("has_power", np.bool_),
+)
+
+
+class PointMass(NamedTuple):
+    """What a return is flown with.
+
+    record: of `POINT_MASS`.
+    excess: (t, v, h) specific excess power, by throttle, m/s.
+    power: (3, v, h) electric power at idle, in level flight and at full throttle, W.
+    """
+
+    record: Record
+    excess: Floats
+    power: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What a return can meet, for compiled code.
+
+    heights, to_pixel: of the terrain; one pixel without data where none is known.
+    spheres, radii: (m, 3) middles and (m,) radii of kill spheres, m; a radius of 0 is none.
+    known: whether there is a terrain.
+    """
+
+    heights: Heights
+    to_pixel: PolyMapRecord
+    spheres: Floats
+    radii: Floats
+    known: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SwiftReturns:
+    """Returns that were flown.
+
+    flown: (n,) of `RETURN_FLOWN`.
+    ways: n arrays (t, 3) of places a second apart, m; empty where none were kept.
+    """
+
+    flown: Records
+    ways: tuple[Floats, ...] = ()
+
+
+def surroundings(scenario: Scenario) -> Surroundings:
+    """Ground and kill spheres of a scenario."""
+    threats, terrain = scenario.threats, scenario.terrain
+    spheres, radii = threats.position.reshape(-1, 3), threats.kill_radius
+    if terrain is None:
+        nothing: Heights = np.full((2, 2), np.nan, dtype=np.float32)
+        return Surroundings(nothing, np.zeros(1, POLYMAP)[0], spheres, radii, False)
+    return Surroundings(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
+
+
+def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
+    """An aircraft by its trims, in a wind.
+
+    airspeed: commanded, m/s, equivalent.  Beyond the grid of the trims its edge counts.
+    """
+    speeds, excess, alpha, lift = _trimmed(aircraft)
+    has_power = bool(envelope.power_level.size)
+    power = np.full((3, len(speeds), len(_HEIGHTS)), np.nan)
+    if has_power:
+        named = (envelope.power_idle, envelope.power_level, envelope.power_full)
+        power = np.stack([_resampled(envelope, table, speeds) for table in named])
+    record: Record = np.zeros(1, POINT_MASS)[0]
+    record.airspeed, record.slowest, record.has_power = airspeed, speeds[0], has_power
+    record.speed_step, record.height_step = speeds[1] - speeds[0], _HEIGHTS[1] - _HEIGHTS[0]
+    record.alpha, record.alpha_lift = alpha, lift
+    record.induced = _induced_drag(speeds, excess[0, :, 0])
+    record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
+    record.wind_east, record.wind_north = -math.sin(wind.from_course), -math.cos(wind.from_course)
+    return PointMass(record, excess, power)
+
+
+@functools.lru_cache(maxsize=8)
+def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
+    """Airspeeds (v,), specific excess power (t, v, h) and the angle of attack, without lift and times V^2 with it.
+
+    Where there is no trim the nearest throttle's counts.
+    """
+    simulator = Fdm(aircraft)
+    speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _SPEEDS)
+    excess = np.full((_THROTTLES, _SPEEDS, len(_HEIGHTS)), np.nan)
+    alphas = np.full(_SPEEDS, np.nan)
+    for h, amsl in enumerate(_HEIGHTS):
+        for v, speed in enumerate(speeds):
+            near = None
+            for t in reversed(range(_THROTTLES)):
+                found = trim(simulator, amsl, {"airspeed": float(speed), "throttle": t / (_THROTTLES - 1.0)}, near)
+                if found is None:
+                    continue
+                near = found
+                excess[t, v, h] = speed * math.sin(found.climb)
+                if h == 0:
+                    alphas[v] = found.alpha
+            _fill(excess[:, v, h])
+        for row in excess[:, :, h]:
+            _fill(row)
+    _fill(alphas)
+    terms = np.stack([np.ones(_SPEEDS), speeds**-2.0], axis=1)
+    alpha, lift = np.linalg.lstsq(terms, np.nan_to_num(alphas), rcond=None)[0]
+    return speeds, excess, float(alpha), float(lift)
+
+
+def _fill(values: Floats) -> None:
+    """Put between and beyond known values what is nearest to them."""
+    good = ~np.isnan(values)
+    if good.any():
+        values[:] = np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+
+
+def _resampled(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
+    """A table of the envelope at airspeeds (v,) and the grid's heights, its edges extended."""
+    filled = np.array(table)
+    for column in filled.T:
+        _fill(column)
+    by_speed = np.stack([np.interp(speeds, envelope.airspeed, column) for column in filled.T], axis=1)
+    return np.stack([np.interp(_HEIGHTS, envelope.amsl, row) for row in by_speed])
+
+
+def _induced_drag(speeds: Floats, excess: Floats) -> float:
+    """Induced drag by weight times the square of airspeed, of the drag polar through the glides with closed throttle.
+
+    Drag by weight is a V^2 + b / V^2 in straight flight; b is what bank adds to, as the square of the load.
+    """
+    terms = np.stack([speeds**2, speeds**-2.0], axis=1)
+    return max(0.0, float(np.linalg.lstsq(terms, -excess / speeds, rcond=None)[0][1]))
+
+
+def fly_returns(
+    starts: Records,
+    targets: Sequence[ReturnCircle],
+    parameters: ArduPilotParameters,
+    aircraft: PointMass,
+    around: Surroundings,
+    *,
+    keep: bool = False,
+) -> SwiftReturns:
+    """Fly a return from each of n starts.
+
+    starts: (n,) of `RETURN_START`.  targets: n circles, where each of them goes.
+    keep: whether their ways are kept.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.autopilots.arduplane.parameters import load_parameters
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from world.scenario import load_scenario
+    >>> scenario, aerosonde = load_scenario("jacksboro"), load_aircraft("aerosonde")
+    >>> start = np.zeros(1, RETURN_START)
+    >>> start["up"], start["velocity_north"] = 1000.0, 26.0
+    >>> flown = fly_returns(
+    ...     start,
+    ...     [ReturnCircle(0.0, 4000.0, 900.0, 120.0)],
+    ...     load_parameters(aerosonde),
+    ...     point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind()),
+    ...     surroundings(scenario),
+    ... ).flown[0]
+    >>> int(flown["ended"]) == CIRCLED, bool(140.0 < flown["to_circle"] < 160.0)
+    (True, True)
+    """
+    ends = np.zeros(len(starts), WAYPOINT)
+    if len(starts):
+        columns = np.array([tuple(target) for target in targets]).T
+        for name, column in zip(("centre_east", "centre_north", "up", "circle", "slope_base"), columns, strict=True):
+            ends[name] = column
+    ends["returns"], ends["airspeed"] = True, aircraft.record.airspeed
+    flown = np.zeros(len(starts), RETURN_FLOWN)
+    longest = int(max((_most_seconds(s, e, aircraft) for s, e in zip(starts, ends, strict=True)), default=0.0)) + 2
+    way = np.zeros((longest if keep else 0, 3))
+    ways = []
+    for k in range(len(starts)):
+        most = _most_seconds(starts[k], ends[k], aircraft)
+        _fly_return(
+            starts[k], ends[k], parameters.record(), aircraft.record, aircraft.excess, aircraft.power, around.heights,
+            around.to_pixel, around.spheres, around.radii, around.known, most, way, flown[k],
+        )  # fmt: skip
+        if keep:
+            ways.append(way[: int(flown[k]["rows"])].copy())
+    return SwiftReturns(flown, tuple(ways))
+
+
+def _most_seconds(start: Record, end: Record, aircraft: PointMass) -> float:
+    """After how long a return is given up, s."""
+    distance = math.hypot(end["centre_east"] - start["east"], end["centre_north"] - start["north"])
+    slowest = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
+    return float(_SPARE + _TOO_LONG * (distance / slowest + abs(end["up"] - start["up"]) / 2.0))
+
+
+@compiled
+def _fly_return(
+    start: Record, end: Record, parameters: Record, aircraft: Record, excess: Floats, power: Floats, heights: Heights,
+    to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float, way: Floats, out: Record,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Fly one return for ``most`` s at the longest, and fill in what is told of it."""
+    waypoints = np.zeros(2, WAYPOINT)
+    b = waypoints[1]
+    estimated, state = np.zeros(1, MOTION)[0], np.zeros(1, STATE)[0]
+    own = np.zeros(1, ARDUPILOT_MEMORY)[0]
+    _begin(start, end, b, estimated, out)
+    _take_over(start, parameters, aircraft, excess, state, own)
+    pitch = state.pitch
+    angle = pitch - state.alpha
+    dt = NAVIGATION_TICK
+    roll_share = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
+    pitch_share = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
+    path_share = 1.0 - math.exp(-dt / _PATH_LAG)
+    near = max(NEAR, 2.0 * abs(b.circle))
+    circled, used = 0.0, 0.0
+    for tick in range(int(most / dt)):
+        time = tick * dt
+        if tick % KEPT_EVERY == 0 and out.rows < way.shape[0]:
+            way[out.rows, 0], way[out.rows, 1], way[out.rows, 2] = estimated.east, estimated.north, estimated.up
+            out.rows += 1
+        distance = math.hypot(estimated.east - b.centre_east, estimated.north - b.centre_north)
+        if distance < AT_CIRCLE and math.isnan(out.to_circle):
+            out.to_circle = time
+        out.seconds = time
+        _look(estimated, time, heights, to_pixel, spheres, radii, known, out)
+        if out.ended != NEVER:
+            break
+        if circled > 0.0 or (distance < near and abs(estimated.up - b.up) < AT_HEIGHT):
+            circled += dt
+        if circled > UNLIMITED:
+            out.ended = CIRCLED
+            break
+        factor = true_by_equivalent(estimated.up)
+        navigate_legs(estimated, waypoints, parameters, own, factor, dt)
+        demand_height(estimated, b, parameters, own, dt)
+        wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, b.airspeed))
+        state.pitch = pitch
+        update_tecs(state, estimated, parameters, own, wanted * factor, factor, dt)
+        banked = roll_demand(own.side_acceleration, state.pitch, state.airspeed / factor, parameters)
+        state.roll += roll_share * (banked - state.roll)
+        pitch += pitch_share * (own.pitch_demand + parameters.pitch_trim - pitch)
+        angle += path_share * (pitch - _attack(state, aircraft) - angle)
+        used += dt * _move(estimated, state, angle, own.throttle_demand, aircraft, excess, power, dt)
+    if not known:
+        out.clearance = out.clearance_before = math.nan
+    out.energy = used / 3600.0 if aircraft.has_power else math.nan
+
+
+@inner
+def _begin(start: Record, end: Record, b: Record, estimated: Record, out: Record) -> None:  # pragma: no cover
+    """Fill in the waypoint to return to, where it begins, and what is told before anything was flown."""
+    b.centre_east, b.centre_north, b.up = end.centre_east, end.centre_north, end.up
+    b.circle, b.slope_base, b.returns, b.airspeed = end.circle, end.slope_base, True, end.airspeed
+    estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
+    estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
+    estimated.velocity_up = start.velocity_up
+    out.clearance, out.clearance_before, out.threat = math.inf, math.inf, -1
+    out.outside, out.outside_before = math.inf, math.inf
+    out.to_circle, out.energy, out.ended, out.rows = math.nan, 0.0, NEVER, 0
+
+
+@inner
+def _take_over(
+    start: Record, parameters: Record, aircraft: Record, excess: Floats, state: Record, own: Record
+) -> None:  # pragma: no cover - compiled
+    """Fill the state from what flies over the ground, and the law's memory as after a long steady flight of it.
+
+    As `flight.autopilots.arduplane.law._begin` takes over, but on a slope: the height asked for is ahead by its lag.
+    """
+    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
+    air_east = start.velocity_east - wind * aircraft.wind_east
+    air_north = start.velocity_north - wind * aircraft.wind_north
+    climb = start.velocity_up
+    state.airspeed = max(1.0, math.hypot(math.hypot(air_east, air_north), climb))
+    state.yaw, state.roll = math.atan2(air_east, air_north), start.roll
+    state.alpha = _attack(state, aircraft)
+    state.pitch = math.asin(min(1.0, max(-1.0, climb / state.airspeed))) + state.alpha
+    own.begun = True
+    own.height_demand, own.height_rate = start.up, climb
+    own.height_asked = own.height_limited = start.up + climb * parameters.tecs_height_demand_time
+    own.climb_share, own.sink_share = 1.0, 1.0
+    own.airspeed_read = own.airspeed = own.airspeed_demand = state.airspeed
+    own.pitch_demand = state.pitch - parameters.pitch_trim
+    own.speed_sum = SPEED_SUM
+    own.balance_sum = own.pitch_demand * state.airspeed * GRAVITY - GRAVITY * climb - SPEED_SUM
+    throttle = 1.0
+    while throttle > 0.0 and _excess(excess, throttle, state.airspeed, start.up, aircraft) > climb:
+        throttle -= 0.01
+    own.throttle_demand, own.throttle_before = throttle, parameters.throttle_cruise
+    own.throttle_sum = throttle - parameters.throttle_cruise
+
+
+@inner
+def _attack(state: Record, aircraft: Record) -> float:  # pragma: no cover - compiled
+    """Angle of attack at an airspeed in a bank, rad."""
+    load = 1.0 / max(0.3, math.cos(state.roll))
+    attack: float = aircraft.alpha + aircraft.alpha_lift * load / (state.airspeed * state.airspeed)
+    return attack
+
+
+@inner
+def _look(
+    here: Record,
+    time: float,
+    heights: Heights,
+    to_pixel: PolyMapRecord,
+    spheres: Floats,
+    radii: Floats,
+    known: bool,
+    out: Record,
+) -> None:  # pragma: no cover - compiled
+    """Note how high above ground a place is and how far outside each sphere; whether the return ends there."""
+    for m in range(spheres.shape[0]):
+        radius = radii[m]
+        if radius <= 0.0:
+            continue
+        off_e, off_n, off_u = here.east - spheres[m, 0], here.north - spheres[m, 1], here.up - spheres[m, 2]
+        outside = math.sqrt(off_e * off_e + off_n * off_n + off_u * off_u) - radius
+        if outside < out.outside:
+            out.outside, out.threat, out.threat_time = outside, m, time
+        if math.isnan(out.to_circle):
+            out.outside_before = min(out.outside_before, outside)
+    if not known:
+        return
+    clearance = here.up - ground_height(heights, to_pixel, here.east, here.north)
+    if math.isnan(clearance):
+        out.ended = OFF_GROUND
+        return
+    if math.isnan(out.to_circle):
+        out.clearance_before = min(out.clearance_before, clearance)
+    if clearance < out.clearance:
+        out.clearance, out.clearance_time = clearance, time
+        out.clearance_east, out.clearance_north, out.clearance_up = here.east, here.north, here.up
+    if clearance <= 0.0:
+        out.ended = HIT
+
+
+@inner
+def _move(
+    motion: Record,
+    state: Record,
+    angle: float,
+    throttle: float,
+    aircraft: Record,
+    excess: Floats,
+    power: Floats,
+    dt: float,
+) -> float:  # pragma: no cover - compiled
+    """Move a point mass on by ``dt`` s on a path angle (rad, to the air); returns the power that it takes, W."""
+    thrust = _excess(excess, throttle, state.airspeed, motion.up, aircraft)
+    tilt = math.tan(min(1.2, abs(state.roll)))
+    gain = thrust - aircraft.induced / state.airspeed * tilt * tilt
+    taken = _power(thrust, excess, power, state.airspeed, motion.up, aircraft)
+    state.yaw += GRAVITY * math.tan(state.roll) / state.airspeed * dt
+    state.airspeed = max(3.0, state.airspeed + (GRAVITY * gain / state.airspeed - GRAVITY * math.sin(angle)) * dt)
+    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, motion.up)
+    level = state.airspeed * math.cos(angle)
+    motion.velocity_east = level * math.sin(state.yaw) + wind * aircraft.wind_east
+    motion.velocity_north = level * math.cos(state.yaw) + wind * aircraft.wind_north
+    motion.velocity_up = state.airspeed * math.sin(angle)
+    motion.east += motion.velocity_east * dt
+    motion.north += motion.velocity_north * dt
+    motion.up += motion.velocity_up * dt
+    return taken
+
+
+@inner
+def _power(
+    thrust: float, excess: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
+) -> float:  # pragma: no cover - compiled
+    """Electric power at a specific excess power, by the parabola of `aircraft.envelope.Envelope.power`, W."""
+    if not aircraft.has_power:
+        return 0.0
+    low = _at(power[0], airspeed, amsl, aircraft)
+    middle = _at(power[1], airspeed, amsl, aircraft)
+    high = _at(power[2], airspeed, amsl, aircraft)
+    full, idle = _at(excess[excess.shape[0] - 1], airspeed, amsl, aircraft), _at(excess[0], airspeed, amsl, aircraft)
+    if thrust >= full or not idle < 0.0 < full:
+        return high
+    if thrust <= idle:
+        return low
+    return (
+        low * thrust * (thrust - full) / (idle * (idle - full))
+        + middle * (thrust - idle) * (thrust - full) / (-idle * -full)
+        + high * thrust * (thrust - idle) / (full * (full - idle))
+    )
+
+
+@inner
+def _excess(
+    excess: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record
+) -> float:  # pragma: no cover - compiled
+    """Specific excess power in straight flight at a throttle, an airspeed and a height, m/s."""
+    x = min(1.0, max(0.0, throttle)) * (excess.shape[0] - 1)
+    i = min(excess.shape[0] - 2, int(x))
+    low, high = _at(excess[i], airspeed, amsl, aircraft), _at(excess[i + 1], airspeed, amsl, aircraft)
+    value: float = low + (x - i) * (high - low)
+    return value
+
+
+@inner
+def _at(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:  # pragma: no cover - compiled
+    """A table (v, h) at an airspeed and a height, bilinear, its edges extended."""
+    x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.slowest) / aircraft.speed_step))
+    y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.height_step))
+    i, j = min(table.shape[0] - 2, int(x)), min(table.shape[1] - 2, int(y))
+    p, q = x - i, y - j
+    low = (1.0 - q) * table[i, j] + q * table[i, j + 1]
+    high = (1.0 - q) * table[i + 1, j] + q * table[i + 1, j + 1]
+    value: float = (1.0 - p) * low + p * high
+    return value
