@@ -1,10 +1,13 @@
 """How well aircraft of known truth are identified from their logs: fresh variants, flown by ArduPlane's law.
 
-    python -m benchmarks.identification --first 1001 --count 10 --out build/identification.json
+    python -m benchmarks.identification --first 1001 --count 10 --repeats 2 --out build/identification.json
+    python -m benchmarks.identification --first 4001 --count 3 --missions --shorts 0 --out build/missions.json
 
 Each variant's truth is drawn from 0.8 of the priors, with the things that identification holds fixed drawn as well.
 It flies the mission of manoeuvres in light turbulence, `tests.instrumented_flights` makes its sensors and clocks, and
-the log is identified, once without and once with the battery's current.  Nothing was tuned on these seeds.
+the log is identified, once without and once with the battery's current.  With ``--missions`` it flies missions A and B
+of the project's shared flights in place of that (27 minutes), and both logs are identified together.  ``--sensors 2``
+draws the errors of airspeed, level and accelerometers from twice the deviations that are usual.
 """
 
 import argparse
@@ -12,7 +15,8 @@ import json
 import math
 import tempfile
 import time
-from dataclasses import fields
+from collections.abc import Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +37,15 @@ from planfly.identification.base_numbers import base_model, scaled
 from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identified
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
-from tests.instrumented_flights import HOME, Truth, changed_aerosonde, drawn_sensors, fly_identification, sensed
+from tests.instrumented_flights import (
+    HOME,
+    Sensors,
+    Truth,
+    changed_aerosonde,
+    drawn_sensors,
+    fly_identification,
+    sensed,
+)
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +54,7 @@ _SHARE, _CRUISE = 0.8, 25.0
 _FIXED = {"side_force": 0.25, "lift_of_rate": 0.4, "lift_of_elevator": 0.4}
 _INERTIA = {"roll_inertia": 0.15, "pitch_inertia": 0.12, "yaw_inertia": 0.12}
 _STEEP = 1.2
+MISSIONS = Path(__file__).parent / "identification_missions"
 
 
 def drawn_truth(seed: int) -> Truth:
@@ -73,16 +86,42 @@ def true_values(truth: Truth) -> Floats:
     return np.array([true[name] for name in NAMES])
 
 
+def worse_sensors(seed: int, factor: float, *, battery: bool) -> Sensors:
+    """Sensors by a seed, with errors of airspeed, level and accelerometers so many times as large."""
+    usual = drawn_sensors(seed, battery=battery)
+    ahead, right, down = usual.bias
+    return replace(
+        usual, bias=(factor * ahead, factor * right, factor * down), level=factor * usual.level,
+        airspeed=1.0 + factor * (usual.airspeed - 1.0),
+    )  # fmt: skip
+
+
 def identify(
-    track: Track, changed: Aircraft, base: BaseModel, seed: int, *, battery: bool
+    tracks: Sequence[Track], changed: Aircraft, base: BaseModel, seed: int, sensors: Sensors
 ) -> tuple[Estimate, Any, float]:
-    """The estimate, its log, and the CPU time it took, s."""
+    """The estimate, the last log, and the CPU time it took, s; tracks: of flights with the same sensors."""
     prior = load_aircraft("aerosonde")
-    log = sensed(track, changed, drawn_sensors(seed, battery=battery), seed)
+    logs = [sensed(track, changed, sensors, seed + 100_000 * k) for k, track in enumerate(tracks)]
     began = time.process_time()
-    records = flight_records(log, prior, read_servos(prior.folder / "ardupilot.toml"))
+    servos = read_servos(prior.folder / "ardupilot.toml")
+    records = [record for log in logs for record in flight_records(log, prior, servos)]
     estimate = estimate_model(records, base)
-    return estimate, log, time.process_time() - began
+    return estimate, logs[-1], time.process_time() - began
+
+
+def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Aircraft]:
+    """Missions A and B by ArduPlane's law, each in a wind of its own and light turbulence."""
+    aircraft = changed_aerosonde(folder / f"v{seed}", truth)
+    tracks = []
+    for k, file in enumerate(sorted(MISSIONS.glob("*.waypoints"))):
+        draw = np.random.default_rng([seed, 6, k])
+        made = planfly.fly(
+            str(file), aircraft=str(aircraft.folder), seed=seed + k, turbulence="light",
+            wind=(float(draw.uniform(1.0, 7.0)), float(draw.uniform(0.0, 360.0))),
+            params=str(aircraft.folder / "ardupilot.parm"),
+        )  # fmt: skip
+        tracks.append(made.track)
+    return tracks, aircraft
 
 
 def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]:
@@ -130,8 +169,8 @@ def verdict_of_too_steep(folder: Path, climb: float, estimate: Estimate, base: B
     return "undecided" if verdict.undecided else "flyable" if verdict.flyable else "refused"
 
 
-def one_variant(seed: int, repeats: int, shorts: int) -> dict[str, Any]:
-    """All rows of one variant."""
+def one_variant(seed: int, repeats: int, shorts: int, factor: float, *, missions: bool) -> dict[str, Any]:
+    """All rows of one variant; factor: on the errors of its sensors."""
     truth = drawn_truth(seed)
     values = true_values(truth)
     numbers = base_model(load_aircraft("aerosonde"))
@@ -142,11 +181,15 @@ def one_variant(seed: int, repeats: int, shorts: int) -> dict[str, Any]:
     }
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        track, changed = fly_identification(folder, truth, seed, repeats=repeats)
-        made["minutes"] = float(track.time[-1]) / 60.0
+        if missions:
+            tracks, changed = fly_missions(folder, truth, seed)
+        else:
+            track, changed = fly_identification(folder, truth, seed, repeats=repeats)
+            tracks = [track]
+        made["minutes"] = sum(float(track.time[-1]) for track in tracks) / 60.0
         climb = float(performance(base, values, _CRUISE, DENSITY).climb[0])
         for battery in (False, True):
-            estimate, log, spent = identify(track, changed, base, seed, battery=battery)
+            estimate, log, spent = identify(tracks, changed, base, seed, worse_sensors(seed, factor, battery=battery))
             own = folder / ("with" if battery else "without")
             own.mkdir()
             made["with_battery" if battery else "without_battery"] = errors(base, values, estimate) | {
@@ -156,7 +199,8 @@ def one_variant(seed: int, repeats: int, shorts: int) -> dict[str, Any]:
         made["five_minutes"] = []
         for other in range(1, shorts + 1):
             short, _ = fly_identification(folder, truth, seed, repeats=1, wind=2.0 + 3.0 * other)
-            estimate, _, _ = identify(short, changed, base, seed + 10_000 * other, battery=False)
+            own_seed = seed + 10_000 * other
+            estimate, _, _ = identify([short], changed, base, own_seed, worse_sensors(own_seed, factor, battery=False))
             made["five_minutes"].append(errors(base, values, estimate))
     return made
 
@@ -167,12 +211,14 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=10)
     parser.add_argument("--repeats", type=int, default=4)
     parser.add_argument("--shorts", type=int, default=2)
+    parser.add_argument("--missions", action="store_true", help="fly A and B of the shared flights")
+    parser.add_argument("--sensors", type=float, default=1.0, metavar="FACTOR", help="on the sensors' errors")
     parser.add_argument("--out", default="build/identification.json")
     args = parser.parse_args()
     rows = []
     Path(args.out).parent.mkdir(parents=True, exist_ok=True)
     for seed in range(args.first, args.first + args.count):
-        rows.append(one_variant(seed, args.repeats, args.shorts))
+        rows.append(one_variant(seed, args.repeats, args.shorts, args.sensors, missions=args.missions))
         print(json.dumps(rows[-1]), flush=True)
         Path(args.out).write_text(json.dumps(rows, indent=1), encoding="utf-8")
     print(json.dumps(summary(rows), indent=1))
@@ -186,13 +232,18 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         for name in ("climb_deg", "sink_percent", "power_percent"):
             sizes = np.abs([row[name] for row in chosen])
             made[f"{kind}.{name}"] = {"median": float(np.median(sizes)), "worst": float(sizes.max())}
+        made[f"{kind}.climb_inside"] = sum(row["climb_inside"] for row in chosen)
+        made[f"{kind}.climb_interval_deg"] = float(np.median([row["climb_interval_deg"] for row in chosen]))
         made[f"{kind}.coverage"] = sum(row["inside"] for row in chosen) / (len(NAMES) * len(chosen))
         for answer in ("refused", "undecided", "flyable"):
             made[f"{kind}.too_steep_{answer}"] = sum(row["too_steep"] == answer for row in chosen)
         made[f"{kind}.cpu_s"] = max(row["cpu_s"] for row in chosen)
     short = [one for row in rows for one in row["five_minutes"]]
+    if not short:
+        return made
     made["five_minutes.inside"] = f"{sum(one['climb_inside'] for one in short)} of {len(short)}"
     made["five_minutes.within_1.5_deg"] = int(sum(abs(one["climb_deg"]) < 1.5 for one in short))
+    made["five_minutes.widest_deg"] = max(one["climb_interval_deg"] for one in short)
     made["five_minutes.interval_deg"] = float(np.median([one["climb_interval_deg"] for one in short]))
     return made
 

@@ -38,6 +38,7 @@ class Signals:
 
     Fields as of `FlightRecord`, (n,) or (n, k); rate_changes: (n, 3) of p, q and r, rad/s^2.
     throttle: (n,) behind the motor's lag.  surfaces: (n, 3) elevator, aileron, rudder behind the servos', rad.
+    airspeed_factor: that the airspeed was multiplied with.  airspeed_sd: standard deviation of what it should be.
     edges: rows at which each stretch begins, and the end.  block: (n,) number of the block of time of each row.
     """
 
@@ -56,6 +57,8 @@ class Signals:
     edges: tuple[int, ...]
     block: Ints
     hertz: float = GRID_HZ
+    airspeed_factor: float = 1.0
+    airspeed_sd: float = 0.02
     extra: Mapping[str, Floats] = field(default_factory=dict)
 
     def smooth(self, values: Floats, cutoff: float) -> Floats:

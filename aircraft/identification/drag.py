@@ -1,7 +1,9 @@
 """Drag and thrust together, from the forward acceleration, and from the battery's current where it is logged.
 
 Level flight alone tells only their difference; climbs, glides and other speeds tell more, and the current tells most.
-What else is not known about motor and accelerometer is estimated with them, within what it can be.
+What else is not known about motor and accelerometer is estimated with them, within what it can be.  What of that is
+the aircraft's own (its motor's resistance, the battery's voltage) is then folded into the parameters: the model has no
+place for it, and without it would fly with another thrust than the one that was measured.
 """
 
 from dataclasses import dataclass
@@ -30,6 +32,10 @@ NUISANCES = {
     "angle of attack by lift": 1.0,
 }
 # The last two count in standard deviations of `AlphaDoubt`.
+# Of the aircraft, where the others are of its sensors.
+_OF_AIRCRAFT = np.array([name.split()[0] in ("resistance", "idle", "voltage", "drag") for name in NUISANCES])
+# Forces and currents count alike in the folding, by what no model gets right of each; steps of its search.
+_FOLDING_STEPS = 3
 # Where the battery's voltage is logged it is known this much better.
 _LOGGED_VOLTAGE = 0.25
 # What no model gets right, m/s^2 and A, and over how long it is autocorrelated, s.
@@ -96,6 +102,9 @@ def fit_drag(
 ) -> tuple[Fit, Floats, Floats]:
     """Fit, values (5,) of the parameters of drag and motor, and their covariance (5, 5).
 
+    The values are those with which the base's own resistance, idle current, voltage and drag of the elevator make the
+    same forces and currents as the fit does with what it found for those.
+
     values: (n,) of all parameters, of which those of lift count.  doubt: about the lift curve.
     """
     forces = _forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)
@@ -112,12 +121,33 @@ def fit_drag(
     force, _ = forces.predicted(fit.estimate)
     goal = thin.smooth(thin.acceleration[:, 0], FORCE_BAND)
     explained = 1.0 - float((goal - force).var() / goal.var())
+    five, turn = _folded(forces, fit.estimate)
+    return Fit(fit.estimate, fit.covariance, force, goal - force, explained), five, turn @ fit.covariance @ turn.T
+
+
+def _folded(forces: _Forces, unknown: Floats) -> tuple[Floats, Floats]:
+    """Parameters (5,) that do alone what they and the aircraft's nuisances do together, and their slopes (5, p).
+
+    Least squares over the log's own flow and throttle.  unknown: (p,) as fitted.
+    """
     own = int(_OWN.sum())
-    return (
-        Fit(fit.estimate, fit.covariance, force, goal - force, explained),
-        fit.estimate[:own],
-        fit.covariance[:own, :own],
-    )
+    folded = own + np.flatnonzero(_OF_AIRCRAFT)
+    scale = _FORCE_FLOOR / _CURRENT_FLOOR
+
+    def joined(force: Floats, current: Floats) -> Floats:
+        return np.concatenate([force, scale * current])
+
+    goal = joined(*forces.predicted(unknown))
+    alone = unknown.copy()
+    alone[folded] = 0.0
+    for _ in range(_FOLDING_STEPS):
+        columns = joined(*forces.slopes(alone))
+        left = goal - joined(*forces.predicted(alone))
+        alone[:own] += np.linalg.lstsq(columns[:, :own], left, rcond=None)[0]
+    turn = np.zeros((own, len(unknown)))
+    turn[:, :own] = np.eye(own)
+    turn[:, folded] = np.linalg.lstsq(columns[:, :own], columns[:, folded], rcond=None)[0]
+    return alone[:own], turn
 
 
 class _Goal:

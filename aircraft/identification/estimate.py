@@ -1,8 +1,9 @@
 """The estimate: lift curve, drag with thrust, and the moments, one after the other, with what is not known of each.
 
-The order matters.  The accelerometer is the vane: lift over the lift curve's slope is the angle of attack, gusts
-included, and sideslip is side force likewise.  The lift curve itself comes from frequencies at which the aircraft
-heaves with the gusts; drag and thrust come from the forward acceleration, the moments from the gyros' changes.
+The order matters.  The wind triangle gives the airspeed its scale.  The accelerometer is the vane: lift over the lift
+curve's slope is the angle of attack, gusts included, and sideslip is side force likewise.  The lift curve itself comes
+from frequencies at which the aircraft heaves with the gusts; drag and thrust come from the forward acceleration, the
+moments from the gyros' changes.
 
 What is held fixed and is not known either (`aircraft.identification.held_fixed`) is changed by its standard deviation,
 one after the other, and everything estimated anew: these shifts are part of the covariance.
@@ -14,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.identification.airspeed import SCALE_SD, with_airspeed_scale
 from aircraft.identification.alignment import Clocks, Signals, align, find_clocks
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.drag import FORCE_THINNING, AlphaDoubt, fit_drag
@@ -75,6 +77,7 @@ class Estimate:
     shifts: by what is held fixed, (n,): how far the estimate moves with one standard deviation of it.
     with_current: whether the battery's current was used.
     dynamics: whether the moments were estimated; their parameters are the prior's otherwise.
+    airspeed: true by measured, of the wind triangle, and its standard deviation.
     seconds: of flight that were used.
     """
 
@@ -85,6 +88,7 @@ class Estimate:
     shifts: Mapping[str, Floats] = field(default_factory=dict)
     with_current: bool = False
     dynamics: bool = True
+    airspeed: tuple[float, float] = (1.0, SCALE_SD)
     seconds: float = 0.0
 
     @property
@@ -113,7 +117,7 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
     """
     slow = Clocks(servo_lag=base.servo_lag)
     clocks = align_clocks(records, base) if dynamics else tuple(slow for _ in records)
-    signals = levelled(align(records, clocks, base.motor_lag))
+    signals = aligned_signals(records, clocks, base)
     nominal = fit_all(signals, base, dynamics=dynamics)
     shifts = {}
     for held in HELD_FIXED:
@@ -126,8 +130,15 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
         covariance=total_covariance(nominal.covariance, shifts),
         clocks=clocks,
         shifts=shifts,
+        airspeed=(signals.airspeed_factor, signals.airspeed_sd),
         seconds=sum(record.seconds for record in records),
     )
+
+
+def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
+    """All stretches on the clocks of their accelerometers, levelled, with the airspeed of the wind triangle."""
+    signals = levelled(align(records, clocks, base.motor_lag))
+    return with_airspeed_scale(signals, vane(signals, base, prior_means()))
 
 
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:

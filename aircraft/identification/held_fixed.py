@@ -61,8 +61,8 @@ def _product_of_inertia(share: float, least: float) -> Callable[[Signals, BaseMo
     return change
 
 
-def _airspeed(factor: float) -> Callable[[Signals, BaseModel], Changed]:
-    return lambda signals, base: (replace(signals, airspeed=signals.airspeed * factor), base)
+def _airspeed(signals: Signals, base: BaseModel) -> Changed:
+    return replace(signals, airspeed=signals.airspeed * (1.0 + signals.airspeed_sd)), base
 
 
 def _acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel], Changed]:
@@ -115,7 +115,7 @@ HELD_FIXED = (
     Held("product of inertia (50 %)", _product_of_inertia(0.5, 0.05)),
     Held("clock of the accelerometers (15 ms)", _late_force(0.015)),
     Held("clock of the servos (15 ms)", _late_surfaces(0.015)),
-    Held("airspeed (1 %)", _airspeed(1.01)),
+    Held("airspeed (as the wind triangle has it)", _airspeed),
     # A level that is off shows as a bias of the forward accelerometer as well, which is taken off.
     Held("level of the autopilot (0.2 deg)", _acceleration(0, _LEVEL * 9.80665), level=_LEVEL),
     Held("mean vertical air (0.1 deg)", _same, level=0.5 * _LEVEL),

@@ -193,7 +193,9 @@ def _servos(outputs: Mapping[str, ServoOutput]) -> str:
 def posterior_text(found: Identified) -> str:
     """The text of ``posterior.toml``."""
     estimate = found.estimate
-    _, drawn = found.performance()
+    best, drawn = found.performance()
+    # As a share; more than the whole of it is as good as nothing known.
+    power = min(1.0, float(np.std(drawn.power) / best.power[0]))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (drawn.climb, drawn.sink))
     shares = estimate.of_log()
     lines = [
@@ -203,10 +205,13 @@ def posterior_text(found: Identified) -> str:
         'source = "flight logs"',
         f"climb_sd_deg = {climb:.3f}    # of the steepest climb at cruise, one standard deviation",
         f"descent_sd_deg = {sink:.3f}  # of the steepest descent",
+        f"power_sd = {power:.4f}        # of the power in level flight, as a share of it",
         f'base = "{found.base.name}"',
         f"mass_kg = {found.numbers.mass:.6g}",
         f"seconds = {estimate.seconds:.0f}",
         f"battery_current = {'true' if estimate.with_current else 'false'}",
+        f"airspeed_factor = {estimate.airspeed[0]:.4f}  # true by measured airspeed, from the wind triangle",
+        f"airspeed_factor_sd = {estimate.airspeed[1]:.4f}",
         f"dynamics = {'true' if estimate.dynamics else 'false'}",
         "held_fixed = [",
         *(f'  "{name}",' for name in (*estimate.shifts, *NUISANCES)),

@@ -6,7 +6,7 @@ and velocity say it was.  What the models then do is compared with what the log 
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +54,7 @@ def replay_log(
     """Replays by the base, scaled to the aircraft, and by the identified model; files: of the aircraft's folder."""
     clock = found.estimate.clocks[-1]
     signals = levelled(align(records, [Clocks(clock.lag, clock.delay, 0.0)] * len(records), 0.0))
+    signals = replace(signals, airspeed=signals.airspeed * found.estimate.airspeed[0])
     flow = vane(signals, found.numbers, found.estimate.values)
     with temporary_folder("planfly-replay-") as place:
         folder = place / name

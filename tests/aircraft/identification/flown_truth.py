@@ -20,6 +20,8 @@ TRUTH = Truth(
     aileron_power=0.75, weathercock=0.8, roll_inertia=1.1, pitch_inertia=0.95, yaw_inertia=1.05,
 )  # fmt: skip
 
+SENSORS = drawn_sensors(3, battery=True)
+
 
 class Flown(NamedTuple):
     """The log, its stretches, the base scaled to the aircraft's mass, and the estimate."""
@@ -34,7 +36,7 @@ class Flown(NamedTuple):
 def flown_truth() -> Flown:
     with tempfile.TemporaryDirectory() as folder:
         track, changed = fly_identification(Path(folder), TRUTH, 3)
-        log = sensed(track, changed, drawn_sensors(3, battery=True), 3)
+        log = sensed(track, changed, SENSORS, 3)
     prior = load_aircraft("aerosonde")
     base = scaled(base_model(prior), changed.mass, prior.wing_span, prior.wing_area)
     records = flight_records(log, prior, read_servos(prior.folder / "ardupilot.toml"))

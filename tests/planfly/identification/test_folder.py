@@ -11,10 +11,10 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.identification.estimate import Estimate
-from aircraft.identification.parameters import prior_means, prior_sds
+from aircraft.identification.parameters import INDEX, prior_means, prior_sds
 from logs.importers.motion_log import MotionLog
 from planfly.identification.base_numbers import base_model
-from planfly.identification.folder import Identified, flown_parameters, folder_files, make_identified
+from planfly.identification.folder import Identified, flown_parameters, folder_files, make_identified, posterior_text
 from planfly.identification.records import log_outputs
 from tests.instrumented_flights import PARAMETERS, short_motion
 
@@ -71,3 +71,16 @@ def test_the_folder_of_an_old_log_has_its_speeds_and_its_bank() -> None:
 
 def test_no_mission_is_made_of_a_log_that_does_not_say_where_it_flew() -> None:
     assert "identify.waypoints" not in files(flown(PARAMETERS))
+
+
+def test_power_is_as_sure_as_the_torque_that_it_overcomes() -> None:
+    """A propeller that needs 5 % more torque for the same thrust needs some 5 % more current, and power."""
+    sds = np.full(len(prior_sds()), 1e-6)
+    sds[INDEX["propeller-torque"]] = 0.05
+    estimate = Estimate(prior_means(), np.diag(np.square(sds)), (), (), airspeed=(1.02, 0.003))
+    log = flown({})
+    table = tomllib.loads(
+        posterior_text(make_identified(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE)))
+    )
+    assert table["power_sd"] == pytest.approx(0.05, rel=0.3)
+    assert (table["airspeed_factor"], table["airspeed_factor_sd"]) == (1.02, 0.003)

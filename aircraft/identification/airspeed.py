@@ -1,0 +1,87 @@
+"""The scale of the airspeed sensor, from the wind triangle: velocity over the ground less that through the air is wind.
+
+The wind does not know which way the aircraft flies.  A sensor that reads too little leaves a part of the airspeed in
+the wind, and that part turns with the aircraft: every turn shows it.  Wind and gusts change as well, but slowly, so
+what counts is how the difference changes from one second to the next.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.flow import Flow
+from aircraft.identification.regression import fit_with_prior
+
+Floats = NDArray[np.float64]
+
+# Standard deviation of a sensor's factor as it comes, and of what the method leaves at best.
+SCALE_SD, _LEAST_SD = 0.02, 0.002
+# Nor is the heading known, rad.
+_HEADING_SD = float(np.radians(3.0))
+# Over how long a gust is forgotten, s (MIL-F-8785C, 3.7.3: 290 m at 150 m above ground, at 25 m/s), and the standard
+# deviation of a mean wind, m/s.
+_GUST_SECONDS, _WIND_SD = 11.5, 30.0
+# Of so many samples one.
+_THINNING = 25
+
+
+def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
+    """Signals with the airspeed that fits the wind triangle best, its factor and how sure that is."""
+    factor, sd = airspeed_scale(signals, flow)
+    return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)
+
+
+def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
+    """True by measured airspeed, and its standard deviation.
+
+    The flow counts for the direction of the airspeed alone, to which the scale is indifferent to the first order.
+    """
+    ahead, right = _through_air(signals, flow)
+    thin = signals.thinned(_THINNING, {"ahead": ahead, "right": right})
+    ahead, right = thin.extra["ahead"], thin.extra["right"]
+    north, east, _ = thin.velocity.T
+    stretches = list(zip(thin.edges[:-1], thin.edges[1:], strict=True))
+    # Wind is velocity over the ground less that through the air; the heading's error turns the latter.  A gust is in
+    # the wind as well as in the airspeed and its direction, and would count for the scale: what the scale goes with is
+    # the velocity over the ground less the mean wind, which gusts hardly move.
+    steady = np.empty((2, len(ahead)))
+    for first, last in stretches:
+        for k, (ground, air) in enumerate(((north, ahead), (east, right))):
+            steady[k, first:last] = ground[first:last] - np.mean(ground[first:last] - air[first:last])
+    columns = [(steady[0], steady[1]), (-steady[1], steady[0])]
+    for first, last in stretches:
+        one = np.zeros(len(ahead))
+        one[first:last] = 1.0
+        columns += [(one, 0.0 * one), (0.0 * one, one)]
+    keep = float(np.exp(-1.0 / (_GUST_SECONDS * thin.hertz)))
+
+    def fresh(values: Floats) -> Floats:
+        """What is new in each row, of a process that forgets over `_GUST_SECONDS`; each stretch for itself."""
+        made = np.empty_like(values)
+        for first, last in stretches:
+            part = values[first:last]
+            made[first:last] = lfilter([1.0, -keep], [1.0], part, zi=np.array([-keep * part[0]]))[0]
+            made[first] = part[0] * np.sqrt(1.0 - keep * keep)
+        return made
+
+    table = np.column_stack([np.concatenate([fresh(a), fresh(b)]) for a, b in columns])
+    measured = np.concatenate([fresh(north - ahead), fresh(east - right)])
+    sds = np.concatenate([[SCALE_SD, _HEADING_SD], np.full(2 * len(stretches), _WIND_SD)])
+    blocks = np.concatenate([thin.block, thin.block + thin.block.max() + 1])
+    fit = fit_with_prior(table, measured, np.zeros(len(sds)), sds, blocks)
+    return 1.0 + float(fit.estimate[0]), float(np.hypot(_LEAST_SD, np.sqrt(fit.covariance[0, 0])))
+
+
+def _through_air(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:
+    """Velocity through the air (n,) to the north and to the east, m/s."""
+    roll, pitch, yaw = signals.attitude.T
+    u = signals.airspeed * np.cos(flow.alpha) * np.cos(flow.beta)
+    v = signals.airspeed * np.sin(flow.beta)
+    w = signals.airspeed * np.sin(flow.alpha) * np.cos(flow.beta)
+    below = v * np.sin(roll) + w * np.cos(roll)
+    across = v * np.cos(roll) - w * np.sin(roll)
+    along = u * np.cos(pitch) + below * np.sin(pitch)
+    return along * np.cos(yaw) - across * np.sin(yaw), along * np.sin(yaw) + across * np.cos(yaw)
