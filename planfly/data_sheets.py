@@ -32,7 +32,8 @@ from aircraft.uncertainty import (
     draws_text,
     uncertainty_text,
 )
-from flight.autopilots.arduplane.parameters import DEFINITIONS, Entry, read_parameter_file
+from flight.autopilots.arduplane.parameters import DEFINITIONS
+from flight.autopilots.parameter_files import Entry, read_parameter_file
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Simulator, Trim, fastest, full_throttle, idle, linearise, slowest, straight
 from flight.guidance.model_gains import AMSL, gains_of_model, gains_text

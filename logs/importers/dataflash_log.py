@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.law import true_by_equivalent
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Home, MissionItem, on_grid
 from logs.importers.clean_places import steady_clock
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from flight.autopilots.arduplane.law import true_by_equivalent
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Home, Mission, MissionItem, on_grid
 from flight.simulation.setup import Damage
 from logs.importers.clean_places import steady_clock

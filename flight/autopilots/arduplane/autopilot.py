@@ -9,7 +9,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
-from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick, true_by_equivalent, turn_distance
+from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick, turn_distance
 from flight.autopilots.arduplane.parameters import (
     HEIGHT_CANDIDATES,
     SIDE_CANDIDATES,
@@ -22,6 +22,7 @@ from flight.autopilots.arduplane.parameters import (
 )
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import Autopilot, Floats, SpeedLimits, StoredAutopilot, StoredParameters, Tick
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.return_path import ReturnRules
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Navigation

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, CLIMB_BEFORE_TURN
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from flight.guidance.path import find_on_path, profile
@@ -545,19 +546,7 @@ PITCH_LAG = 1.1
 # TECS's two integrals of the pitch balance each other, and no steady flight tells how large they are; what came before
 # the first waypoint has left this in the one of speed, m^2/s^3 (12 to 39, 27 on average, in 18 flights of ArduPlane).
 SPEED_SUM = 27.0
-# The international standard atmosphere below 11 km: temperature falls by this share of sea level's a metre, and density
-# with that power of the temperature.
-_LAPSE, _DENSITY_POWER = 2.25577e-5, 4.25588
-# Highest that the ratio is worked out for, m.
-_HIGHEST = 11_000.0
 _FASTEST_PITCH = math.radians(40.0)
-
-
-@compiled
-def true_by_equivalent(amsl: float) -> float:  # pragma: no cover - compiled
-    """True airspeed by equivalent airspeed in the standard atmosphere at a height, m; 1.05 at 1,000 m."""
-    ratio: float = (1.0 - _LAPSE * min(_HIGHEST, amsl)) ** (-0.5 * _DENSITY_POWER)
-    return ratio
 
 
 @compiled

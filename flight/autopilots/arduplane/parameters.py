@@ -6,7 +6,6 @@ that states a parameter counts: the file that a person gives, the file `ardupilo
 """
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,110 +16,12 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters
+from flight.autopilots.parameter_files import Entry, parse_parameters, read_parameter_file
 from world.errors import ParameterError
-from world.files import TextLine, read_small_file, utf8_text
+from world.files import TextLine
 from world.kernels import Record, record_dtype
 
 Floats = NDArray[np.float64]
-
-
-# ----------------------------------------------------------------------
-# Files of ArduPilot parameters, in the forms that ground stations write.
-#
-# QGroundControl writes five columns with tabs between: vehicle, component, name, value, type.  MAVProxy and ArduPilot's
-# own default files have a name and a value with blanks between, Mission Planner has a comma.  In all of them a `#`
-# begins a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's, "Plain-Text File
-# Format").
-
-# A vehicle has some 1,500 parameters in lines of 40 bytes.
-MAX_BYTES = 4 * 2**20
-# ArduPilot's names have at most sixteen characters (MAVLink, PARAM_VALUE).
-_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-# A line of QGroundControl's: vehicle, component, name, value, type.
-_QGC_FIELDS = 5
-_WHOLE = re.compile(r"[0-9]{1,5}")
-_BETWEEN = re.compile(r"[\s,=]+")
-
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """One parameter of a file.
-
-    where: file and line, for messages.
-    """
-
-    name: str
-    value: float
-    where: TextLine
-
-
-def read_parameter_file(path: Path) -> dict[str, Entry]:
-    """Read a file of parameters, by name in the order of the file.
-
-    Raises ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
-    """
-    data = read_small_file(path, MAX_BYTES, "parameter", ParameterError)
-    return parse_parameters(utf8_text(data, path, ParameterError), str(path))
-
-
-def parse_parameters(text: str, source: str) -> dict[str, Entry]:
-    r"""Read the text of a parameter file, in any of the forms; ``source`` names it in messages.
-
-    Raises ParameterError with file, line, field, value and what is allowed, for a line that is none, a value that is no
-    finite number, a name that comes twice, and a file without a parameter.
-
-    >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
-    >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)
-    (90.0, 'qgc.params:2')
-    >>> list(parse_parameters("WP_RADIUS 90  # m\nTHR_MAX,100\n", "any.parm"))
-    ['WP_RADIUS', 'THR_MAX']
-    """
-    found: dict[str, Entry] = {}
-    for number, text_line in enumerate(re.split(r"\r\n|\n|\r", text), 1):
-        line = text_line.partition("#")[0].strip()
-        if not line:
-            continue
-        entry = _entry(line, TextLine(source, number))
-        if entry.name in found:
-            first = found[entry.name].where.number
-            allowed = "each name is expected once"
-            raise ParameterError(
-                f"{entry.where}: {entry.name}: already on line {first}: {allowed}",
-                file=source, field=entry.name, value=entry.value, allowed=allowed,
-            )  # fmt: skip
-        found[entry.name] = entry
-    if not found:
-        raise ParameterError(f"{source}: no parameter: lines of a name and a value are expected", file=source)
-    return found
-
-
-def _entry(line: str, where: TextLine) -> Entry:
-    fields = line.split("\t")
-    if len(fields) == _QGC_FIELDS and _WHOLE.fullmatch(fields[0].strip()):
-        name, text = fields[2].strip(), fields[3].strip()
-    else:
-        fields = _BETWEEN.split(line)
-        if len(fields) != 2:
-            allowed = "a name and a value are expected, or QGroundControl's five columns"
-            message = f"{where}: {_shown(line)}: {allowed}"
-            raise ParameterError(message, file=where.file, value=line, allowed=allowed)
-        name, text = fields
-    if not _NAME.fullmatch(name):
-        allowed = "up to 16 capitals, digits and _ are expected"
-        message = f"{where}: name {_shown(name)}: {allowed}"
-        raise ParameterError(message, file=where.file, field="name", value=name, allowed=allowed)
-    value = float(text) if _NUMBER.fullmatch(text) else math.nan
-    if not math.isfinite(value):
-        allowed = "a finite number is expected"
-        raise ParameterError(
-            f"{where}: {name}: {_shown(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
-        )
-    return Entry(name, value, where)
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= 40 else text[:37] + "...")
 
 
 # Of an aircraft, beside its model: what ArduPlane has to be told of it.

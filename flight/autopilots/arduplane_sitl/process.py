@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.parameters import AIRCRAFT_FILE, DEFINITIONS, read_parameter_file
+from flight.autopilots.arduplane.parameters import AIRCRAFT_FILE, DEFINITIONS
 from flight.autopilots.arduplane_sitl.physics import LOOPBACK, ServoMap
+from flight.autopilots.parameter_files import read_parameter_file
 from flight.mission.items import Home
 from flight.simulation.setup import FlightSetup
 from world.errors import FlightError

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from flight.autopilots.arduplane.parameters import parse_parameters
+from flight.autopilots.parameter_files import parse_parameters
 from flight.mission_files.formats import read_mission
 from flight.mission_files.qgc_plan import parse_plan_file
 from flight.mission_files.wpl import HEADER, parse_waypoints

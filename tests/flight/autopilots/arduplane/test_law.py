@@ -21,7 +21,6 @@ from flight.autopilots.arduplane.law import (
     navigate_legs,
     past_line,
     roll_demand,
-    true_by_equivalent,
     turn_distance,
     update_tecs,
 )
@@ -377,12 +376,6 @@ KEPT: list[dict[str, Any]] = json.loads(
 @pytest.fixture(scope="module")
 def usual(aerosonde: Aircraft) -> ArduPilotParameters:
     return load_parameters(aerosonde)
-
-
-def test_true_airspeed_is_a_twentieth_more_at_a_thousand_metres() -> None:
-    # Density of the standard atmosphere (ISO 2533): 1.2250 at sea level, 1.1117 at 1,000 m, 0.9093 at 3,000 m.
-    for amsl, density in ((0.0, 1.2250), (1000.0, 1.1117), (3000.0, 0.9093)):
-        assert true_by_equivalent(amsl) == pytest.approx(math.sqrt(1.2250 / density), rel=2e-4)
 
 
 def test_it_holds_an_equivalent_airspeed(
