@@ -22,6 +22,7 @@ from world.raster import RasterFile, open_raster, read_terrain, tile_bounds
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
 from world.scenario_tables import (
     MAX_ZONES,
+    OWN_GUIDANCE,
     AreaTable,
     FlightTable,
     LimitsTable,
@@ -467,7 +468,9 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     given = {key: value for key, value in changes.items() if value is not None}
     kept = scenario.flight.model_dump()
     if "guidance" in given or "params" in given or "autopilot" in given:
-        kept |= {"autopilot": None, "guidance": None, "params": None}
+        # Parameters alone are of the autopilot that the scenario names, where that takes any.
+        named = bool(set(given) & {"guidance", "autopilot"}) or kept["autopilot"] in (None, OWN_GUIDANCE)
+        kept |= {"guidance": None, "params": None} | ({"autopilot": None, "px4_version": None} if named else {})
     table = checked_table(lambda: FlightTable(**(kept | given)), f"{scenario.name}: flight")
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 

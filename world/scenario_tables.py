@@ -52,6 +52,9 @@ Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(no_lin
 FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(no_line_break)]
 Guidance = Literal["path", "l1", "vector-field"]
 Navigation = Literal["perfect", "rtk", "gnss"]
+# Releases of PX4 whose laws differ.
+Px4Version = Literal["1.16", "1.17"]
+NEWEST_PX4: Px4Version = "1.17"
 Seed = Annotated[int, within(0, 2**63 - 1)]
 Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 Angle = Annotated[float, within(0.0, 90.0, above=True, below=True, also=', or "aircraft"')] | Literal["aircraft"]
@@ -334,7 +337,9 @@ def names_folder(aircraft: str) -> bool:
 # Who flies where a scenario names neither an autopilot nor what belongs to one.
 DEFAULT_AUTOPILOT = "ardupilot"
 # Planfly's own guidance, which alone has a choice of laws and takes no parameters.
-_OWN_GUIDANCE = "ideal"
+OWN_GUIDANCE = "ideal"
+# The one whose releases can be told apart.
+_PX4 = "px4"
 
 
 class Steering(NamedTuple):
@@ -355,7 +360,8 @@ class FlightTable(ScenarioTable):
     """[flight]; what is None was not stated, and `steering` says what that comes to.
 
     autopilot: who flies; guidance alone means "ideal", params alone "ardupilot".
-    params: ArduPilot's parameters, a file.
+    params: the autopilot's parameters, a file.
+    px4_version: of autopilot = "px4", whose releases fly differently; None for the newest.
     guidance: the law of "ideal".
     nav: how well the autopilot knows where it is, see `flight.guidance.navigation_error`.
     """
@@ -365,6 +371,7 @@ class FlightTable(ScenarioTable):
     max_bank_deg: Annotated[float, within(5.0, 60.0)] = 30.0
     autopilot: Name | None = None
     params: FilePath | None = None
+    px4_version: Px4Version | None = None
     guidance: Guidance | None = None
     guidance_hz: Literal[30, 60] = 60
     nav: Navigation | None = None
@@ -375,10 +382,12 @@ class FlightTable(ScenarioTable):
     @model_validator(mode="after")
     def _one_autopilot(self) -> "FlightTable":
         autopilot = self.steering.autopilot
-        if self.guidance is not None and autopilot != _OWN_GUIDANCE:
+        if self.guidance is not None and autopilot != OWN_GUIDANCE:
             raise ValueError(f'guidance: not a key of autopilot = "{autopilot}"')
-        if self.params is not None and autopilot == _OWN_GUIDANCE:
+        if self.params is not None and autopilot == OWN_GUIDANCE:
             raise ValueError('params: not a key of autopilot = "ideal", which guidance alone means')
+        if self.px4_version is not None and autopilot != _PX4:
+            raise ValueError(f'px4_version: a key of autopilot = "px4" alone, not of "{autopilot}"')
         return self
 
     @property
@@ -386,17 +395,19 @@ class FlightTable(ScenarioTable):
         """Who flies, and how well it knows where it is: planfly's guidance exactly, others by GNSS."""
         implied = DEFAULT_AUTOPILOT
         if self.guidance is not None:
-            implied = _OWN_GUIDANCE
+            implied = OWN_GUIDANCE
         elif self.params is not None:
             implied = "ardupilot"
         autopilot = self.autopilot or implied
-        usual: Navigation = "perfect" if autopilot == _OWN_GUIDANCE else "gnss"
+        usual: Navigation = "perfect" if autopilot == OWN_GUIDANCE else "gnss"
         return Steering(autopilot, self.guidance or "path", self.nav or usual)
 
     def stated(self) -> "FlightTable":
         """The same flight with nothing left to a default of who flies: as plans and logs hold it."""
         autopilot, guidance, nav = self.steering
-        who = {"autopilot": autopilot} if autopilot != _OWN_GUIDANCE else {"guidance": guidance}
+        who: dict[str, str] = {"autopilot": autopilot} if autopilot != OWN_GUIDANCE else {"guidance": guidance}
+        if autopilot == _PX4:
+            who["px4_version"] = self.px4_version or NEWEST_PX4
         return self.model_copy(update={**who, "nav": nav})
 
 

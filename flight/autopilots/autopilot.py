@@ -77,12 +77,16 @@ class Parameters(Protocol):
 
 
 class SpeedLimits(NamedTuple):
-    """Airspeeds (m/s) that an autopilot takes from a mission, and the parameters that set them."""
+    """Airspeeds (m/s) that an autopilot takes from a mission, and the parameters that set them.
+
+    nearest: whether it flies the nearest of them for a command of another, which it else ignores.
+    """
 
     min: float
     max: float
     min_name: str
     max_name: str
+    nearest: bool = False
 
 
 class Candidate(NamedTuple):
@@ -130,11 +134,13 @@ class StoredAutopilot(NamedTuple):
     """An autopilot's settings as a log stores them.
 
     guidance: the law of planfly's guidance, "path" for every other autopilot.
+    version: of an autopilot whose releases have laws of their own, "" for any other.
     """
 
     guidance: Guidance = "path"
     parameters: StoredParameters | None = None
     program: AutopilotProgram | None = None
+    version: str = ""
 
 
 # ----------------------------------------------------------------------
@@ -264,7 +270,7 @@ class Autopilot(ABC):
 
     @property
     def speed_limits(self) -> SpeedLimits | None:
-        """Airspeeds that it takes from a mission: it ignores a command of another; None for no limits."""
+        """Airspeeds that it takes from a mission; None for no limits."""
         return None
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:

@@ -9,6 +9,7 @@ from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import Autopilot, StoredAutopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.program import ProgramAutopilot
+from flight.autopilots.px4.autopilot import Px4
 from world.errors import ScenarioError
 from world.files import did_you_mean
 from world.scenario import Scenario
@@ -17,6 +18,7 @@ from world.scenario import Scenario
 AUTOPILOTS: tuple[type[Autopilot], ...] = (
     ArduPlane,
     PlanflyGuidance,
+    Px4,
     ArduPlaneSitl,
 )
 # By the name that a scenario states.

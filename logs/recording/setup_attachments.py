@@ -231,6 +231,7 @@ class _Setup(SetupModel):
     parameters: ParametersTable | None = None  # a log of before there were any was flown by planfly's guidance
     program: ProgramTable | None = None
     autopilot: str | None = None  # left out where guidance, parameters and program say who flew
+    autopilot_version: str | None = None  # left out where all releases of it fly alike
     source: ImportedLog | None = None
     mission: MissionTable
     route: RouteTable
@@ -300,6 +301,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         parameters=None if stored.parameters is None else parameters_table(stored.parameters),
         program=None if stored.program is None else ProgramTable.of(stored.program),
         autopilot=stored_name(setup.autopilot),
+        autopilot_version=stored.version or None,
         source=setup.source,
         mission=MissionTable.of(setup.mission),
         route=RouteTable.of(setup.route),
@@ -307,7 +309,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         versions=package_versions(),
         sha256={name: hashlib.sha256(data).hexdigest() for name, data in attachments.items()},
     )
-    unstated = {"autopilot"} if file.autopilot is None else None
+    unstated = {name for name in ("autopilot", "autopilot_version") if getattr(file, name) is None}
     return {SETUP_FILE: _json(file.model_dump(by_alias=True, exclude=unstated)), **attachments}
 
 
@@ -358,6 +360,7 @@ def _autopilot(file: _Setup, where: str) -> Autopilot:
         file.guidance,
         None if file.parameters is None else read_parameters(file.parameters),
         None if file.program is None else file.program.program(),
+        file.autopilot_version or "",
     )
     try:
         return restore_autopilot(file.autopilot, stored)

@@ -129,6 +129,7 @@ def campaign(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     seed: int | None = None,
     workers: int | None = None,
@@ -146,8 +147,7 @@ def campaign(
     prove: a probability: fly until it is reached or missed, whichever comes first.  at_least: one to answer after all
     flights.  Not both.
     confidence: of each bound; None takes 0.95, or what it was of a campaign that is resumed.
-    scenario, terrain, fence, wind, turbulence, aircraft, airspeed, params, guidance, nav: as of `planfly.fly`.
-    seed: of plan and draws; None takes the scenario's, or 1.
+    scenario to nav: as of `planfly.fly`.  seed: of plan and draws; None takes the scenario's, or 1.
     workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
     out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
     overwrite: replace it.
@@ -164,7 +164,7 @@ def campaign(
     goal = make_goal(flights, prove, at_least, confidence)
     asked = _asked(
         target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, params=params, guidance=guidance, nav=nav,
+        turbulence=turbulence, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as place:
         if resume:
@@ -209,6 +209,7 @@ def campaign_flight(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     seed: int | None = None,
 ) -> CampaignFlight:
@@ -222,7 +223,7 @@ def campaign_flight(
     goal = continued_goal(folder, flights, prove, at_least, confidence)
     asked = _asked(
         target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, params=params, guidance=guidance, nav=nav,
+        turbulence=turbulence, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     base = asked.open(_dispersions(spread), OutputDirectory(folder, DATABASE, resume=True, overwrite=False))
     row = _row_of(base, goal, folder, index)
@@ -263,6 +264,7 @@ def winds(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     seed: int | None = None,
     workers: int | None = None,
@@ -277,7 +279,7 @@ def winds(
     prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all
     directions; None takes 5,000, or those that a search which is resumed was to have.
     confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
-    scenario, terrain, fence, wind, turbulence, aircraft, airspeed, params, guidance, nav: as of `planfly.fly`.
+    scenario to nav: as of `planfly.fly`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
     resume: go on with the search that is there.  overwrite: replace it.
 
@@ -293,7 +295,7 @@ def winds(
     check_arguments(workers=workers, seed=seed)
     asked = _asked(
         target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, params=params, guidance=guidance, nav=nav,
+        turbulence=turbulence, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as place:
         folder = place.folder

@@ -127,6 +127,7 @@ def fly(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     autopilot: str | Path | None = None,
     log_hz: Literal[10, 20, 30, 60] = 60,
@@ -142,7 +143,7 @@ def fly(
     scenario: to fly it in, a name or a TOML file; None for the plan's own, or one made around the mission.
     terrain: an elevation file in place of the scenario's.  fence: files of fences and zones beside its own.
     seed: of the turbulence; None takes the plan's, the scenario's, or 1.
-    wind, turbulence, aircraft, airspeed, params, guidance, nav: as of `planfly.plan`.
+    wind, turbulence, aircraft, airspeed, params, guidance, autopilot_law, nav: as of `planfly.plan`.
     autopilot: the program of ArduPilot SITL, which then flies.
     log_hz: rows a second in the log.  max_hours, max_log: where a flight ends that would go on, h and MB.
 
@@ -159,7 +160,7 @@ def fly(
         check_binary(program)
     change = partial(
         changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
-        guidance=guidance, nav=nav, autopilot=autopilot,
+        guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,
     )  # fmt: skip
     opened = _opened(mission, scenario, terrain, seed, fence, change)
     target = None if log is None else _log_target(log, opened, mission, program, overwrite)
@@ -206,6 +207,7 @@ def judge(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     plan: str | Path | None = None,
     flight: int | None = None,
     datum: VerticalDatum | None = None,
@@ -214,8 +216,8 @@ def judge(
 
     what: a flight log or its path, an autopilot's log, what `planfly.fly` gave, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.
-    scenario, wind, turbulence, aircraft, airspeed, params, guidance: of a plan or mission, as of `planfly.fly`; a
-    flight is judged as it was flown.
+    scenario, wind, turbulence, aircraft, airspeed, params, guidance, autopilot_law: of a plan or mission, as of
+    `planfly.fly`; a flight is judged as it was flown.
     terrain, fence: in place of the ground, and beside the fences, that it carries.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
 
@@ -234,7 +236,8 @@ def judge(
 
         found = read_imported(
             what, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence,
-            aircraft=aircraft, airspeed=airspeed, params=params, guidance=guidance, flight=flight, datum=datum,
+            aircraft=aircraft, airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law,
+            flight=flight, datum=datum,
         )  # fmt: skip
         return Judged(found.setup, found.verdict, lossy=found.lossy)
     source = _source_of(what)
@@ -242,13 +245,13 @@ def judge(
     fences = named_fences(fence)
     log = Path(what) if isinstance(what, str | Path) and is_log(Path(what)) else None
     if log is not None or isinstance(what, FlightLog | FlownMission):
-        _refuse(source, flown_with | {"guidance": guidance}, _AS_FLOWN)
+        _refuse(source, flown_with | {"guidance": guidance, "autopilot_law": autopilot_law}, _AS_FLOWN)
         _refuse(source, {"scenario": scenario}, _WHERE_FLOWN)
     if log is not None:
         what = read_log(log)
     if isinstance(what, FlightLog | FlownMission):
         return _judge_flight(what, terrain, fences)
-    change = partial(changed_scenario, guidance=guidance, **flown_with)
+    change = partial(changed_scenario, guidance=guidance, autopilot_law=autopilot_law, **flown_with)
     setup = _opened(what, scenario, terrain, None, fences, change).setup
     return Judged(setup, judge_geometry(setup))
 
@@ -265,6 +268,7 @@ def check(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     plan: str | Path | None = None,
     flight: int | None = None,
     datum: VerticalDatum | None = None,
@@ -282,7 +286,8 @@ def check(
     """
     return judge(
         what, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence, aircraft=aircraft,
-        airspeed=airspeed, params=params, guidance=guidance, plan=plan, flight=flight, datum=datum,
+        airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law, plan=plan, flight=flight,
+        datum=datum,
     ).verdict  # fmt: skip
 
 

@@ -55,6 +55,7 @@ def read_imported(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     flight: int | None = None,
     datum: VerticalDatum | None = None,
 ) -> ImportedFlight:
@@ -62,7 +63,12 @@ def read_imported(
 
     Raises ScenarioError for an argument that a flown log cannot take.
     """
-    for name, value in {"params": params, "guidance": guidance, "airspeed": airspeed}.items():
+    for name, value in {
+        "params": params,
+        "guidance": guidance,
+        "autopilot_law": autopilot_law,
+        "airspeed": airspeed,
+    }.items():
         if value is not None:
             allowed = "an imported flight is judged by the autopilot and the speeds of its log"
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=log)

@@ -55,15 +55,29 @@ def flight_entries(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     autopilot: str | Path | None = None,
 ) -> dict[str, str | float | None]:
-    """Entries of a scenario's [flight] that the keywords of a call state; None for those that were not given."""
+    """Entries of a scenario's [flight] that the keywords of a call state; None for those that were not given.
+
+    Raises ArgumentError for a law that planfly does not know, and for one beside a program.
+
+    >>> entries = flight_entries(autopilot_law="px4-1.16")
+    >>> entries["autopilot"], entries["px4_version"]
+    ('px4', '1.16')
+    """
+    check_arguments(autopilot_law=autopilot_law)
+    if autopilot is not None and autopilot_law is not None:
+        allowed = "not with autopilot: a program flies by its own law"
+        raise ArgumentError.of_argument("autopilot_law", autopilot_law, allowed)
+    law, _, version = (autopilot_law or "").partition("-")
     return {
         # A `Path` is a folder, and is passed on so that it is known for one.
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
         "airspeed_mps": airspeed,
-        "autopilot": None if autopilot is None else program_autopilot(Path(autopilot)).name,
+        "autopilot": law or None if autopilot is None else program_autopilot(Path(autopilot)).name,
+        "px4_version": version or None,
         "guidance": guidance,
         "nav": nav,
         # Whatever folder the scenario is in.
@@ -80,13 +94,14 @@ def changed_scenario(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     autopilot: str | Path | None = None,
 ) -> Scenario:
     """A scenario in other weather, or flown otherwise; None keeps what it has.
 
     wind: speed, m/s, and where it comes from, degrees.  aircraft: a name, or a folder.  airspeed: m/s.
-    params: a file of ArduPlane's parameters.  autopilot: an ArduPlane's program.
+    params: a file of the autopilot's parameters.  autopilot_law: whose law flies.  autopilot: an ArduPlane's program.
     Raises ScenarioError for what a scenario file may not have either.
 
     >>> changed = changed_scenario(load_scenario("tight"), wind=(8.0, 270.0), airspeed=28.0)
@@ -97,7 +112,13 @@ def changed_scenario(
     if speed is not None and from_deg is not None and not is_wind(0.0, from_deg):
         raise ArgumentError.of_argument("wind", wind, "degrees from north that it blows from, -360..360, are expected")
     entries = flight_entries(
-        aircraft=aircraft, airspeed=airspeed, params=params, guidance=guidance, nav=nav, autopilot=autopilot
+        aircraft=aircraft,
+        airspeed=airspeed,
+        params=params,
+        guidance=guidance,
+        autopilot_law=autopilot_law,
+        nav=nav,
+        autopilot=autopilot,
     )
     from_course = None if from_deg is None else math.radians(from_deg)
     return with_wind(with_flight(scenario, **entries), speed, from_course, turbulence)
@@ -124,6 +145,7 @@ def plan(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     out: str | Path | None = None,
     overwrite: bool = True,
@@ -136,7 +158,8 @@ def plan(
     algorithm: a name of ``planfly plan --help``; None for the default.
     budget: evaluations at most.  seconds: time at most; the best path so far is given then.
     wind: speed, m/s, and where it comes from, degrees; turbulence: "none", "light" or "moderate".
-    aircraft: a name, or a folder.  airspeed: m/s.  params: a file of ArduPlane's parameters.
+    aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
+    autopilot_law: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16", "px4-1.17" or "ideal".
     guidance: planfly's own law ("path", "l1", "vector-field") in place of ArduPlane's.  nav: "perfect", "rtk", "gnss".
     out: where to write it as plan.json; {name} and {seed} in it stand for the scenario's name and the seed.
     overwrite: whether an existing file is replaced.
@@ -154,7 +177,7 @@ def plan(
     """
     change = partial(
         changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
-        guidance=guidance, nav=nav,
+        guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     check_arguments(seed=seed, budget=budget, seconds=seconds)
     world = _with_budget(change(opened_scenario(scenario)), budget)
@@ -178,6 +201,7 @@ def replan(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     out: str | Path | None = None,
     overwrite: bool = True,
@@ -199,7 +223,7 @@ def replan(
     """
     change = partial(
         changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
-        guidance=guidance, nav=nav,
+        guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     check_arguments(seed=seed, budget=budget, seconds=seconds, at_leg=at_leg)
     world = _with_budget(change(opened_scenario(scenario)), budget)

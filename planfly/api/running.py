@@ -117,6 +117,7 @@ def run(
     airspeed: float | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     autopilot: str | Path | None = None,
     log_hz: Literal[10, 20, 30, 60] = 60,
@@ -133,8 +134,7 @@ def run(
     refine: rounds more, up to 20, each planned within limits tightened by what the flight before could not do.
     out: the folder; {name} and {seed} in it stand for the scenario's name and the seed.
     overwrite: whether results that lie there are replaced, as they always are in the default folder.
-    on_round: called with each round once it is over.
-    The other keywords are as of `planfly.fly`.
+    on_round: called with each round once it is over.  The other keywords are as of `planfly.fly`.
 
     Raises a `planfly.PlanflyError` for bad input, before anything is written.
 
@@ -150,19 +150,19 @@ def run(
         check_binary(program)
     change = partial(
         changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
-        guidance=guidance, nav=nav, autopilot=autopilot,
+        guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,
     )  # fmt: skip
     world = change(opened_scenario(scenario, terrain))
     number, airframe = choose_seed(world, seed), load_airframe(world)
     folder = filled_pattern(out, world.name, number)
     refuse_folder(folder, overwrite or out == RUN_FOLDER)
-    limits = FlightLimits(max_hours, max_log)
     repeated = {
         "refine": refine, "terrain": terrain, "aircraft": aircraft, "airspeed": airspeed, "wind": wind,
         "turbulence": turbulence, "params": params, "guidance": guidance, "nav": nav, "autopilot": autopilot,
-    }  # fmt: skip
+    } | {"autopilot-law": autopilot_law}  # fmt: skip
     name = world.name if isinstance(scenario, Scenario) else str(scenario)
-    task = _Task(world, airframe, number, command_line(name, number, repeated), folder, program, limits, 60 // log_hz)
+    line, limits = command_line(name, number, repeated), FlightLimits(max_hours, max_log)
+    task = _Task(world, airframe, number, line, folder, program, limits, 60 // log_hz)
     with contextlib.ExitStack() as held:
         return _rounds(task, refine, held, on_round)
 

@@ -48,6 +48,7 @@ def serve(
     fence: FencePaths = (),
     params: str | Path | None = None,
     guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
     nav: Navigation | None = None,
     to: str | Sequence[str] = "127.0.0.1:14550",
     bind: str = "127.0.0.1:14580",
@@ -61,8 +62,8 @@ def serve(
     """Be a MAVLink vehicle in a simulated world, until ``stop`` is true.
 
     mission: a file to begin with; None waits for an upload.
-    scenario, terrain, fence, params, guidance, nav: as of `planfly.fly`; without a mission the scenario is "jacksboro"
-    unless another is named.
+    scenario, terrain, fence, params, guidance, autopilot_law, nav: as of `planfly.fly`; without a mission the scenario
+    is "jacksboro" unless another is named.
     to: where ground stations listen, IP:PORT, one or several.  bind: where the vehicle listens.
     allow: IP addresses beyond this machine that may talk to it.  sign_key: a file with a MAVLink signing key.
     speed: times real time, 0.1 to 100.  log: the folder of the flight logs.
@@ -74,7 +75,7 @@ def serve(
     access = link_access(to, bind, allow, sign_key)
     check_arguments(served_speed=speed)
     named = ["" if one is None else str(one) for one in (mission, scenario, terrain)]
-    entries = flight_entries(params=params, guidance=guidance, nav=nav)
+    entries = flight_entries(params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav)
     options = ServeOptions(named[0], named[1] or None, named[2] or None, speed, Path(log), entries, named_fences(fence))
     served = open_served(options)
     if options.logs.exists() and not options.logs.is_dir():

@@ -139,9 +139,18 @@ def pilot_options(parser: CommandParser) -> OptionTaker:
     """The autopilot."""
     group = parser.group("autopilot")
     found = group.add_argument(
-        "--params", metavar="FILE", help="fly ArduPlane's law with these parameters, as a ground station saves them"
+        "--params",
+        metavar="FILE",
+        help="fly the autopilot's law, ArduPlane's unless another is named, with these parameters, as a ground station "
+        "saves them",
     )
     completed(found, files("param", "parm", "params"))
+    group.add_argument(
+        "--autopilot-law",
+        choices=CHOICES["autopilot_law"],
+        help="whose law flies: ArduPlane's (ardupilot, the default), PX4's for fixed wing (px4, the newest release "
+        "that planfly knows, px4-1.16 or px4-1.17), or planfly's own guidance (ideal)",
+    )
     group.add_argument(
         "--guidance",
         choices=CHOICES["guidance"],
@@ -157,7 +166,7 @@ def steering_options(parser: CommandParser) -> OptionTaker:
     group.add_argument(
         "--nav",
         choices=CHOICES["nav"],
-        help="position errors of the navigation: 0, 0.05 or 1.5 m on each axis (default: gnss for ArduPlane, perfect "
+        help="position errors of the navigation: 0, 0.05 or 1.5 m on each axis (default: gnss for autopilots, perfect "
         "for planfly's guidance)",
     )
     return group

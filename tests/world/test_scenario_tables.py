@@ -129,6 +129,7 @@ def test_every_default() -> None:
             "max_bank_deg": 30.0,
             "autopilot": None,
             "params": None,
+            "px4_version": None,
             "guidance": None,
             "guidance_hz": 60,
             "nav": None,

@@ -90,7 +90,8 @@ def _not_taken(requirements: RouteRequirements, asked: float) -> list[str]:
     if limits is None or limits.min <= asked <= limits.max:
         return []
     taken = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    return [f"{autopilot.title} takes speeds from {taken}, and ignores this one"]
+    does = "flies the nearest for this one" if limits.nearest else "ignores this one"
+    return [f"{autopilot.title} takes speeds from {taken}, and {does}"]
 
 
 def _no_room(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:

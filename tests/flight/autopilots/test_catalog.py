@@ -22,6 +22,8 @@ from flight.autopilots.catalog import (
 )
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.program import ProgramAutopilot
+from flight.autopilots.px4 import parameters as px4_parameters
+from flight.autopilots.px4.autopilot import Px4
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario, with_flight
 
@@ -78,6 +80,8 @@ def test_one_without_parameters_takes_no_file_of_them() -> None:
         (ArduPlane(MINE), None),
         (ArduPlaneSitl(MINE, PROGRAM), None),
         (Other("l1"), "other"),
+        (Px4(px4_parameters.parameters_of("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")), "px4"),
+        (Px4(px4_parameters.default_parameters()), "px4"),
     ],
 )
 @pytest.mark.usefixtures("listed")

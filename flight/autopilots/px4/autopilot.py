@@ -1,0 +1,145 @@
+"""PX4's law for fixed wing as an autopilot, with the parameters that it flies by."""
+
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar, Self
+
+import numpy as np
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.autopilot import Autopilot, Floats, SpeedLimits, StoredAutopilot, StoredParameters, Tick
+from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
+from flight.autopilots.px4.law import PX4, px4_tick
+from flight.autopilots.px4.parameters import (
+    HEIGHT_CANDIDATES,
+    SIDE_CANDIDATES,
+    Px4Parameters,
+    default_parameters,
+    load_parameters,
+    stored_parameters,
+)
+from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.mission.return_path import ReturnRules
+from world.kernels import Record
+from world.scenario_tables import NEWEST_PX4, FlightTable
+
+
+@dataclass(frozen=True)
+class Px4(Autopilot):
+    """PX4's law for fixed wing: NPFG along the legs, TECS for height and airspeed.
+
+    >>> made = Px4(default_parameters("1.16"))
+    >>> made.acceptance_radius, Px4(default_parameters("1.17")).acceptance_radius
+    (33.6, 10.0)
+    """
+
+    name: ClassVar = "px4"
+    title: ClassVar = "PX4"
+    own: ClassVar[np.dtype[np.record] | None] = PX4
+    equivalent_airspeeds: ClassVar = True
+    height_candidates: ClassVar = HEIGHT_CANDIDATES
+    side_candidates: ClassVar = SIDE_CANDIDATES
+    parameters: Px4Parameters = field()
+
+    @classmethod
+    def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
+        """With the parameters of the person's file, of the aircraft, and PX4's defaults."""
+        return cls(load_parameters(aircraft, table.params, table.px4_version or NEWEST_PX4))
+
+    @classmethod
+    def restore(cls, stored: StoredAutopilot) -> Self:
+        """With the parameters and the version that a log stores."""
+        version = stored.version or NEWEST_PX4
+        if stored.parameters is None:
+            return cls(default_parameters())
+        return cls(stored_parameters(stored.parameters, version))
+
+    def store(self) -> StoredAutopilot:
+        """Its parameters and its version."""
+        made = self.parameters
+        stored = StoredParameters(made.values, made.unused, made.source)
+        return StoredAutopilot(parameters=stored, version=made.version)
+
+    @classmethod
+    def missing_files(cls, aircraft: Aircraft) -> list[str]:
+        """None: what the aircraft does not state has PX4's defaults."""
+        load_parameters(aircraft)
+        return []
+
+    @property
+    def tick(self) -> Tick:
+        """One tick of the law."""
+        return px4_tick
+
+    def begin(self, memory: Record, own: Record) -> None:
+        """Hand over the parameters."""
+        own.parameters = self.parameters.record()
+
+    def described(self, aircraft: str) -> str:
+        """The law with the parameters that decide most of a flight."""
+        made = self.parameters
+        whose = f"the parameters of {made.source}" if made.source else "its default parameters"
+        return (
+            f"PX4 {made.version}'s law with {whose} (NAV_ACC_RAD {made['NAV_ACC_RAD']:g} m, FW_T_CLMB_R_SP"
+            f" {made['FW_T_CLMB_R_SP']:g} and FW_T_SINK_R_SP {made['FW_T_SINK_R_SP']:g} m/s)"
+        )
+
+    @property
+    def acceptance_radius(self) -> float | None:
+        """NAV_ACC_RAD; up to 1.16 guidance's own switch distance at sea level where that is more."""
+        return self.turn_distance(math.pi, 0.0)
+
+    def turn_distance(self, turn: float, amsl: float) -> float:
+        """How far before a waypoint it turns in still air, whatever the turn: up to 1.16 more in thin air, m."""
+        made = self.parameters
+        if not made.anticipates:
+            return made["NAV_ACC_RAD"]
+        period = made["NPFG_PERIOD"]
+        if made["NPFG_LB_PERIOD"] > 0.0:
+            least = math.pi * made["NPFG_ROLL_TC"] / made["NPFG_DAMPING"] * made["NPFG_PERIOD_SF"]
+            period = max(period, least)
+        speed = made["FW_AIRSPD_TRIM"] * float(true_by_equivalent(amsl))
+        early = made["NPFG_SW_DST_MLT"] * period * made["NPFG_DAMPING"] * speed
+        return max(made["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE, early), 6))
+
+    def airspeed_factor(self, amsl: float) -> float:
+        """True by equivalent airspeed."""
+        return float(true_by_equivalent(amsl))
+
+    @property
+    def return_rules(self) -> ReturnRules:
+        """By RTL_RETURN_ALT and RTL_LOITER_RAD: to the nearest of home and rally points, however far."""
+        made = self.parameters
+        return ReturnRules(
+            height=made["RTL_RETURN_ALT"],
+            radius=made["RTL_LOITER_RAD"],
+            sink=made["FW_T_SINK_R_SP"],
+            rally_limit=0.0,
+            includes_home=True,
+        )
+
+    @property
+    def speed_limits(self) -> SpeedLimits | None:
+        """FW_AIRSPD_MIN and FW_AIRSPD_MAX: of another speed it flies the nearer of them."""
+        made = self.parameters
+        low, high = made["FW_AIRSPD_MIN"], made["FW_AIRSPD_MAX"]
+        return SpeedLimits(low, high, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
+
+    def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
+        """The commanded speeds within its limits."""
+        return np.clip(commanded, self.parameters["FW_AIRSPD_MIN"], self.parameters["FW_AIRSPD_MAX"])
+
+    @property
+    def stated_airspeed(self) -> tuple[float, str] | None:
+        """FW_AIRSPD_TRIM of a person's file."""
+        stated = self.parameters.by_origin("file")
+        return (stated["FW_AIRSPD_TRIM"], "FW_AIRSPD_TRIM") if "FW_AIRSPD_TRIM" in stated else None
+
+    @property
+    def stated_bank(self) -> float | None:
+        """FW_R_LIM of a person's file."""
+        return self.parameters["FW_R_LIM"] if "FW_R_LIM" in self.parameters.by_origin("file") else None
+
+    def with_parameters(self, **values: float) -> "Px4":
+        """The law with other parameters."""
+        return Px4(self.parameters.changed(**values))

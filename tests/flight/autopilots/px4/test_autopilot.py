@@ -1,0 +1,82 @@
+"""PX4 as an autopilot: its settings from a scenario, what a verdict asks of it, and a flight that ends at the gate."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.catalog import load_autopilot
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import load_parameters, parameters_of
+from flight.simulation.simulate import simulate
+from tests.setups import MakeSetup
+from world.errors import ScenarioError
+from world.scenario import load_scenario, with_flight
+
+
+def test_a_scenario_names_it_and_its_version(aerosonde: Aircraft) -> None:
+    tight = load_scenario("tight")
+    newest = load_autopilot(with_flight(tight, autopilot="px4"), aerosonde)
+    older = load_autopilot(with_flight(tight, autopilot="px4", px4_version="1.16"), aerosonde)
+    assert newest.acceptance_radius == 10.0
+    assert older.acceptance_radius == pytest.approx(56.0)
+    assert "PX4 1.17's law with its default parameters (NAV_ACC_RAD 10 m" in newest.described("aerosonde")
+    with pytest.raises(ScenarioError, match='px4_version: a key of autopilot = "px4" alone, not of "ideal"'):
+        with_flight(tight, px4_version="1.16")
+
+
+def test_a_plan_states_the_version_that_it_is_for() -> None:
+    stated = with_flight(load_scenario("tight"), autopilot="px4").to_json()["flight"]
+    assert (stated["autopilot"], stated["px4_version"]) == ("px4", "1.17")
+    assert "px4_version" not in load_scenario("jacksboro").to_json()["flight"]
+
+
+def test_parameters_alone_are_of_the_autopilot_that_the_scenario_names(aerosonde: Aircraft, tmp_path: Path) -> None:
+    file = tmp_path / "mine.params"
+    file.write_text("NAV_ACC_RAD 40\n", encoding="utf-8")
+    named = with_flight(load_scenario("tight"), autopilot="px4", px4_version="1.16")
+    made = load_autopilot(with_flight(named, params=str(file)), aerosonde)
+    assert isinstance(made, Px4)
+    assert (made.parameters["NAV_ACC_RAD"], made.parameters.version) == (40.0, "1.16")
+
+
+def test_it_turns_earlier_in_thin_air_up_to_1_16(aerosonde: Aircraft) -> None:
+    older, newer = (Px4(load_parameters(aerosonde, None, version)) for version in ("1.16", "1.17"))
+    # 2.24 s of the true airspeed, which at 2,000 m is 1.1029 of the equivalent one (ISO 2533: 1.0066 kg/m^3).
+    assert older.turn_distance(1.0, 2000.0) == pytest.approx(56.0 * (1.2250 / 1.0066) ** 0.5, rel=1e-3)
+    assert newer.turn_distance(1.0, 2000.0) == 10.0
+
+
+def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
+    made = Px4(parameters_of("FW_AIRSPD_MIN 18\nFW_AIRSPD_MAX 31\nFW_AIRSPD_TRIM 25\nFW_R_LIM 40\n", "a.params"))
+    assert made.speeds_flown(np.array([10.0, 20.0, 40.0]), 25.0).tolist() == [18.0, 20.0, 31.0]
+    assert made.speed_limits is not None
+    assert made.speed_limits.nearest
+    assert made.stated_airspeed == (25.0, "FW_AIRSPD_TRIM")
+    assert made.stated_bank == pytest.approx(np.radians(40.0))
+    assert (made.return_rules.height, made.return_rules.radius, made.return_rules.includes_home) == (100.0, 80.0, True)
+
+
+def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    # 100 m down in 1,000 m: 40 s at 25 m/s, in which 2 m/s take it 80 m; within 10 m it has arrived.
+    setup = make_setup([[0, 0, 600.0], [0, 1000, 500.0]])
+    law = Px4(load_parameters(aerosonde, None, "1.16"))
+    flown = simulate(replace(setup, autopilot=law), aerosonde)
+    track = flown.track
+    assert flown.ended == "completed"
+    assert track.position[-1, 2] == pytest.approx(510.0, abs=0.5)
+    # 90 m at 2 m/s, and some seconds behind the reference.
+    assert 45.0 < track.time[-1] < 60.0
+    assert np.degrees(np.abs(track.attitude[:, 0])).max() > 25.0
+    quick = Px4(load_parameters(aerosonde, None, "1.16").changed(FW_T_SINK_R_SP=4.0, FW_T_HRATE_FF=1.0))
+    down = simulate(replace(setup, autopilot=quick), aerosonde).track
+    assert np.degrees(np.abs(down.attitude[:, 0])).max() < 5.0
+
+
+def test_it_holds_a_leg_in_wind(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    setup = make_setup([[0, 0, 500.0], [0, 3000, 500.0]], wind=(8.0, 270.0))
+    track = simulate(replace(setup, autopilot=Px4(load_parameters(aerosonde))), aerosonde).track
+    late = track.time > 40.0
+    assert np.abs(track.position[late, 0]).max() < 5.0

@@ -1,0 +1,145 @@
+"""When PX4 turns to the next waypoint, the circle at one that is too high or too low, and heights along a leg."""
+
+import math
+from typing import Any
+
+import pytest
+
+from flight.autopilots.px4.navigator import SWITCH_DELAY, leg_height, navigate, past_corner, reach_radius
+from tests.flight.autopilots.px4.laws import flying, memory, parameters, waypoints
+from world.kernels import Record
+from world.scenario_tables import Px4Version
+
+DT = 0.02
+LEGS = ((0.0, 0.0, 500.0), (0.0, 1000.0, 500.0), (1000.0, 1000.0, 500.0))
+
+
+def after(
+    at: Record, own: Record | None = None, route: Any = LEGS, version: Px4Version = "1.16", **values: float
+) -> Record:
+    """The memory after the navigator has seen the aircraft at a place for longer than its delay."""
+    own = memory() if own is None else own
+    for _ in range(round(SWITCH_DELAY / DT) + 2):
+        navigate(at, waypoints(*route), 0.0, 0.0, 25.0, parameters(version, **values), own, DT)
+        if own.leg:
+            break
+    return own
+
+
+@pytest.mark.parametrize(("version", "values", "radius"), [
+    ("1.16", {}, 56.0),
+    ("1.16", {"NAV_ACC_RAD": 70.0}, 70.0),
+    ("1.17", {}, 10.0),
+    ("1.17", {"NAV_ACC_RAD": 70.0}, 70.0),
+])  # fmt: skip
+def test_a_waypoint_is_reached_within_its_radius(version: Px4Version, values: dict[str, float], radius: float) -> None:
+    assert reach_radius(25.0, parameters(version, **values)) == pytest.approx(radius)
+    assert after(flying(0.0, 1000.0 - radius - 0.1), version=version, **values).leg == 0
+    assert after(flying(0.0, 1000.0 - radius + 0.1), version=version, **values).leg == 1
+
+
+def test_an_items_own_radius_is_not_read() -> None:
+    own, route = memory(), waypoints(*LEGS, acceptance=120.0)
+    for _ in range(20):
+        navigate(flying(0.0, 930.0), route, 0.0, 0.0, 25.0, parameters(), own, DT)
+    assert own.leg == 0
+
+
+def test_the_turn_comes_after_the_delay() -> None:
+    own, route, made = memory(), waypoints(*LEGS), parameters()
+    ticks = 0
+    while not own.leg:
+        navigate(flying(0.0, 950.0), route, 0.0, 0.0, 25.0, made, own, DT)
+        ticks += 1
+    assert SWITCH_DELAY < ticks * DT <= SWITCH_DELAY + 2.5 * DT
+
+
+def test_past_the_plane_across_the_leg_it_is_reached_from_afar() -> None:
+    assert after(flying(400.0, 999.0), version="1.17").leg == 0
+    assert after(flying(400.0, 1001.0), version="1.17").leg == 1
+
+
+@pytest.mark.parametrize(("up", "leg"), [(509.9, 1), (510.1, 0), (490.1, 1), (489.9, 0)])
+def test_only_near_its_height_is_it_reached(up: float, leg: int) -> None:
+    assert after(flying(0.0, 960.0, up)).leg == leg
+    assert after(flying(0.0, 960.0, up), NAV_FW_ALT_RAD=20.0).leg == 1
+
+
+def test_near_it_and_too_high_it_circles_and_further_away_it_does_not() -> None:
+    near = after(flying(0.0, 945.0, 520.0))
+    assert (near.leg, bool(near.circling), near.height_asked) == (0, True, 500.0)
+    assert not after(flying(0.0, 943.0, 520.0)).circling
+    assert not after(flying(0.0, 945.0, 509.0)).circling
+    # South of its middle, a circle to the right goes west, and one to the left east.
+    assert after(flying(0.0, 990.0, 520.0), NAV_LOITER_RAD=80.0).side_acceleration < -5.0
+    assert after(flying(0.0, 990.0, 520.0), NAV_LOITER_RAD=-80.0).side_acceleration > 5.0
+
+
+def test_the_next_legs_line_goes_through_both_waypoints() -> None:
+    own = after(flying(5.0, 960.0))
+    assert (own.from_east, own.from_north, own.from_up, own.reached_for) == (0.0, 1000.0, 500.0, 0.0)
+    assert own.nearest == math.inf
+
+
+def test_the_last_waypoint_is_not_left() -> None:
+    assert after(flying(0.0, 999.0), route=LEGS[:2]).leg == 0
+
+
+@pytest.mark.parametrize(
+    ("nearest", "expected"),
+    [(1000.0, 500.0), (1200.0, 500.0), (540.0, 550.0), (80.0, 600.0), (0.0, 600.0)],
+)
+def test_a_legs_slope_is_done_a_loiters_radius_before_its_end(nearest: float, expected: float) -> None:
+    assert leg_height(0.0, 1000.0, 600.0, 80.0, memory(nearest=nearest)) == pytest.approx(expected)
+
+
+def test_a_leg_shorter_than_that_is_a_step() -> None:
+    assert leg_height(0.0, 80.0, 600.0, 80.0, memory(nearest=79.0)) == 600.0
+    assert leg_height(0.0, 80.2, 600.0, 80.0, memory(nearest=80.1)) == pytest.approx(550.0)
+
+
+def test_the_slope_never_goes_back() -> None:
+    own, route, made = memory(), waypoints((0.0, 0.0, 500.0), (0.0, 1000.0, 600.0), LEGS[2]), parameters()
+    navigate(flying(0.0, 460.0, 540.0), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert own.height_asked == pytest.approx(550.0)
+    navigate(flying(0.0, 300.0, 540.0), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert own.height_asked == pytest.approx(550.0)
+
+
+def test_a_loiters_circle_is_flown_until_its_corner_is_passed() -> None:
+    route = waypoints((0.0, 0.0, 500.0), (100.0, 1000.0, 500.0), (1000.0, 1000.0, 500.0))
+    route["circle"][1], route["centre_east"][1], route["centre_north"][1] = 100.0, 0.0, 1000.0
+    own, made = memory(), parameters()
+    # The circle is joined 100 + 56 m from its middle; before that the line to the middle is flown.
+    navigate(flying(0.0, 840.0), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert not own.circling
+    navigate(flying(0.0, 850.0), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert own.circling
+    # The corner is east of the middle; a circle to the right comes to it from the north.
+    assert not past_corner(flying(70.0, 1070.0), route[1])
+    navigate(flying(70.0, 1070.0), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert own.leg == 0
+    navigate(flying(70.0, 930.0), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert (own.leg, bool(own.circling), own.from_east) == (1, False, 70.0)
+
+
+def test_a_return_climbs_on_the_spot_flies_straight_and_comes_down_at_its_target() -> None:
+    route = waypoints((0.0, 0.0, 500.0), (0.0, 5000.0, 600.0), returns=True, circle=80.0, centre_north=5000.0)
+    own, made = memory(), parameters()
+
+    def seen(north: float, up: float) -> None:
+        navigate(flying(0.0, north, up), route, 0.0, 0.0, 25.0, made, own, DT)
+
+    seen(100.0, 500.0)
+    assert (bool(own.returning), bool(own.climbed), own.from_north, own.height_asked) == (True, False, 100.0, 600.0)
+    seen(150.0, 591.0)
+    assert (bool(own.climbed), own.from_north) == (True, 150.0)
+    seen(4000.0, 700.0)
+    assert (own.height_asked, own.side_acceleration) == (600.0, pytest.approx(0.0, abs=1e-9))
+    own = memory()
+    seen(100.0, 800.0)
+    assert own.climbed
+    seen(4000.0, 800.0)
+    assert own.height_asked == 800.0
+    seen(4900.0, 800.0)
+    assert own.height_asked == 600.0

@@ -1,0 +1,146 @@
+"""PX4's TECS by plain sums: the reference height, what pitch and throttle are asked for, and their limits."""
+
+import math
+from typing import Any
+
+import pytest
+
+from flight.autopilots.px4.tecs import estimate_airspeed, lead_height, underspeed, update_tecs
+from tests.flight.autopilots.px4.laws import flying, memory, parameters, state
+from world.kernels import Record
+
+DT, G = 0.05, 9.80665
+
+
+def led(asked: float, seconds: float, **values: float) -> Record:
+    own = memory(height_asked=asked)
+    made = parameters(**values)
+    for _ in range(round(seconds / DT)):
+        lead_height(made, own, DT)
+    return own
+
+
+@pytest.mark.parametrize(
+    ("asked", "values", "rate"),
+    [
+        (900.0, {}, 3.0),
+        (100.0, {}, -2.0),
+        (900.0, {"FW_T_CLMB_R_SP": 5.0, "FW_T_CLMB_MAX": 4.0}, 4.0),
+        (100.0, {"FW_T_SINK_R_SP": 6.0}, -5.0),
+    ],
+)
+def test_the_reference_climbs_and_sinks_no_faster(asked: float, values: dict[str, float], rate: float) -> None:
+    own = led(asked, 5.0, **values)
+    assert own.height_rate == pytest.approx(rate)
+    # It takes |rate| / 7 s to be as fast.
+    assert own.height_reference == pytest.approx(500.0 + rate * (5.0 - 0.5 * abs(rate) / 7.0), abs=0.2)
+
+
+def test_the_reference_stops_at_the_height_without_going_past() -> None:
+    own, made, highest = memory(height_asked=530.0), parameters(), 0.0
+    for _ in range(300):
+        lead_height(made, own, DT)
+        highest = max(highest, own.height_reference)
+    assert own.height_reference == pytest.approx(530.0, abs=0.01)
+    assert highest < 530.1
+
+
+def test_airspeed_follows_its_sensor_and_its_rate_is_held_to_nothing() -> None:
+    own, made = memory(), parameters()
+    for _ in range(300):
+        estimate_airspeed(26.0, made, own, DT)
+    assert (own.airspeed, own.airspeed_rate) == pytest.approx((26.0, 0.0), abs=1e-6)
+
+
+def demanded(own: Record, up: float = 500.0, climb: float = 0.0, speed: float = 25.0, **values: float) -> Record:
+    usual = {"FW_AIRSPD_MIN": 18.0, "FW_AIRSPD_TRIM": 25.0, "FW_AIRSPD_MAX": 31.0}
+    made = parameters(**(usual | values))
+    update_tecs(state(airspeed=speed), flying(up=up, climb=climb), made, own, 25.0, 1.0, DT)
+    return own
+
+
+def test_level_at_its_speed_it_holds_trim() -> None:
+    own = demanded(memory())
+    assert (own.pitch_demand, own.throttle_demand) == pytest.approx((0.0, 0.6))
+
+
+def test_pitch_leads_a_climb_by_its_angle() -> None:
+    # 10 m below: 2 m/s are asked for, 2 / 25 rad, and 0.1 of what is missing of it.
+    own = demanded(memory(height_reference=510.0, height_asked=510.0), FW_T_VERT_ACC=10.0, FW_T_I_GAIN_PIT=0.0)
+    for _ in range(20):
+        demanded(own, FW_T_VERT_ACC=10.0, FW_T_I_GAIN_PIT=0.0)
+    assert own.pitch_demand == pytest.approx(1.1 * 2.0 / 25.0, rel=1e-3)
+    # Its feed-forward: 0.3 of the reference's own rate.
+    own = memory(height_reference=500.0, height_asked=900.0, height_rate=3.0)
+    demanded(own, up=500.06, FW_T_I_GAIN_PIT=0.0, FW_T_PTCH_DAMP=0.0)
+    step = 7.0 / 25.0 * DT
+    assert own.pitch_demand == pytest.approx(min(step, 0.9 / 25.0))
+
+
+@pytest.mark.parametrize(("off", "rate"), [(1000.0, 5.0), (-1000.0, -5.0)])
+def test_no_climb_beyond_the_limits_is_asked_for(off: float, rate: float) -> None:
+    own = memory(height_reference=500.0 + off, height_asked=500.0 + off)
+    for _ in range(40):
+        demanded(own, FW_T_I_GAIN_PIT=0.0, FW_T_PTCH_DAMP=0.0)
+    assert own.pitch_demand == pytest.approx(rate / 25.0, rel=1e-3)
+
+
+def test_pitch_keeps_to_its_limits_less_the_trim() -> None:
+    own = memory(height_reference=1500.0, height_asked=1500.0)
+    for _ in range(150):
+        demanded(own, climb=-3.0, FW_P_LIM_MAX=15.0, FW_PSP_OFF=3.0)
+    assert own.pitch_demand == pytest.approx(math.radians(12.0))
+    before = own.balance_sum
+    demanded(own, climb=-3.0, FW_P_LIM_MAX=15.0, FW_PSP_OFF=3.0)
+    assert own.balance_sum == before
+
+
+@pytest.mark.parametrize(
+    ("climb", "values", "expected"),
+    [
+        (2.5, {}, 0.6 + 0.5 * 0.4),
+        (5.0, {}, 1.0),
+        (-1.0, {"FW_THR_MIN": 0.2}, 0.6 - 0.5 * 0.4),
+        (-2.0, {"FW_THR_MIN": 0.2}, 0.2),
+    ],
+)
+def test_throttle_goes_with_the_climb_between_trim_and_its_ends(
+    climb: float, values: dict[str, float], expected: float
+) -> None:
+    # In the climb that is asked for: nothing is missing of the energy's rate.
+    own = memory(height_reference=500.0 + 5.0 * climb, height_asked=500.0 + 5.0 * climb, energy_rate=G * climb)
+    demanded(own, climb=climb, **values)
+    assert own.throttle_demand == pytest.approx(expected, abs=1e-3)
+
+
+def test_thin_air_takes_more_throttle_and_a_bank_more_energy() -> None:
+    own = memory()
+    usual: dict[str, Any] = {"FW_AIRSPD_MIN": 18.0, "FW_AIRSPD_TRIM": 25.0, "FW_AIRSPD_MAX": 31.0}
+    update_tecs(state(), flying(), parameters(**usual), own, 25.0 / 1.1, 1.1, DT)
+    assert own.throttle_demand == pytest.approx(0.66, abs=2e-3)
+    banked = memory()
+    update_tecs(state(roll=math.radians(60.0)), flying(), parameters(**usual), banked, 25.0, 1.0, DT)
+    # 15 (1 / cos 60 - 1) m^2/s^3 of 5 g that full throttle gives.
+    assert banked.throttle_demand == pytest.approx(0.6 + 0.4 * 15.0 / (5.0 * G) + 0.05 * 15.0 / (7.0 * G), abs=1e-3)
+
+
+def test_a_speed_is_taken_up_by_one_metre_a_second_squared_within_its_limits() -> None:
+    own = memory()
+    for _ in range(40):
+        demanded(own, FW_AIRSPD_MAX=24.5)
+    assert own.airspeed_demand == pytest.approx(24.5)
+    own = memory(roll_demand=math.radians(60.0))
+    for _ in range(80):
+        demanded(own, FW_AIRSPD_MIN=20.0)
+    assert own.airspeed_demand == pytest.approx(20.0 * math.sqrt(2.0))
+    own = memory(airspeed_demand=20.0)
+    for _ in range(20):
+        demanded(own)
+    assert own.airspeed_demand == pytest.approx(21.0)
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(18.0, 0.0), (14.25, 0.0), (12.375, 0.5), (10.5, 1.0), (5.0, 1.0)])
+def test_speed_comes_first_below_the_least(speed: float, expected: float) -> None:
+    # 18 m/s less 15 % of 25 m/s, and as much less again.
+    made = parameters(FW_AIRSPD_MIN=18.0, FW_AIRSPD_TRIM=25.0, FW_AIRSPD_MAX=31.0)
+    assert underspeed(speed, made) == pytest.approx(expected)
