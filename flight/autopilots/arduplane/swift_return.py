@@ -28,13 +28,13 @@ from flight.autopilots.arduplane.law import (
     demand_height,
     navigate_legs,
     roll_demand,
-    true_by_equivalent,
     update_tecs,
 )
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.state import STATE
 from flight.dynamics.trim import trim
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION
 from flight.mission.itinerary import UNLIMITED
