@@ -158,6 +158,7 @@ class Autopilot(ABC):
     own: type of the record that its law keeps beside `flight.guidance.inner_loops.GUIDANCE_MEMORY`; None for none.
     equivalent_airspeeds: whether commanded airspeeds count as equivalent ones, which are less than true ones at height;
     it then takes over in level flight.
+    refuses: whether it takes no mission that PX4's feasibility checks refuse.
     height_candidates, side_candidates: parameters that may decide a flight which fails by its height or its track.
     """
 
@@ -166,6 +167,7 @@ class Autopilot(ABC):
     level: ClassVar[Level] = "autopilot"
     own: ClassVar[np.dtype[np.record] | None] = None
     equivalent_airspeeds: ClassVar[bool] = False
+    refuses: ClassVar[bool] = False
     height_candidates: ClassVar[tuple[Candidate, ...]] = ()
     side_candidates: ClassVar[tuple[Candidate, ...]] = ()
     parameters: Parameters | None = None
@@ -246,6 +248,11 @@ class Autopilot(ABC):
         waypoint too where it passes the line across the leg there.
         """
         return None
+
+    @property
+    def reads_acceptance(self) -> bool:
+        """Whether the radius that a mission states at a waypoint decides when it turns to the next leg."""
+        return True
 
     @property
     def follows_path(self) -> bool:

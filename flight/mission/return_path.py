@@ -73,6 +73,8 @@ class ReturnRules:
     slope_to_stated_height: whether the slope down to a rally point is drawn to its height over home as if that were a
         height above the sea, and flown no higher than where it begins.  ArduPlane 4.6-dev does that: it holds its
         height at first, and comes down later than a straight slope to the point would have it.
+    holds_height: whether it holds its height until it is over its target and comes down in circles there, and climbs,
+        if it has to, in circles where it is, as PX4 does.
 
     >>> ReturnRules().height, ReturnRules().rally_limit
     (100.0, 5000.0)
@@ -87,8 +89,11 @@ class ReturnRules:
     rally_limit: float = 5000.0
     includes_home: bool = False
     slope_to_stated_height: bool = False
+    holds_height: bool = False
 
 
+# A slope drawn to so far (m) below its target, and flown no higher than where it begins, is none until the very end.
+_FAR_BELOW = 1e6
 # Of an autopilot that has none of its own: planfly's guidance returns as ArduPlane does by its defaults.
 USUAL_RULES = ReturnRules()
 
@@ -142,7 +147,7 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
     """
     height = here[2] if math.isnan(rules.height) else home.up + rules.height
     to_home = _distance(here, home)
-    go_home = ReturnTarget((home.east, home.north, height), "home", "", to_home)
+    go_home = ReturnTarget((home.east, home.north, height), "home", "", to_home, _FAR_BELOW * rules.holds_height)
     if not rally:
         return go_home
     nearest = min(range(len(rally)), key=lambda k: _distance(here, rally[k]))
@@ -152,10 +157,11 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
         reason = f"{name}, the nearest, is {_km(away)} away, beyond RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
         return go_home._replace(reason=reason)
     if rules.includes_home and to_home <= away:
-        return go_home._replace(reason=f"nearer than {name}, which is {_km(away)} away (RALLY_INCL_HOME 1)")
+        why = "" if rules.holds_height else " (RALLY_INCL_HOME 1)"
+        return go_home._replace(reason=f"nearer than {name}, which is {_km(away)} away{why}")
     count = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
     point = rally[nearest]
-    base = point.base if rules.slope_to_stated_height else 0.0
+    base = point.base if rules.slope_to_stated_height else _FAR_BELOW * rules.holds_height
     return ReturnTarget((point.east, point.north, point.up), name, f"the nearest {count}", away, base)
 
 
@@ -170,6 +176,10 @@ def described_return(target: ReturnTarget, rules: ReturnRules, up: float) -> str
     way = f"sinking {-rise:.0f} m on a straight slope to" if rise <= -1.0 else f"climbing {rise:.0f} m at once to"
     if -rise >= 1.0 and abs(target.slope_base - rise) < rules.least_slope:
         way = f"sinking {-rise:.0f} m at once to"
+    if rules.holds_height:
+        way = f"climbing {rise:.0f} m first, to"
+        if rise < 0.0:
+            way = f"level, and sinking {-rise:.0f} m in circles there, to"
     if abs(rise) < 1.0:
         way = "at"
     first = ""

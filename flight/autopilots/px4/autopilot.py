@@ -37,6 +37,7 @@ class Px4(Autopilot):
     title: ClassVar = "PX4"
     own: ClassVar[np.dtype[np.record] | None] = PX4
     equivalent_airspeeds: ClassVar = True
+    refuses: ClassVar = True
     height_candidates: ClassVar = HEIGHT_CANDIDATES
     side_candidates: ClassVar = SIDE_CANDIDATES
     parameters: Px4Parameters = field()
@@ -89,6 +90,11 @@ class Px4(Autopilot):
         """NAV_ACC_RAD; up to 1.16 guidance's own switch distance at sea level where that is more."""
         return self.turn_distance(math.pi, 0.0)
 
+    @property
+    def reads_acceptance(self) -> bool:
+        """The second parameter of a waypoint is for PX4's multicopters alone."""
+        return False
+
     def turn_distance(self, turn: float, amsl: float) -> float:
         """How far before a waypoint it turns in still air, whatever the turn: up to 1.16 more in thin air, m."""
         made = self.parameters
@@ -116,6 +122,7 @@ class Px4(Autopilot):
             sink=made["FW_T_SINK_R_SP"],
             rally_limit=0.0,
             includes_home=True,
+            holds_height=True,
         )
 
     @property

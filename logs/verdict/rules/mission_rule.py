@@ -2,14 +2,15 @@
 
 After `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with the default
 parameters: NAV_ACC_RAD 10 m, FW_LND_ANG 5 degrees, MIS_DIST_1WP 10 km, MIS_TKO_LAND_REQ 0.  These are PX4's own limits
-and say nothing of the aircraft: what PX4 alone refuses is named and does not fail.  What does fail is what no autopilot
-flies: a command that neither PX4 nor ArduPlane takes, and a route beyond the mission's own fence.  Latitude, longitude,
+and say nothing of the aircraft: what PX4 alone refuses is named, and fails only where PX4 is to fly.  Whoever flies, a
+command that neither PX4 nor ArduPlane takes fails, and a route beyond the mission's own fence.  Latitude, longitude,
 frames and counts that are none were refused when the file was read.
 """
 
 import itertools
 import math
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 
@@ -69,15 +70,20 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         ("checkIfBelowHomeAltitude", _below_home(mission)),
         ("checkGeofence", _fence(setup)),
     )
-    return [_finding(name, list(remarks)) for name, remarks in checks]
+    refuses = setup.autopilot.refuses
+    return [_finding(name, list(remarks), refuses) for name, remarks in checks]
 
 
-# What a check remarks: the verdict on it, the item (None: the whole mission), and why.  PX4's refusal is none.
-REFUSED = None
-_Remark = tuple[bool | None, int | None, str | Message]
+# What a check remarks: the verdict on it, the item (None: the whole mission), and why.  PX4's refusal is a verdict only
+# where PX4 is to fly.
+REFUSED: Literal["refused"] = "refused"
+_Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
-def _finding(check: str, remarks: list[_Remark]) -> Finding:
+def _finding(check: str, said: list[_Remark], refuses: bool) -> Finding:
+    """One finding of what a check said.  refuses: whether whoever flies refuses what PX4 does."""
+    verdict = False if refuses else None
+    remarks = [(verdict if ok == REFUSED else ok, item, why) for ok, item, why in said]
     # A failure comes first, then what PX4 refuses, then what is only remarked.
     remarks.sort(key=lambda one: {False: 0, None: 1, True: 2}[one[0]])
     ok, item, why = remarks[0] if remarks else (True, None, "nothing to object to")
@@ -208,8 +214,9 @@ def _first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     home = MissionItem(0, int(C.NAV_WAYPOINT), 0, (0.0,) * 4, mission.home.lat_deg, mission.home.lon_deg, 0.0)
     away = _apart(home, places[0], origin)
     if not away < PX4_FIRST_WAYPOINT:
+        # A warning, in the releases whose law is flown here.
         yield (
-            REFUSED,
+            None,
             places[0].seq,
             f"first waypoint too far away: {away:.0f} m from home, maximum {PX4_FIRST_WAYPOINT:.0f} m",
         )

@@ -38,8 +38,7 @@ def _planned(requirements: RouteRequirements, i: int) -> Finding:
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
     elif not requirements.setup.autopilot.follows_path:
-        title = requirements.setup.autopilot.title
-        fact = f"{title} turns to the next leg {near.radius:.0f} m before it, or where it is past it"
+        fact = _turns(requirements, i, near)
     elif offset > near.radius + ROUNDING:
         turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
         faults.append(
@@ -62,6 +61,16 @@ def _planned(requirements: RouteRequirements, i: int) -> Finding:
         unit="m",
         method="the fly-by arc",
     )
+
+
+def _turns(requirements: RouteRequirements, i: int, near: Reach) -> str:
+    """Where an autopilot that flies from leg to leg turns at a waypoint."""
+    autopilot, before, unread = requirements.setup.autopilot, near.radius, ""
+    if near.source == "mission" and not autopilot.reads_acceptance:
+        turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
+        before = autopilot.turn_distance(turn, float(requirements.points[i, 2]))
+        unread = f"; {autopilot.title} does not read the mission's {near.radius:.0f} m"
+    return f"{autopilot.title} turns to the next leg {before:.0f} m before it, or where it is past it{unread}"
 
 
 def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:

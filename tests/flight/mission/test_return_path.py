@@ -259,3 +259,17 @@ def test_a_return_from_over_home_is_flown() -> None:
 def test_a_height_that_is_never_flown_is_refused() -> None:
     message = refusal(wp(0, 500, 100, frame=0), wp(0, 2500, 100, frame=0), RTL, home="36.5 -84.2 8950")
     assert message == "a.waypoints: item 3: return to home: 9050.0 m AMSL: allowed -500..9000"
+
+
+def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
+    rules = ReturnRules(holds_height=True)
+    begin = [RoutePoint(STOP, (0.0, 9000.0, 900.0)), RoutePoint(STOP, (0.0, 8000.0, 900.0))]
+    target = choose_target(rules, begin[-1].position, HOME, ())
+    ups = [point.position[2] for point in lay_return(begin, STOP, target, rules, ABLE)]
+    # Level until the circle about home, down to 100 m over it there.
+    assert (ups[0], ups[-1]) == (900.0, 400.0)
+    assert described_return(target, rules, 900.0).startswith(
+        "NAV_RETURN_TO_LAUNCH: to home, 8.0 km away, level, and sinking 500 m in circles there, to 400 m AMSL; circles"
+    )
+    low = choose_target(rules, (0.0, 8000.0, 350.0), HOME, ())
+    assert ", climbing 50 m first, to 400 m AMSL" in described_return(low, rules, 350.0)

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import default_parameters
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import Place
@@ -99,6 +101,14 @@ def test_px4s_own_limits_are_named_and_are_no_verdict_on_the_aircraft(case: str)
     named = [line for line in verdict.lines if line.startswith("PX4 would not take it: ") and check in line]
     assert len(named) == (0 if case in NOBODY else 1), verdict.lines
     assert not [item for item in verdict.findings if item.rule == "mission" and item.ok is False] or case in NOBODY
+
+
+@pytest.mark.parametrize("case", sorted(REFUSED))
+def test_where_px4_flies_what_it_refuses_fails(case: str) -> None:
+    check, lines, item, _ = REFUSED[case]
+    verdict = judge_geometry(replace(setup_of(*lines), autopilot=Px4(default_parameters())))
+    found = [one for one in verdict.findings if one.rule == "mission" and one.check == check]
+    assert [(one.ok, one.place) for one in found] == [(False, Place("mission", item=item))]
 
 
 def test_first_waypoint_too_far() -> None:

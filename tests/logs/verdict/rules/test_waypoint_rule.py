@@ -8,6 +8,8 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.px4 import parameters as px4_parameters
+from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_geometry
@@ -145,3 +147,14 @@ def test_past_the_line_beside_it_there_is_no_margin() -> None:
         item = of(judge(setup, fly_path(setup, across=bump(3000.0, aside, 150.0))), "waypoint", waypoint(1))
         assert item.ok
         assert item.margin == (None if margin is None else pytest.approx(margin, abs=0.02))
+
+
+def test_px4_turns_by_its_own_radius_and_says_so() -> None:
+    setup = replace(accepting(make_setup(STRAIGHT), 120.0), autopilot=Px4(px4_parameters.default_parameters("1.17")))
+    planned = of(judge_geometry(setup), "waypoint", waypoint(1)).reason
+    assert planned == (
+        "PX4 turns to the next leg 10 m before it, or where it is past it; PX4 does not read the mission's 120 m"
+    )
+    own = replace(setup, route=replace(setup.route, acceptance=np.zeros(3)))
+    told = of(judge_geometry(own), "waypoint", waypoint(1)).reason
+    assert told == "PX4 turns to the next leg 10 m before it, or where it is past it"
