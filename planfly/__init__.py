@@ -11,6 +11,7 @@
 
 plan, replan, what_blocks            make a path; plan again in flight; why there is no feasible path
 fly, plan_then_fly, run              fly a plan or a mission file; both at once; the whole chain into a folder
+fly_by_each                          fly it by the laws of several autopilots
 check, judge, read_log               judge a log, a plan or a mission; read a log, its track as a table
 figures, report, compare             matplotlib figures; a page of a flight; two flights beside each other
 export, foxglove_layout              files for ground stations, maps and other programs
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from planfly.api.flying import Judged as Judged
     from planfly.api.flying import check as check
     from planfly.api.flying import fly as fly
+    from planfly.api.flying import fly_by_each as fly_by_each
     from planfly.api.flying import judge as judge
     from planfly.api.flying import plan_then_fly as plan_then_fly
     from planfly.api.identifying import IdentifiedAircraft as IdentifiedAircraft
@@ -148,6 +150,7 @@ _HOMES = {
             "Judged",
             "check",
             "fly",
+            "fly_by_each",
             "judge",
             "plan_then_fly",
         ),

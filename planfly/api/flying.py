@@ -35,7 +35,7 @@ from planfly.pipeline import autopilot_log, fly_and_judge
 from planfly.stages import stage
 from planfly.targets import file_target, refuse_existing
 from planner.plan import Plan
-from world.errors import ScenarioError
+from world.errors import ArgumentError, ScenarioError
 from world.scenario import over_terrain
 from world.scenario_tables import Guidance, Navigation
 
@@ -172,6 +172,49 @@ def fly(
     target = target if len(flown.track) else None
     own = None if target is None or program is None else autopilot_log(target)
     return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, own)
+
+
+@with_warm_up(*FLYING)
+def fly_by_each(
+    mission: Plan | str | Path,
+    autopilots: Sequence[str],
+    *,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+) -> dict[str, FlownMission]:
+    """Fly a mission by the laws of several autopilots, each with its default parameters, and judge each flight.
+
+    autopilots: names, as `autopilot_law` of `planfly.plan` takes them.  The others are as of `planfly.fly`.
+    Returns the flights by these names.  Raises a `planfly.PlanflyError` for bad input.
+
+    >>> import planfly
+    >>> flown = planfly.fly_by_each(planfly.plan("paper-07", seed=1), ["ideal", "px4"])
+    >>> list(flown), flown["ideal"].flyable
+    (['ideal', 'px4'], True)
+    """
+    named = list(dict.fromkeys(autopilots))
+    if not named:
+        raise ArgumentError.of_argument("autopilots", "", "at least one autopilot is expected")
+    check_arguments(autopilot_law=named)
+    return {
+        name: fly(
+            mission,
+            scenario=scenario,
+            terrain=terrain,
+            fence=fence,
+            wind=wind,
+            turbulence=turbulence,
+            aircraft=aircraft,
+            airspeed=airspeed,
+            autopilot_law=name,
+        )
+        for name in named
+    }
 
 
 def _log_target(

@@ -4,7 +4,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, completed, files
+from planfly.arguments import CHOICES
+from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, autopilots, completed, files
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import LOSS, verdict_code
 from planfly.terminal.options import (
@@ -17,6 +18,7 @@ from planfly.terminal.options import (
 )
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import print_verdict, print_warnings
+from world.errors import ArgumentError
 
 if TYPE_CHECKING:
     from planfly import Judged
@@ -31,6 +33,7 @@ def check_options(line: LineParser) -> None:
         "judge a flight from its log (planfly's or an autopilot's), or a mission file by its geometry alone",
         "planfly check flight.mcap --json verdict.json",
         "planfly check mission.waypoints --terrain jacksboro --json -",
+        "planfly check mission.waypoints --terrain jacksboro --for ardupilot,px4",
     )
     completed(
         parser.add_argument(
@@ -41,12 +44,18 @@ def check_options(line: LineParser) -> None:
     imported_log_options(parser)
     world_options(parser)
     flown_by_options(parser)
-    pilot_options(parser)
+    pilot_options(parser).add_argument(
+        "--for", dest="autopilots", metavar="AUTOPILOT,...", type=autopilots,
+        help="fly a mission by the laws of several autopilots, and print one table, a column each: "
+        + ", ".join(CHOICES["autopilot_law"]),
+    )  # fmt: skip
     result_options(parser)
 
 
 def check(args: argparse.Namespace) -> int:
     """Judge without flying; the exit code is the verdict's, or 3 for a log that is cut short."""
+    if args.autopilots is not None:
+        return _check_for(args)
     judged = call(planfly.judge, args)
     if judged.verdict.level == "geometric":
         print_warnings(judged.setup.mission.warnings)
@@ -56,6 +65,23 @@ def check(args: argparse.Namespace) -> int:
     if judged.lossy:
         return LOSS
     return verdict_code(judged.verdict)
+
+
+# What does not go with several autopilots: what belongs to one of them, or to a log.
+_OF_ONE = ("params", "guidance", "autopilot_law", "plan", "flight", "datum", "json")
+
+
+def _check_for(args: argparse.Namespace) -> int:
+    """Fly a mission by each autopilot; the exit code is that of the worst verdict."""
+    from planfly.terminal.autopilot_table import autopilot_lines
+
+    for name in _OF_ONE:
+        if (value := getattr(args, name)) is not None:
+            raise ArgumentError.of_argument(name, value, "not with --for, which flies several autopilots")
+    flown = call(planfly.fly_by_each, args, mission=args.what)
+    verdicts = {name: one.verdict for name, one in flown.items()}
+    print("\n".join(autopilot_lines(verdicts)))
+    return max(verdict_code(verdict) for verdict in verdicts.values())
 
 
 def _document(judged: "Judged") -> str:

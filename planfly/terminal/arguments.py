@@ -49,6 +49,15 @@ def wind(text: str) -> tuple[float, float]:
     return speed, source
 
 
+def autopilots(text: str) -> list[str]:
+    """Names of autopilots with commas between."""
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if name not in CHOICES["autopilot_law"]:
+            raise argparse.ArgumentTypeError(f"{name!r}: {', '.join(CHOICES['autopilot_law'])} is expected")
+    return names
+
+
 def time_or_stations(text: str) -> float | str:
     """A time of the flight, or where ground stations listen: an address has a colon."""
     if ":" in text:

@@ -17,7 +17,7 @@ FUNCTIONS = {
     "export": ("export",),
     "fly": ("fly",),
     "serve": ("serve",),
-    "check": ("judge",),
+    "check": ("judge", "fly_by_each"),
     "report": ("report", "foxglove_layout"),
     "compare": ("compare",),
     "replay": ("timeline", "instruments", "movie", "play_to_foxglove", "play_to_stations"),

@@ -20,6 +20,7 @@ VERBS = {
         "replan",
         "what_blocks",
         "fly",
+        "fly_by_each",
         "plan_then_fly",
         "run",
         "check",

@@ -158,3 +158,45 @@ def test_legs_have_their_items_and_limits_their_owner_through_a_jump(tmp_path: P
     assert violated["limit_source"] == "fence"
     assert "(leg 0, to item 2)" in violated["reason"]
     assert "scenario" not in {item["limit_source"] for item in findings}
+
+
+def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A corner of 72 degrees: 100 m of overshoot, which PX4 1.17 turns onto only at the waypoint."""
+    mission = tmp_path / "corner.waypoints"
+    lines = MISSION.format(up=200).splitlines()
+    lines[4:] = ["3\t0\t3\t16\t0\t0\t0\t0\t46.012\t8.02\t200\t1"]
+    mission.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert main(["check", str(mission), "--for", "ardupilot,px4"]) == 4
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].split() == ["ardupilot", "px4"]
+    assert said[1].split() == ["verdict", "flyable", "not", "flyable"]
+    assert any(line.split()[0] == "corridor" and line.endswith("failed") for line in said)
+    assert said[-2].startswith("ardupilot: flyable")
+    assert "px4: not flyable: corridor" in said[-1]
+    assert "would pass" in said[-1]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--for", "px4", "--guidance", "l1"], "not with --for, which flies several autopilots"),
+        (["--for", "px4", "--params", "a.params"], "not with --for, which flies several autopilots"),
+    ],
+)
+def test_what_does_not_go_with_several_autopilots_is_one_line(
+    more: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mission = tmp_path / "up.waypoints"
+    mission.write_text(MISSION.format(up=200), encoding="utf-8")
+    assert main(["check", str(mission), *more]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert said in told.err
+    assert told.err.count("\n") == 1
+
+
+def test_an_autopilot_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["check", "up.waypoints", "--for", "ardupilot,px5"])
+    assert ended.value.code == 2
+    assert "argument --for: 'px5': ardupilot, px4, px4-1.16, px4-1.17, ideal is expected" in capsys.readouterr().err

@@ -1,0 +1,24 @@
+"""Several autopilots' verdicts on one mission, as a table."""
+
+from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.places import Place
+from planfly.terminal.autopilot_table import autopilot_lines
+
+
+def of(rule: str, leg: int, ok: bool | None) -> Finding:
+    return make_finding(rule, Place("leg", leg), ok=ok, reason="r")
+
+
+def test_each_rule_has_a_row_and_each_autopilot_a_column() -> None:
+    good = (of("corridor", 0, True), of("corridor", 1, True), of("clearance", 0, None))
+    bad = (of("corridor", 0, True), of("corridor", 1, False))
+    flies = Verdict(good, flyable=False, complete=True, lines=("in part",), level="flown", unjudged="terrain")
+    fails = Verdict(bad, flyable=False, complete=True, lines=("not flyable", "105 would pass"), level="flown")
+    assert autopilot_lines({"ardupilot": flies, "px4-1.17": fails}) == [
+        "             ardupilot   px4-1.17",
+        "  verdict    undecided   not flyable",
+        "  clearance  not judged",
+        "  corridor   2 ok        1 of 2 failed",
+        "ardupilot: in part",
+        "px4-1.17: not flyable; 105 would pass",
+    ]
