@@ -30,7 +30,10 @@ _PREFIX = "ident/"
 # Keys that must be there, those that may, and those of what else `posterior.toml` says of the logs.
 _NEEDED = frozenset({"climb_sd_deg", "descent_sd_deg"})
 _OPTIONAL = frozenset({"source", "quantity", "battery_guessed", "power_sd"})
-_OF_LOGS = frozenset({"base", "mass_kg", "seconds", "battery_current", "dynamics", "held_fixed", "log", "correlation"})
+_OF_LOGS = frozenset({
+    "base", "mass_kg", "seconds", "battery_current", "airspeed_factor", "airspeed_factor_sd", "dynamics", "held_fixed",
+    "log", "correlation",
+})  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ microseconds at 25 Hz.  All of it comes from a seed.
 import math
 import re
 import shutil
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -371,6 +372,95 @@ def write_motion(path: Path, log: MotionLog) -> Path:
     for time, name, letters, columns, values in sorted(rows, key=lambda row: row[0]):
         out.message(name, letters, columns, round(time * 1e6), *values)
     path.write_bytes(bytes(out.data))
+    return path
+
+
+# ----------------------------------------------------------------------
+# PX4.
+
+PX4_PARAMETERS: Mapping[str, float] = {
+    "CA_AIRFRAME": 1, "CA_ROTOR_COUNT": 1, "CA_SV_CS_COUNT": 4, "FW_AIRSPD_MIN": 18.0, "FW_AIRSPD_TRIM": 25.0,
+    "FW_AIRSPD_MAX": 31.0, "CA_SV_CS0_TYPE": 1, "CA_SV_CS0_TRQ_R": -0.5, "CA_SV_CS1_TYPE": 2, "CA_SV_CS1_TRQ_R": 0.5,
+    "CA_SV_CS2_TYPE": 3, "CA_SV_CS2_TRQ_P": 1.0, "CA_SV_CS3_TYPE": 4, "CA_SV_CS3_TRQ_Y": 1.0, "CA_SV_CS2_TRIM": -0.05,
+}  # fmt: skip
+
+
+def px4_topics(log: MotionLog) -> dict[str, tuple[Floats, dict[str, Floats]]]:
+    """The topics of a motion as PX4 would have logged it: stamps (s), and fields.
+
+    Surfaces are shares of 30 degrees, up and right positive: two ailerons, elevator, rudder.
+    """
+    roll, pitch, yaw = 0.5 * log.attitude.values.T
+    cr, sr, cp, sp, cy, sy = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
+    turn = np.column_stack([
+        cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
+    ])  # fmt: skip
+    one, two, three, four = log.outputs.values[:, :4].T
+    aileron, elevator, rudder = (one - 1500.0) / 400.0, (two - 1500.0) / 400.0 + 8.4 / 30.0, (four - 1500.0) / 400.0
+    unused = np.full((len(one), 8), np.nan)
+    servos, motors = unused.copy(), unused.copy()
+    servos[:, :4] = np.column_stack([-aileron, aileron, elevator - 0.05, rudder])
+    motors[:, 0] = (three - 1000.0) / 1000.0
+    height, status = log.height, log.attitude.time[::25]
+    place = np.column_stack([np.full(len(height.time), HOME[0]), np.full(len(height.time), HOME[1]), height.values])
+    ratio = np.interp(log.airspeed.time, log.ratio.time, log.ratio.values[:, 0])[:, np.newaxis]
+    made = {
+        "sensor_combined": (log.inertial.time, {
+            "gyro_rad": log.inertial.values[:, 3:], "accelerometer_m_s2": log.inertial.values[:, :3]}),
+        "vehicle_attitude": (log.attitude.time, {"q": turn}),
+        "vehicle_local_position": (log.velocity.time, {
+            name: log.velocity.values[:, k] for k, name in enumerate(("vx", "vy", "vz"))}),
+        "vehicle_global_position": (height.time, {
+            name: place[:, k] for k, name in enumerate(("lat", "lon", "alt"))}),
+        "airspeed_validated": (log.airspeed.time, {
+            "calibrated_airspeed_m_s": log.airspeed.values, "true_airspeed_m_s": log.airspeed.values * ratio,
+            "selected_airspeed_index": np.ones(len(ratio))}),
+        "wind": (log.wind.time[::25], {
+            "windspeed_north": log.wind.values[::25, 0], "windspeed_east": log.wind.values[::25, 1]}),
+        "actuator_servos": (log.outputs.time, {"control": servos}),
+        "actuator_motors": (log.outputs.time, {"control": np.column_stack([motors, motors[:, 1:5]])}),
+        "battery_status": (log.battery.time, {
+            "voltage_v": log.battery.values[:, 0], "current_a": log.battery.values[:, 1]}),
+        "vehicle_status": (status, {
+            "vehicle_type": np.full(len(status), 2.0), "nav_state": np.full(len(status), 3.0),
+            "in_transition_mode": np.zeros(len(status))}),
+        "home_position": (status[:1], {
+            name: np.full(1, value) for name, value in zip(("lat", "lon", "alt"), HOME, strict=True)}),
+    }  # fmt: skip
+    return {name: table for name, table in made.items() if len(table[0])}
+
+
+def write_px4(
+    path: Path, topics: Mapping[str, tuple[Floats, Mapping[str, Floats]]], parameters: Mapping[str, float]
+) -> Path:
+    """Write topics as a `.ulg` (PX4, "ULog File Format"), all numbers as doubles."""
+
+    def message(letter: bytes, body: bytes) -> bytes:
+        return struct.pack("<H", len(body)) + letter + body
+
+    head = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + message(b"B", bytes(40)))
+    stamps, pieces = [], []
+    for number, (name, (time, fields)) in enumerate(topics.items()):
+        tables = {key: values.reshape(len(time), -1) for key, values in fields.items()}
+        kinds = "".join(
+            f"double{f'[{table.shape[1]}]' if table.shape[1] > 1 else ''} {key};" for key, table in tables.items()
+        )
+        head += message(b"F", f"{name}:uint64_t timestamp;{kinds}".encode())
+        rows = np.hstack(list(tables.values())).astype("<f8")
+        for when, row in zip(np.rint(time * 1e6).astype(np.int64).tolist(), rows, strict=True):
+            stamps.append(when)
+            pieces.append(message(b"D", struct.pack("<HQ", number, when) + row.tobytes()))
+    key = b"char[3] sys_name"
+    head += message(b"I", bytes([len(key)]) + key + b"PX4")
+    for name, value in parameters.items():
+        whole = isinstance(value, int)
+        text = f"{'int32_t' if whole else 'float'} {name}".encode()
+        head += message(b"P", bytes([len(text)]) + text + struct.pack("<i" if whole else "<f", value))
+    for number, name in enumerate(topics):
+        head += message(b"A", struct.pack("<BH", 0, number) + name.encode())
+    order = np.argsort(np.array(stamps), kind="stable").tolist()
+    path.write_bytes(bytes(head) + b"".join(pieces[k] for k in order))
     return path
 
 

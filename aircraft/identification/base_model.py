@@ -52,6 +52,7 @@ class BaseModel:
     mass: kg.  area: m^2.  span, chord: m.
     inertia: (4,) Ixx, Iyy, Izz and Ixz (the integral of x z dm), kg m^2.
     servo_lag, motor_lag: first-order time constants, s.
+    reacts: whether the propeller's torque rolls it; a flying wing's elevons are rigged against that.
     """
 
     mass: float
@@ -63,3 +64,4 @@ class BaseModel:
     motor_lag: float
     coefficients: Coefficients
     motor: ElectricMotor
+    reacts: bool = True

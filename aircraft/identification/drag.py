@@ -27,19 +27,20 @@ NUISANCES = {
     "resistance of the motor": 0.2,
     "idle current of the motor": 0.3,
     "voltage of the battery": 0.02,
-    "drag of the elevator": 1.0,
+    "drag of the elevator": 0.5,
     "angle of attack": 1.0,
     "angle of attack by lift": 1.0,
 }
 # The last two count in standard deviations of `AlphaDoubt`.
+
 # Of the aircraft, where the others are of its sensors.
 _OF_AIRCRAFT = np.array([name.split()[0] in ("resistance", "idle", "voltage", "drag") for name in NUISANCES])
-# Forces and currents count alike in the folding, by what no model gets right of each; steps of its search.
+# Steps of the folding's search.
 _FOLDING_STEPS = 3
-# Where the battery's voltage is logged it is known this much better.
+# Where the battery's voltage is logged, it is known this much better.
 _LOGGED_VOLTAGE = 0.25
-# What no model gets right, m/s^2 and A, and over how long it is autocorrelated, s.
-_FORCE_FLOOR, _CURRENT_FLOOR, _FLOOR_SECONDS = 0.015, 0.3, 5.0
+# What no model gets right, m/s^2 and A, and over how long it stays the same, s: a climb, a glide, a level run.
+_FORCE_FLOOR, _CURRENT_FLOOR, _FLOOR_SECONDS = 0.015, 0.3, 25.0
 _OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
 _STEP = 1e-3
 # Steps of a search at most, and how short the last is, as a share of the prior's standard deviations.

@@ -59,7 +59,7 @@ def _turning(signals: Signals, base: BaseModel, motor: ElectricMotor) -> dict[Gr
     ixx, iyy, izz, ixz = base.inertia
     p, q, r = signals.rates.T
     dp, dq, dr = signals.rate_changes.T
-    torque = motor.reaction(signals.airspeed, signals.throttle, signals.density)
+    torque = motor.reaction(signals.airspeed, signals.throttle, signals.density) if base.reacts else 0.0
     return {
         "pitch": iyy * dq + (ixx - izz) * p * r + ixz * (p * p - r * r),
         "roll": ixx * dp - ixz * (dr + p * q) + (izz - iyy) * q * r + torque,

@@ -1,6 +1,7 @@
 """What a log holds of an aircraft's motion, unthinned: inertial sensors, servo outputs, attitude, air data, battery.
 
-`logs.importers.raw_log` has what a verdict needs, where a vehicle was; this is what identifies its model.
+`logs.importers.raw_log` has what a verdict needs, where a vehicle was; this is what identifies its model.  ArduPilot's
+logs are read here, PX4's by `logs.importers.px4_motion`.
 """
 
 import hashlib
@@ -8,6 +9,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +49,11 @@ class MotionLog:
     airspeed: (n, 1) equivalent, m/s, of a sensor that was in use.  ratio: (n, 1) true by equivalent airspeed.
     height: (n, 1) m above sea level.  battery: (n, 2) V and A.
     modes: time and number of the flight mode.  parameters: by name; those that changed in flight keep the last.
+    program_kind: whose log it is.
+    controls: (n, 4) pitch up, roll and yaw to the right as shares of full travel, and throttle (0..1), of a log that
+        has those in place of pulses.
+    elevons: whether the controls are made by elevons.
+    hovering: stretches (s) on lifting motors that the log names itself.
     home: latitude and longitude, degrees, and m above sea level: as the vehicle had it last (ORGN), or its first
         position on the ground; None where neither is logged.
     """
@@ -67,6 +74,15 @@ class MotionLog:
     modes: tuple[tuple[float, int], ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     home: tuple[float, float, float] | None = None
+    program_kind: Literal["ardupilot", "px4"] = "ardupilot"
+    controls: Samples = field(default_factory=lambda: Samples(np.zeros(0), np.zeros((0, 4))))
+    elevons: bool = False
+    hovering: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def moved(self) -> Samples:
+        """What was told to the surfaces: controls where the log has them, or else pulses."""
+        return self.controls if len(self.controls.time) else self.outputs
 
 
 _DEGREE = math.pi / 180.0
@@ -82,15 +98,19 @@ def read_motion(path: Path) -> MotionLog:
     """Read a log's motion.  Raises LogError, in one line, for a file that cannot be read or that is no such log."""
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file: a log (.BIN) is expected", file=path)
+            raise LogError(f"{path}: no such file: a log (.BIN or .ulg) is expected", file=path)
         with path.open("rb") as file:
-            head = file.read(4)
+            head = file.read(7)
             file.seek(0)
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
+    if head == b"ULog\x01\x12\x35":
+        from logs.importers.px4_motion import read_px4_motion
+
+        return read_px4_motion(path, digest)
     if head[:2] != b"\xa3\x95":
-        allowed = "an ArduPilot .BIN is expected"
+        allowed = "an ArduPilot .BIN or a PX4 .ulg is expected"
         raise LogError(
             f"{path}: not a log of inertial sensors and servo outputs: {allowed}", file=path, allowed=allowed
         )
@@ -150,7 +170,7 @@ class _Dataflash:
             for k, column in enumerate(columns):
                 if column in held:
                     values[:, k] = found.column(column)
-            return _rising(found.column("TimeUS") * 1e-6, values * scale)
+            return rising(found.column("TimeUS") * 1e-6, values * scale)
         return Samples(np.zeros(0), np.zeros((0, 1)))
 
     def _airspeed(self) -> Samples:
@@ -158,7 +178,7 @@ class _Dataflash:
         if not found.has("TimeUS", "Airspeed"):
             return Samples(np.zeros(0), np.zeros((0, 1)))
         used = found.column("U") > 0 if found.has("U") else np.ones(len(found), np.bool_)
-        return _rising(found.column("TimeUS")[used] * 1e-6, found.column("Airspeed")[used, np.newaxis])
+        return rising(found.column("TimeUS")[used] * 1e-6, found.column("Airspeed")[used, np.newaxis])
 
     def _modes(self) -> list[tuple[float, int]]:
         found = self._messages("MODE")
@@ -204,7 +224,7 @@ def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float,
     return lat, lon, height
 
 
-def _rising(time: Floats, values: Floats) -> Samples:
+def rising(time: Floats, values: Floats) -> Samples:
     """Rows in the order of their times; those that are no numbers and those of the same time left out."""
     good = np.isfinite(time) & np.isfinite(values).all(axis=1)
     time, values = time[good], values[good]

@@ -49,17 +49,22 @@ _MAX_ITEMS = 65_535
 
 def read_px4(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one that pyulog cannot read, and one without vehicle_global_position."""
+    return open_topics(path, _TOPICS).log()
+
+
+def open_topics(path: Path, names: list[str]) -> "Topics":
+    """The named topics of a log.  Raises LogError, in one line, for a file that pyulog cannot read."""
     try:
         # It complains on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
-            found = ULog(_Steps(file, str(path)), _TOPICS, disable_str_exceptions=True)
+            found = ULog(_Steps(file, str(path)), names, disable_str_exceptions=True)
     except (AddressSpaceError, LogError):
         raise
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory", file=path) from None
     except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones
         raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}", file=path) from error
-    return _Topics(found, str(path), _damage_of(path)).log()
+    return Topics(found, str(path), _damage_of(path))
 
 
 class _Steps:
@@ -149,7 +154,7 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())[:120] or type(error).__name__
 
 
-class _Topics:
+class Topics:
     """The topics of one log, the first instance of each."""
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
@@ -160,26 +165,32 @@ class _Topics:
                 self._data[one.name] = one.data
 
     def log(self) -> RawLog:
+        """All that a verdict needs.  Raises LogError for a log that does not say where it flew."""
         series = {name: found for name, found in self._series() if found is not None and len(found.time)}
         if "position" not in series:
             raise LogError(f"{self._source}: no vehicle_global_position: nothing says where it flew", file=self._source)
         return RawLog(
             source=self._source,
             format=FORMAT,
-            program=self._program(),
-            vehicle=self._vehicle(),
+            program=self.program(),
+            vehicle=self.vehicle(),
             series=series,
             heights=tuple(self._heights()),
             datum="amsl",
             modes=tuple(self._modes()),
             missions=tuple(self._missions()),
-            parameters=self._parameters(),
+            parameters=self.parameters(),
             events=tuple((one.timestamp * 1e-6, str(one.message)) for one in self._log.logged_messages),
             utc_start=self._utc_start(),
             damage=replace(self._damage, places=self._damage.places + len(self._log.dropouts)),
         )
 
-    def _table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
+    @property
+    def source(self) -> str:
+        """The file."""
+        return self._source
+
+    def table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
         """The first choice of fields that a topic has."""
         data = self._data.get(topic, {})
         for columns in choices:
@@ -189,40 +200,41 @@ class _Topics:
         return None
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
-        place = self._table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
+        place = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
         yield "position", place if place is not None else self._gps()
         yield "velocity", self._velocity()
-        yield "attitude", self._attitude()
+        yield "attitude", self.attitude()
         yield "airspeed", self._airspeed()
-        wind = self._table("wind", ("windspeed_east", "windspeed_north"))
+        wind = self.table("wind", ("windspeed_east", "windspeed_north"))
         if wind is None:
-            wind = self._table("wind_estimate", ("windspeed_east", "windspeed_north"))
+            wind = self.table("wind_estimate", ("windspeed_east", "windspeed_north"))
         yield "wind", wind if wind is not None and np.any(wind.values) else None
         yield "battery", self._battery()
-        yield "throttle", self._table("actuator_controls_0", ("control[3]",))
+        yield "throttle", self.table("actuator_controls_0", ("control[3]",))
 
     def _gps(self) -> LogSeries | None:
         for topic in ("vehicle_gps_position", "sensor_gps"):
-            found = self._table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
+            found = self.table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
             if found is not None:
                 return found
-            whole = self._table(topic, ("lat", "lon", "alt"))
+            whole = self.table(topic, ("lat", "lon", "alt"))
             if whole is not None:
                 return LogSeries(topic, whole.time, np.round(whole.values * np.array([1e-7, 1e-7, 1e-3]), 7))
         return None
 
     def _velocity(self) -> LogSeries | None:
-        found = self._table("vehicle_local_position", ("vy", "vx", "vz"))
+        found = self.table("vehicle_local_position", ("vy", "vx", "vz"))
         if found is None:
-            found = self._table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
+            found = self.table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
         if found is None:
             return None
         return LogSeries(found.source, found.time, found.values * np.array([1.0, 1.0, -1.0]))
 
-    def _attitude(self) -> LogSeries | None:
-        found = self._table("vehicle_attitude", ("q[0]", "q[1]", "q[2]", "q[3]"))
+    def attitude(self) -> LogSeries | None:
+        """Roll, pitch and yaw (n, 3), rad; None of a log without."""
+        found = self.table("vehicle_attitude", ("q[0]", "q[1]", "q[2]", "q[3]"))
         if found is None:
-            return self._table("vehicle_attitude", ("roll", "pitch", "yaw"))
+            return self.table("vehicle_attitude", ("roll", "pitch", "yaw"))
         w, x, y, z = found.values.T
         roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
         pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
@@ -231,7 +243,7 @@ class _Topics:
 
     def _airspeed(self) -> LogSeries | None:
         for topic in ("airspeed_validated", "airspeed"):
-            found = self._table(topic, ("true_airspeed_m_s",))
+            found = self.table(topic, ("true_airspeed_m_s",))
             if found is not None:
                 good = np.isfinite(found.values[:, 0])
                 if good.any() and np.any(found.values[good]):
@@ -239,7 +251,7 @@ class _Topics:
         return None
 
     def _battery(self) -> LogSeries | None:
-        found = self._table("battery_status", ("current_a", "voltage_v"))
+        found = self.table("battery_status", ("current_a", "voltage_v"))
         if found is None or not (found.values[:, 0] > 0.0).any():
             return None
         step = np.clip(np.diff(found.time, prepend=found.time[0]), 0.0, 10.0)
@@ -251,7 +263,7 @@ class _Topics:
         gps = self._gps()
         if gps is not None and "vehicle_global_position" in self._data:
             yield HeightSource(f"{gps.source}.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
-        baro = self._table("vehicle_air_data", ("baro_alt_meter",))
+        baro = self.table("vehicle_air_data", ("baro_alt_meter",))
         if baro is not None:
             yield HeightSource("vehicle_air_data.baro_alt_meter", "pressure", baro)
 
@@ -265,7 +277,8 @@ class _Topics:
                 yield ModeChange(time * 1e-6, *px4_state(int(state)))
                 last = state
 
-    def _vehicle(self) -> VehicleKind:
+    def vehicle(self) -> VehicleKind:
+        """What it is; a VTOL is a plane."""
         data = self._data.get("vehicle_status", {})
         if "vehicle_type" in data:
             kinds = np.asarray(data["vehicle_type"])
@@ -285,7 +298,7 @@ class _Topics:
         if not items and not total:
             return
         held = px4_items([items[seq] for seq in sorted(items)])
-        mission = Mission(self._home(), held, source=f"{self._source}: mission items")
+        mission = Mission(self.home(), held, source=f"{self._source}: mission items")
         found = LoggedMission(float(stamps[0]) * 1e-6, mission, "navigator_mission_item")
         made = without_gaps(found, total, max([total, *(item.seq for item in held[-1:])]))
         if made is not None:
@@ -324,19 +337,22 @@ class _Topics:
         total = float(data["seq_total"][before[-1] if before.size else 0])
         return int(total) if 0.0 <= total <= _MAX_ITEMS else 0
 
-    def _home(self) -> Home | None:
-        found = self._table("home_position", ("lat", "lon", "alt"))
+    def home(self) -> Home | None:
+        """Where it was set last; None where the log does not say."""
+        found = self.table("home_position", ("lat", "lon", "alt"))
         if found is None:
             return None
         placed = found.values[np.isfinite(found.values).all(axis=1) & (np.abs(found.values) < _PLACE).all(axis=1)]
         return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
 
-    def _parameters(self) -> dict[str, float]:
+    def parameters(self) -> dict[str, float]:
+        """As they were when the log began, by name."""
         known = self._log.initial_parameters.items()
         # A damaged one may be a text.
         return {str(name): float(value) for name, value in known if isinstance(value, int | float)}
 
-    def _program(self) -> str:
+    def program(self) -> str:
+        """Name and release of what flew."""
         info = self._log.msg_info_dict
         name, release = str(info.get("sys_name", "PX4")), info.get("ver_sw_release")
         if isinstance(release, int):

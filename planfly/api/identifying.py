@@ -18,7 +18,7 @@ from planfly.identification.base_numbers import base_model, scaled
 from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
-from planfly.identification.records import LEAST_HZ, flight_records, log_outputs
+from planfly.identification.records import LEAST_HZ, LEFT, flight_records, log_outputs
 from planfly.identification.replay import QUANTITIES, UNITS, Replay, replay_log
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.stages import stage
@@ -67,9 +67,9 @@ def identify_aircraft(
     base: str | Path = "aerosonde",
     check: str | Path | None = None,
 ) -> IdentifiedAircraft:
-    """Make the folder of an aircraft from flight logs of ArduPlane, with what is not known of it.
+    """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with what is not known of it.
 
-    logs: of one aircraft with one mass, with inertial sensors (IMU) and servo outputs (RCOU).
+    logs: `.BIN` or `.ulg` of one aircraft with one mass, with inertial sensors and servo outputs.
     folder: to make, which must not be there yet.
     mass: kg, in flight.  span: of the wing, m.  area: of the wing, m^2; None for the base's share of the span squared.
     battery: volts and capacity, "44.4V,888Wh"; None for the base's.
@@ -103,9 +103,9 @@ def identify_aircraft(
     records = [record for _, stretches, _ in read for record in stretches]
     log, _, outputs = read[-1]
     with stage("estimating"):
-        fast = all(min(one.inertial.rate, one.outputs.rate) >= LEAST_HZ for one, _, _ in read)
+        fast = all(min(one.inertial.rate, one.moved.rate) >= LEAST_HZ for one, _, _ in read)
         estimate = estimate_model(records, numbers, dynamics=fast)
-        check_estimate(estimate, numbers, {name: output.output for name, output in outputs.items()}, log.source)
+        check_estimate(estimate, numbers, _own_outputs(log, prior), log.source)
         found = make_identified(prior, numbers, estimate, [one for one, _, _ in read], outputs)
         files = folder_files(found, target.name, (volts, energy))
     replays = () if checked is None else _replay(found, files, target.name, checked)
@@ -150,13 +150,27 @@ def _refuse_equal(logs: Sequence[MotionLog]) -> None:
 
 
 def _stretches(log: MotionLog, prior: Aircraft) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
-    """The log's stretches, and its outputs: the base's own where it has the same outputs, rigged as stated."""
-    outputs = log_outputs(log, prior)
+    """The log's stretches, and its outputs: the base's own where it has the same outputs, rigged as stated.
+
+    Those of PX4, and elevons, which are mixed within the model, leave the base's own.
+    """
     file = prior.folder / "ardupilot.toml"
     own = read_servos(file) if file.is_file() else {}
+    if log.program_kind == "px4":
+        return flight_records(log, prior), dict(own)
+    outputs = log_outputs(log, prior)
+    if LEFT in outputs:
+        return flight_records(log, prior, outputs), dict(own)
     same = own.keys() == outputs.keys() and all(_same(own[name], output) for name, output in outputs.items())
     chosen = dict(own) if same else outputs
     return flight_records(log, prior, chosen if same else None), chosen
+
+
+def _own_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:
+    """Number of the output of each control that has one of its own."""
+    if log.program_kind == "px4":
+        return {}
+    return {name: output.output for name, output in log_outputs(log, prior).items()}
 
 
 def _same(one: ServoOutput, other: ServoOutput) -> bool:

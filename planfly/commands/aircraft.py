@@ -58,10 +58,8 @@ def aircraft_options(line: LineParser) -> None:
     _sheet_options(parser)
     logs = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
     completed(
-        logs.add_argument(
-            "--identify", dest="logs", metavar="LOG.BIN", nargs="+", help="logs of ArduPlane to identify it from"
-        ),
-        files(".bin", ".BIN"),
+        logs.add_argument("--identify", dest="logs", metavar="LOG", nargs="+", help=".BIN of ArduPlane or .ulg of PX4"),
+        files(".bin", ".BIN", ".ulg"),
     )
     completed(
         logs.add_argument(
@@ -70,8 +68,8 @@ def aircraft_options(line: LineParser) -> None:
         aircraft_words,
     )
     completed(
-        logs.add_argument("--check", metavar="LOG.BIN", help="with --identify: another log, to replay with the model"),
-        files(".bin", ".BIN"),
+        logs.add_argument("--check", metavar="LOG", help="with --identify: another log, to replay with the model"),
+        files(".bin", ".BIN", ".ulg"),
     )
     result_options(parser, "where the pictures go (default: runs/aircraft-NAME, replaced); of --identify, the folder")
 
@@ -106,7 +104,7 @@ def aircraft(args: argparse.Namespace) -> int:
         return _identify(args)
     for name in ("base", "check"):
         if getattr(args, name) is not None:
-            raise PlanflyError.of_argument(name, getattr(args, name), "goes with `logs` LOG.BIN", shown="")
+            raise PlanflyError.of_argument(name, getattr(args, name), "goes with `logs` LOG", shown="")
     if args.folder is not None:
         return _make_folder(args)
     for name in _SHEET:
@@ -186,7 +184,7 @@ def _identify(args: argparse.Namespace) -> int:
     ):  # fmt: skip
         print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {low:.1f} to {high:.1f} (95 %)")
     if not estimate.dynamics:
-        print("  performance only: under 10 rows of IMU or RCOU a second tell nothing of the moments")
+        print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
     for line in estimate.silent():
         print(f"  not seen {line}")
     for log in found.without_current:

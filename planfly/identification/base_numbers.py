@@ -26,15 +26,14 @@ _SLUG_FT2 = 1.3558179483314004
 def base_model(aircraft: Aircraft) -> BaseModel:
     """Numbers of an aircraft.
 
-    Raises FlightError for one without steady flight at cruise, for a flying wing, and for one whose motor is not in the
-    form of the Aerosonde's, which cannot be told from logs.
+    Raises FlightError for one without steady flight at cruise, and for one whose motor is not in the form of the
+    Aerosonde's, which cannot be told from logs.
 
     >>> from aircraft.catalog import load_aircraft
     >>> numbers = base_model(load_aircraft("aerosonde")).coefficients
     >>> round(numbers.lift_alpha, 2), round(numbers.pitch_elevator, 2), round(numbers.drag_zero, 3)
     (5.61, -0.99, 0.043)
     """
-    _refuse_wing(aircraft)
     motor = read_motor(aircraft)
     probe = _Probe(aircraft)
     return BaseModel(
@@ -47,6 +46,7 @@ def base_model(aircraft: Aircraft) -> BaseModel:
         motor_lag=aircraft.motor_lag,
         coefficients=probe.coefficients(),
         motor=motor,
+        reacts=_reacts(aircraft),
     )
 
 
@@ -122,23 +122,25 @@ class _Probe:
         return np.concatenate([forces, np.array(moments) / lengths]) / self._pressure
 
 
-def _refuse_wing(aircraft: Aircraft) -> None:
-    """Refuse an aircraft whose model has no reaction to the propeller's torque.
+def is_flying_wing(aircraft: Aircraft) -> bool:
+    """Whether a model has elevons: mixed from elevator and aileron in the model itself."""
+    root = _model(aircraft)
+    return root is not None and any(one.get("name") == "elevon/left-rad" for one in root.iter("actuator"))
 
-    Models of flying wings leave it out: without a rudder no trim balances it, and the equations of the moments have it.
-    Raises FlightError.
-    """
+
+def _reacts(aircraft: Aircraft) -> bool:
+    """Whether a model has the reaction to the propeller's torque; those of flying wings leave it out."""
+    root = _model(aircraft)
+    reactions = None if root is None else root.find("external_reactions")
+    return reactions is None or reactions.find("moment") is not None
+
+
+def _model(aircraft: Aircraft) -> ElementTree.Element | None:
+    """The model's text as it is parsed; None of one that JSBSim will say is wrong."""
     try:
-        root = ElementTree.parse(aircraft.model_file).getroot()
+        return ElementTree.parse(aircraft.model_file).getroot()
     except (OSError, ElementTree.ParseError):
-        # JSBSim says what is wrong.
-        return
-    if root.find("external_reactions") is not None and root.find("external_reactions/moment") is None:
-        allowed = "a base with a tail is expected, whose <external_reactions> have the moment of its torque"
-        raise FlightError(
-            f"{aircraft.model_file}: a flying wing, or without the propeller's torque: {allowed}",
-            file=aircraft.model_file, allowed=allowed,
-        )  # fmt: skip
+        return None
 
 
 def read_motor(aircraft: Aircraft) -> ElectricMotor:

@@ -21,14 +21,17 @@ _BLOCK_SECONDS = 30.0
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
     """Refuse an estimate that no aircraft can have.
 
-    outputs: number of the servo output of each control.  source: of the logs, for the message.
+    outputs: number of the servo output of each control that has one of its own.  source: of the logs, for the message.
     Raises LogError, in one line.
     """
     known = estimate.of_log()
     for name, control in _POWERS.items():
         k = INDEX[name]
         if estimate.values[k] < 0.0 and (known[k] > _KNOWN or estimate.values[k] < -2.0 * estimate.sds[k]):
-            number = outputs.get(control, 0)
+            number = outputs.get(control)
+            if number is None:
+                message = f"the {control} seems reversed: it moves the aircraft the other way"
+                raise LogError(f"{source}: {message}", file=source, field=control)
             message = f"output {number} seems reversed: {control} moves the aircraft the other way"
             raise LogError(
                 f"{source}: {message} (SERVO{number}_REVERSED)", file=source, field=f"SERVO{number}_REVERSED"

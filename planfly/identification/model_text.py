@@ -38,7 +38,7 @@ def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats
     _set_sizes(root, numbers, base)
     kept = [one for one in root.iter("property") if (one.text or "").strip().startswith("base/")]
     old = _part(root, "external_reactions", base)
-    reactions = ElementTree.fromstring(_reactions(numbers.motor, values, kept))
+    reactions = ElementTree.fromstring(_reactions(numbers, values, kept))
     root.remove(old)
     # Its properties are read by what follows.
     root.insert(list(root).index(_part(root, "flight_control", base)), reactions)
@@ -189,15 +189,20 @@ def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control
 _RHO, _SPEED, _AIR = "<p> motor/rho-kg_m3 </p>", "<p> motor/propeller-rad_sec </p>", "<p> motor/airspeed-mps </p>"
 
 
-def _reactions(motor: ElectricMotor, values: Floats, kept: list[ElementTree.Element]) -> str:
+def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Element]) -> str:
     """The text of ``<external_reactions>``: the properties, and what drives the propeller."""
     own = "\n".join(
         f'<property value="{values[INDEX[parameter.name]]:.9g}"> {parameter.property_name} </property>'
         for parameter in PARAMETERS
     )
     old = "\n".join(ElementTree.tostring(one, encoding="unicode").strip() for one in kept)
+    motor = numbers.motor
     functions = _motor_functions(motor)
     body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
+    torque = """<moment name="torque" frame="BODY">
+  <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
+  <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
+</moment>"""
     return f"""<external_reactions>
 {old}
 {own}
@@ -209,10 +214,7 @@ def _reactions(motor: ElectricMotor, values: Floats, kept: list[ElementTree.Elem
   <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
   <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
 </force>
-<moment name="torque" frame="BODY">
-  <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
-  <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
-</moment>
+{torque if numbers.reacts else ""}
 </external_reactions>"""
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from logs.importers.motion_log import MotionLog, Samples
+from planfly.identification.base_numbers import is_flying_wing
 from planfly.identification.servos import ServoOutput
 from world.errors import LogError
 
@@ -18,8 +19,9 @@ Flags = NDArray[np.bool_]
 LEAST_HZ = 10.0
 # Flight that a log must have after what cannot be used is cut, s; and a stretch, s.
 LEAST_SECONDS, LEAST_STRETCH = 180.0, 30.0
-# A pause between rows that parts two stretches, s; of airspeed and wind, which come more slowly.
-_GAP, _AIR_GAP = 0.5, 1.0
+# A pause between rows that parts two stretches, s; of airspeed and wind, which come more slowly: PX4's wind once a
+# second, more or less.
+_GAP, _AIR_GAP, _SLOW_WIND_GAP = 0.5, 1.0, 2.5
 # After taking off or being let go, s.
 _SETTLING = 15.0
 # Flight: faster than this share of AIRSPEED_MIN.
@@ -29,7 +31,10 @@ _FLYING = 0.8
 _VTOL_MODES = frozenset({17, 18, 19, 20, 21, 22, 23, 25})
 # SERVOn_FUNCTION (ArduPilot's parameter list).
 _AILERON, _ELEVATOR, _RUDDER, _THROTTLE = 4, 19, 21, 70
-_MIXED = {77: "a flying wing's elevons", 78: "a flying wing's elevons", 79: "a V-tail", 80: "a V-tail"}
+_ELEVON_LEFT, _ELEVON_RIGHT = 77, 78
+_MIXED = {79: "a V-tail", 80: "a V-tail"}
+# Outputs of a flying wing by their names: surfaces that are mixed into elevator and ailerons.
+LEFT, RIGHT = "left elevon", "right elevon"
 _FLAPS = {
     2: "flap",
     3: "automatic flap",
@@ -43,6 +48,8 @@ _FLAPS = {
 _LIFT_MOTORS = frozenset(range(33, 41))
 # ArduPlane's default LOG_BITMASK, which has both.
 _BITMASK = 65535
+# PX4's SDLOG_PROFILE with its default set (1) and that of a high rate (16).
+_PROFILE = 17
 
 
 def flight_records(
@@ -54,15 +61,14 @@ def flight_records(
     Raises LogError, in one line, for a log that cannot be used.
     """
     _refuse(log)
+    if log.elevons:
+        _refuse_base_of_elevons(log, aircraft)
     grid = _grid(log)
-    outputs = servos or log_outputs(log, aircraft)
-    pulses = _held(log.outputs, grid)
-    controls = np.column_stack(
-        [
-            outputs[name].control(pulses[:, outputs[name].output - 1]) if name in outputs else np.zeros(len(grid))
-            for name in ("elevator", "aileron", "rudder", "throttle")
-        ]
-    )
+    pulses = _held(log.outputs, grid) if len(log.outputs.time) else np.zeros((len(grid), log.outputs.values.shape[1]))
+    if len(log.controls.time):
+        controls = _shares_as_angles(_held(log.controls, grid), aircraft)
+    else:
+        controls = _controls(servos or log_outputs(log, aircraft), pulses)
     ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
     height = _at(log.height, grid)[:, 0]
     velocity, wind = _at(log.velocity, grid), _at(log.wind, grid)
@@ -100,32 +106,54 @@ def flight_records(
     return made
 
 
+def _controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:
+    """(n, 4) elevator, aileron, rudder (rad) and throttle at pulses (n, m); elevons are half the sum and difference."""
+    found = {name: output.control(pulses[:, output.output - 1]) for name, output in outputs.items()}
+    if LEFT in found:
+        left, right = found.pop(LEFT), found.pop(RIGHT)
+        found |= {"elevator": 0.5 * (left + right), "aileron": 0.5 * (left - right)}
+    still = np.zeros(len(pulses))
+    return np.column_stack([found.get(name, still) for name in ("elevator", "aileron", "rudder", "throttle")])
+
+
+def _shares_as_angles(shares: Floats, aircraft: Aircraft) -> Floats:
+    """(n, 4) controls of shares of full travel, which is the base's largest deflection."""
+    # Nose up and yaw to the right are positive shares; the model's elevator and rudder count the other way.
+    largest = np.array([-aircraft.max_elevator, aircraft.max_aileron, -aircraft.max_rudder, 1.0])
+    return np.asarray(shares * largest)
+
+
+# What the series are called, by whose log it is.
+_SERIES = {
+    "ardupilot": {
+        "inertial": "IMU, the inertial sensors", "outputs": "RCOU, the servo outputs", "attitude": "ATT, the attitude",
+        "velocity": "XKF1, the velocity", "height": "POS, the height",
+        "airspeed": "ARSP of a sensor in use (U = 1), the airspeed", "wind": "XKF2, the wind",
+    },
+    "px4": {
+        "inertial": "sensor_combined, the inertial sensors",
+        "outputs": "actuator_servos and actuator_motors, nor actuator_controls_0: actuator_outputs alone do not say"
+        " what they move",
+        "attitude": "vehicle_attitude, the attitude", "velocity": "vehicle_local_position, the velocity",
+        "height": "vehicle_global_position, the height",
+        "airspeed": "airspeed_validated of a sensor in use, the airspeed", "wind": "wind, the wind",
+    },
+}  # fmt: skip
+
+
 def _refuse(log: MotionLog) -> None:
     """Refuse what no identification can use.  Raises LogError."""
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): a plane is expected", file=log.source)
-    for samples, message, what in (
-        (log.inertial, "IMU", "inertial sensors"),
-        (log.outputs, "RCOU", "servo outputs"),
-    ):
+    named = _SERIES[log.program_kind]
+    for samples, name in ((log.inertial, "inertial"), (log.moved, "outputs")):
         if len(samples.time) < 2:
-            mask = log.parameters.get("LOG_BITMASK")
-            now = "" if mask is None else f" (it is {mask:.0f})"
-            raise LogError(
-                f"{log.source}: no {message}, the {what}: LOG_BITMASK {_BITMASK} records them{now}", file=log.source
-            )
-    for samples, what in (
-        (log.attitude, "ATT, the attitude"),
-        (log.velocity, "XKF1, the velocity"),
-        (log.height, "POS, the height"),
-    ):
+            raise LogError(f"{log.source}: no {named[name]}: {_recording(log)}", file=log.source)
+    for samples, name in ((log.attitude, "attitude"), (log.velocity, "velocity"), (log.height, "height")):
         if len(samples.time) < 2:
-            raise LogError(f"{log.source}: no {what}", file=log.source)
-    air = (
-        (log.airspeed, "ARSP of a sensor in use (U = 1), the airspeed"),
-        (log.wind, "XKF2, the wind"),
-    )
-    if lacking := [what for samples, what in air if len(samples.time) < 2]:
+            raise LogError(f"{log.source}: no {named[name]}", file=log.source)
+    air = ((log.airspeed, "airspeed"), (log.wind, "wind"))
+    if lacking := [named[name] for samples, name in air if len(samples.time) < 2]:
         raise LogError(f"{log.source}: no {'; no '.join(lacking)}", file=log.source)
     for number, kind in _functions(log).items():
         if kind in _FLAPS:
@@ -133,6 +161,14 @@ def _refuse(log: MotionLog) -> None:
             if highest - lowest > 20.0:
                 message = f"output {number} (SERVO{number}_FUNCTION {kind}, {_FLAPS[kind]}) moves in flight"
                 raise LogError(f"{log.source}: {message}, and no model of it is estimated", file=log.source)
+
+
+def _recording(log: MotionLog) -> str:
+    """What would record it."""
+    if log.program_kind == "px4":
+        return f"SDLOG_PROFILE {_PROFILE}, the default set at a high rate, records them (PX4 1.14 or later)"
+    mask = log.parameters.get("LOG_BITMASK")
+    return f"LOG_BITMASK {_BITMASK} records them{'' if mask is None else f' (it is {mask:.0f})'}"
 
 
 def _range(log: MotionLog, number: int) -> tuple[float, float]:
@@ -159,18 +195,26 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     """Which output moves what, by SERVOn_*: full travel is the base's largest deflection.
 
     More microseconds are roll to the right, nose up and yaw to the right in ArduPlane; the model's elevator and rudder
-    count the other way.  Raises LogError for mixes that no model of is estimated.
+    count the other way.  Elevons are there as `LEFT` and `RIGHT`, trailing edge down, in place of elevator and aileron.
+    Raises LogError for mixes that no model of is estimated, and for elevons where the base has a tail.
     """
     functions = _functions(log)
     for number, kind in functions.items():
         if kind in _MIXED:
             message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of {_MIXED[kind]}"
             raise LogError(f"{log.source}: {message}: its mix is not modelled", file=log.source)
+    elevons = [kind in functions.values() for kind in (_ELEVON_LEFT, _ELEVON_RIGHT)]
+    if any(elevons):
+        _refuse_base_of_elevons(log, aircraft)
+    if any(elevons) and not all(elevons):
+        raise LogError(f"{log.source}: one elevon alone: SERVOn_FUNCTION 77 and 78 are expected", file=log.source)
     made = {}
     for name, function, largest in (
         ("elevator", _ELEVATOR, -aircraft.max_elevator),
         ("aileron", _AILERON, aircraft.max_aileron),
         ("rudder", _RUDDER, -aircraft.max_rudder),
+        (LEFT, _ELEVON_LEFT, -aircraft.max_elevator),
+        (RIGHT, _ELEVON_RIGHT, -aircraft.max_elevator),
     ):
         number = _first(log, function)
         if number:
@@ -180,10 +224,17 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     if number:
         lowest, _, highest, _ = _travel(log, number)
         made["throttle"] = ServoOutput(number, (lowest, highest), (0.0, 1.0))
-    for name in ("elevator", "aileron", "throttle"):
+    for name in ("throttle",) if LEFT in made else ("elevator", "aileron", "throttle"):
         if name not in made:
             raise LogError(f"{log.source}: no SERVOn_FUNCTION is the {name}'s", file=log.source)
     return made
+
+
+def _refuse_base_of_elevons(log: MotionLog, aircraft: Aircraft) -> None:
+    if not is_flying_wing(aircraft):
+        advice = "a flying wing is expected as base: planfly aircraft --new FOLDER --layout wing makes one"
+        message = f"flown with elevons, and the base {aircraft.name} has a tail: {advice}"
+        raise LogError(f"{log.source}: {message}", file=log.source)
 
 
 def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
@@ -196,7 +247,7 @@ def _travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
 
 def _grid(log: MotionLog) -> Floats:
     """Times that all series cover."""
-    series = (log.inertial, log.outputs, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
+    series = (log.inertial, log.moved, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     first, last = max(one.time[0] for one in series), min(one.time[-1] for one in series)
     return np.arange(first, last, 1.0 / GRID_HZ)
 
@@ -223,10 +274,12 @@ def _has_current(log: MotionLog) -> bool:
 def _vtol_rows(log: MotionLog, grid: Floats, pulses: Floats) -> Flags:
     """Where lifting motors ran or a mode of theirs was set."""
     rows = np.zeros(len(grid), np.bool_)
-    for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=True):
+    for (start, number), (end, _) in zip(log.modes, (*log.modes[1:], (np.inf, 0)), strict=False):
         if number in _VTOL_MODES:
             rows |= (grid >= start) & (grid < end)
-    for number, kind in _functions(log).items():
+    for start, end in log.hovering:
+        rows |= (grid >= start) & (grid < end)
+    for number, kind in _functions(log).items() if len(log.outputs.time) else ():
         if kind in _LIFT_MOTORS and log.parameters.get("Q_ENABLE", 0.0) > 0.0:
             rows |= pulses[:, number - 1] > 1100.0
     return rows
@@ -236,8 +289,9 @@ def _usable(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) ->
     """Rows in free flight on the wing, without a pause of the sensors, of airspeed or of wind."""
     least = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     flying = (equivalent > _FLYING * least) & ~_vtol_rows(log, grid, pulses)
-    sensors = [(samples, _GAP) for samples in (log.inertial, log.outputs, log.attitude, log.velocity)]
-    for samples, longest in (*sensors, (log.airspeed, _AIR_GAP), (log.wind, _AIR_GAP)):
+    sensors = [(samples, _GAP) for samples in (log.inertial, log.moved, log.attitude, log.velocity)]
+    wind_gap = _SLOW_WIND_GAP if log.program_kind == "px4" else _AIR_GAP
+    for samples, longest in (*sensors, (log.airspeed, _AIR_GAP), (log.wind, wind_gap)):
         steps = np.diff(samples.time)
         for k in np.flatnonzero(steps > longest):
             flying &= ~((grid > samples.time[k]) & (grid < samples.time[k + 1]))

@@ -1,11 +1,17 @@
 """Numbers off a JSBSim model are those of the book that it was written from."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 
-from aircraft.catalog import load_aircraft
-from planfly.identification.base_numbers import base_model, scaled
+import planfly
+from aircraft.catalog import load_aircraft, read_aircraft
+from aircraft.identification.parameters import prior_means
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import straight
+from planfly.identification.base_numbers import base_model, is_flying_wing, scaled
+from planfly.identification.model_text import identified_xml
 from tests.instrumented_flights import Truth, changed_aerosonde
 from world.errors import FlightError
 
@@ -53,17 +59,24 @@ def test_an_engine_that_burns_fuel_is_refused_in_one_line() -> None:
 
 
 @pytest.mark.parametrize("name", ["x8", "zagi"])
-def test_a_flying_wing_is_refused_in_one_line(name: str) -> None:
-    with pytest.raises(FlightError, match="a flying wing, or without the propeller's torque") as refused:
+def test_a_wing_with_another_motor_is_refused_in_one_line(name: str) -> None:
+    with pytest.raises(FlightError, match="its motor cannot be identified") as refused:
         base_model(load_aircraft(name))
     assert "\n" not in str(refused.value)
 
 
-def test_a_motor_like_the_aerosondes_without_its_torque_is_refused(tmp_path: Path) -> None:
-    """As `planfly aircraft --new --layout wing` writes it: the motor can be read, and no trim would be left."""
-    aircraft = changed_aerosonde(tmp_path / "own", Truth())
-    text = aircraft.model_file.read_text(encoding="utf-8")
-    start, end = text.index("<moment name"), text.index("</moment>") + len("</moment>")
-    aircraft.model_file.write_text(text[:start] + text[end:], encoding="utf-8")
-    with pytest.raises(FlightError, match="a flying wing, or without the propeller's torque"):
-        base_model(aircraft)
+def test_a_flying_wing_from_a_data_sheet_is_a_base_without_the_propellers_torque(tmp_path: Path) -> None:
+    wing = planfly.new_aircraft(tmp_path / "foam", mass=2.1, span=1.6, cruise=15.0, stall=10.0, layout="wing")
+    assert is_flying_wing(wing)
+    assert not is_flying_wing(load_aircraft("aerosonde"))
+    numbers = base_model(wing)
+    assert not numbers.reacts
+    assert base_model(load_aircraft("aerosonde")).reacts
+    # The model that an estimate makes of it has none either, and flies level as the wing does.
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "mine.xml").write_text(identified_xml(wing, "mine", numbers, prior_means()), encoding="utf-8")
+    shutil.copy(wing.folder / "foam.toml", tmp_path / "mine" / "mine.toml")
+    before, after = (straight(Fdm(one), 15.0, 500.0) for one in (wing, read_aircraft(tmp_path / "mine")))
+    assert before is not None
+    assert after is not None
+    assert after.vector() == pytest.approx(before.vector(), abs=2e-3)

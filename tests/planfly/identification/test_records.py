@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import planfly
 from aircraft.catalog import load_aircraft
 from logs.importers.motion_log import MotionLog, Samples
 from planfly.identification.records import flight_records, log_outputs
@@ -35,7 +37,7 @@ def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
         (lambda: changed(vehicle="rover", program="ArduRover V4.5.7"), "flown by a rover"),
         (lambda: changed({"SERVO1_FUNCTION": 24.0}), "output 1 (SERVO1_FUNCTION 24, flaperon) moves"),
         (lambda: changed({"SERVO2_FUNCTION": 79.0}), "V-tail"),
-        (lambda: changed({"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0}), "a flying wing's elevons"),
+        (lambda: changed({"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0}), "and the base aerosonde has a tail"),
         (lambda: changed({"SERVO2_FUNCTION": 0.0}), "no SERVOn_FUNCTION is the elevator's"),
         (lambda: changed(modes=((0.0, 10), (120.0, 19))), "flight on its lifting motors is cut"),
     ],
@@ -81,3 +83,26 @@ def test_outputs_are_read_off_the_logs_parameters() -> None:
     assert np.degrees(found["aileron"].control(pulses)[[0, 3]]) == pytest.approx([30.0, -30.0])
     assert np.degrees(found["elevator"].control(pulses)[[0, 1, 3]]) == pytest.approx([30.0, 0.0, -30.0])
     assert found["throttle"].control(np.array([1000.0, 1770.0])) == pytest.approx([0.0, 0.77])
+
+
+def test_elevons_are_half_their_sum_and_difference(tmp_path: Path) -> None:
+    """ArduPlane's left elevon is elevator less aileron, its right one their sum: nose up, and roll to the right."""
+    wing = planfly.new_aircraft(tmp_path / "foam", mass=2.1, span=1.6, cruise=15.0, stall=10.0, layout="wing")
+    log = changed({"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0, "SERVO2_REVERSED": 1.0})
+    up, roll = 0.3, 0.2
+    pulses = log.outputs.values.copy()
+    pulses[:, 0], pulses[:, 1] = 1500.0 + 400.0 * (up - roll), 1500.0 - 400.0 * (up + roll)
+    (record,) = flight_records(replace(log, outputs=Samples(log.outputs.time, pulses)), wing)
+    elevator, aileron = record.controls[100, :2]
+    # The model's elevator is positive with the trailing edge down, its aileron with a roll to the right.
+    assert (elevator, aileron) == pytest.approx((-up * wing.max_elevator, roll * wing.max_elevator))
+
+
+def test_one_elevon_alone_is_refused(tmp_path: Path) -> None:
+    wing = planfly.new_aircraft(tmp_path / "foam", mass=2.1, span=1.6, cruise=15.0, stall=10.0, layout="wing")
+    with pytest.raises(LogError, match="one elevon alone: SERVOn_FUNCTION 77 and 78 are expected"):
+        flight_records(changed({"SERVO1_FUNCTION": 77.0}), wing)
+
+
+def test_a_log_without_modes_is_flown_on_the_wing() -> None:
+    assert len(flight_records(changed(modes=()), PRIOR)) == 1

@@ -1,0 +1,146 @@
+"""PX4's log of a flight says of the motion what ArduPilot's says, and what it lacks is refused by name."""
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.identification.estimate import aligned_signals, fit_all
+from logs.importers.motion_log import MotionLog, read_motion
+from planfly.identification.records import flight_records
+from tests.aircraft.identification.flown_truth import flown_truth
+from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_px4
+from tests.planfly.identification.test_records import PRIOR
+from world.errors import LogError
+
+
+def short(tmp_path: Path, parameters: Mapping[str, float] = {}, without: tuple[str, ...] = ()) -> MotionLog:
+    topics = {name: table for name, table in px4_topics(short_motion()).items() if name not in without}
+    return read_motion(write_px4(tmp_path / "a.ulg", topics, {**PX4_PARAMETERS, **parameters}))
+
+
+@cache
+def whole() -> dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]:
+    return px4_topics(flown_truth().log)
+
+
+def test_series_are_those_that_were_written(tmp_path: Path) -> None:
+    read, written = short(tmp_path), short_motion()
+    assert (read.vehicle, read.program, read.program_kind) == ("plane", "PX4", "px4")
+    for name in ("inertial", "velocity", "height", "battery"):
+        found, expected = getattr(read, name), getattr(written, name)
+        assert found.time == pytest.approx(expected.time)
+        assert found.values == pytest.approx(expected.values)
+    _, pitch, yaw = written.attitude.values.T
+    assert np.sin(read.attitude.values[:, 1]) == pytest.approx(np.sin(pitch))
+    # Angles of random size, the same turn: the nose points the same way.
+    nose = np.cos(read.attitude.values[:, 1]) * np.cos(read.attitude.values[:, 2])
+    assert nose == pytest.approx(np.cos(pitch) * np.cos(yaw))
+    assert read.parameters == {"AIRSPEED_MIN": 18.0, "AIRSPEED_CRUISE": 25.0, "AIRSPEED_MAX": 31.0}
+    assert read.home == pytest.approx((36.2578, -84.1401, 335.0))
+
+
+def test_surfaces_are_mixed_by_the_airframes_torques(tmp_path: Path) -> None:
+    """By hand: 1500 us is the middle, and 400 us the whole travel; the elevator's trim of -0.05 is taken off."""
+    pulses = short_motion().outputs.values
+    shares = short(tmp_path).controls.values
+    assert shares[:, 1] == pytest.approx((pulses[:, 0] - 1500.0) / 400.0)
+    assert shares[:, 0] == pytest.approx((pulses[:, 1] - 1500.0) / 400.0 + 8.4 / 30.0, abs=1e-6)
+    assert shares[:, 2] == pytest.approx((pulses[:, 3] - 1500.0) / 400.0)
+    assert shares[:, 3] == pytest.approx((pulses[:, 2] - 1000.0) / 1000.0)
+
+
+def test_elevons_are_half_their_sum_and_difference(tmp_path: Path) -> None:
+    elevons = {
+        "CA_SV_CS_COUNT": 2,
+        "CA_SV_CS0_TYPE": 5,
+        "CA_SV_CS0_TRQ_P": 0.5,
+        "CA_SV_CS1_TYPE": 6,
+        "CA_SV_CS1_TRQ_P": 0.5,
+    }
+    read = short(tmp_path, elevons)
+    assert read.elevons
+    # In the topic the two are -a and a.
+    aileron = (short_motion().outputs.values[:, 0] - 1500.0) / 400.0
+    assert read.controls.values[:, 1] == pytest.approx(aileron)
+    assert read.controls.values[:, 0] == pytest.approx(np.zeros(len(aileron)), abs=1e-9)
+    with pytest.raises(LogError, match="flown with elevons, and the base aerosonde has a tail"):
+        flight_records(read, PRIOR)
+
+
+def test_airspeed_that_no_sensor_measured_is_not_used(tmp_path: Path) -> None:
+    topics = px4_topics(short_motion())
+    fields = topics["airspeed_validated"][1]
+    fields["selected_airspeed_index"][:7] = 0.0
+    read = read_motion(write_px4(tmp_path / "a.ulg", topics, PX4_PARAMETERS))
+    assert len(read.airspeed.time) == len(short_motion().airspeed.time) - 7
+
+
+def test_stretches_on_lifting_motors_are_named(tmp_path: Path) -> None:
+    topics = px4_topics(short_motion())
+    times, fields = topics["vehicle_status"]
+    fields["vehicle_type"][1] = 1.0
+    fields["in_transition_mode"][2] = 1.0
+    read = read_motion(write_px4(tmp_path / "a.ulg", topics, PX4_PARAMETERS))
+    begins = [begin for begin, _ in read.hovering]
+    ends = [end for _, end in read.hovering]
+    assert begins == pytest.approx(times[1:3])
+    assert ends == pytest.approx(times[2:4])
+
+
+def test_controls_of_releases_before_1_14_are_read(tmp_path: Path) -> None:
+    topics = px4_topics(short_motion())
+    time, _ = topics.pop("actuator_servos")
+    topics["actuator_controls_0"] = (time, {"control": np.tile([0.1, -0.2, 0.3, 0.6, 0, 0, 0, 0], (len(time), 1))})
+    shares = read_motion(write_px4(tmp_path / "a.ulg", topics, {})).controls.values
+    # Roll, pitch, yaw and throttle there; pitch, roll, yaw, throttle here.
+    assert shares[0] == pytest.approx([-0.2, 0.1, 0.3, 0.6])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"CA_SV_CS2_TYPE": 7}, "CA_SV_CS2_TYPE 7 is a V-tail: its mix is not modelled"),
+        ({"CA_SV_CS3_TYPE": 10}, "CA_SV_CS3_TYPE 10 is flap moves in flight"),
+        ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3 is a tiltrotor: a plane is expected"),
+        ({"CA_SV_CS_COUNT": 2}, "no surface is the elevator's"),
+    ],
+)
+def test_mixes_that_are_not_modelled_are_named(tmp_path: Path, parameters: dict[str, float], said: str) -> None:
+    with pytest.raises(LogError) as refused:
+        short(tmp_path, parameters)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("without", "said"),
+    [
+        (("sensor_combined",), "no sensor_combined, the inertial sensors: SDLOG_PROFILE 17"),
+        (("actuator_servos",), "no actuator_servos and actuator_motors, nor actuator_controls_0"),
+        (("vehicle_attitude",), "no vehicle_attitude, the attitude"),
+        (("vehicle_local_position",), "no vehicle_local_position, the velocity"),
+        (("vehicle_global_position",), "no vehicle_global_position, the height"),
+        (("airspeed_validated", "wind"), "no airspeed_validated of a sensor in use, the airspeed; no wind, the wind"),
+    ],
+)
+def test_what_a_log_lacks_is_named(tmp_path: Path, without: tuple[str, ...], said: str) -> None:
+    with pytest.raises(LogError) as refused:
+        flight_records(short(tmp_path, without=without), PRIOR)
+    assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_the_same_flight_gives_the_same_aircraft(tmp_path: Path) -> None:
+    flown = flown_truth()
+    records = flight_records(read_motion(write_px4(tmp_path / "a.ulg", whole(), PX4_PARAMETERS)), PRIOR)
+    assert [record.seconds for record in records] == pytest.approx(
+        [record.seconds for record in flown.records], abs=1.0
+    )
+    found = fit_all(aligned_signals(records, flown.estimate.clocks, flown.base), flown.base)
+    assert found.with_current
+    off = np.abs(found.values - flown.estimate.values) / flown.estimate.sds
+    # Of pulses at 25 Hz on a grid of 50 one may fall a row later.
+    assert off.max() < 0.8
