@@ -18,6 +18,7 @@ export, foxglove_layout              files for ground stations, maps and other p
 timeline, instruments, movie         a flight again, from its log
 play_to_foxglove, play_to_stations   the same in other programs
 import_log, refly, recover           another program's log; its mission flown in JSBSim; a damaged log
+returns                              will it come home, from everywhere on its way
 campaign, campaign_flight, winds     how likely it is to fly; the largest wind from each direction
 serve                                a MAVLink vehicle for ground stations
 scenarios, aircraft                  what is embedded
@@ -88,6 +89,8 @@ if TYPE_CHECKING:
     from planfly.api.reporting import figures as figures
     from planfly.api.reporting import foxglove_layout as foxglove_layout
     from planfly.api.reporting import report as report
+    from planfly.api.returning import ReturnsFound as ReturnsFound
+    from planfly.api.returning import returns as returns
     from planfly.api.running import Round as Round
     from planfly.api.running import RunResult as RunResult
     from planfly.api.running import run as run
@@ -184,6 +187,10 @@ _HOMES = {
             "figures",
             "foxglove_layout",
             "report",
+        ),
+        "planfly.api.returning": (
+            "ReturnsFound",
+            "returns",
         ),
         "planfly.api.running": (
             "Round",

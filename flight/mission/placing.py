@@ -77,14 +77,30 @@ def place_stops(
     notes = Notes()
     if itinerary is None:
         itinerary = make_itinerary(mission)
-    heights = _Heights(mission.source, itinerary, origin, terrain, notes)
+    heights = _Heights(mission.source, itinerary.home, origin, terrain, notes)
     stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs)
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
     landing_ground = heights.touchdown(itinerary)
-    places = _return_places(mission, itinerary, origin, heights) if itinerary.returns else ()
+    places = _return_places(mission, itinerary.home, origin, heights) if itinerary.returns else ()
     return PlacedMission(
         mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground, places
     )
+
+
+def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[ReturnPlace, ...]:
+    """Home and the rally points of any mission on the map, home first; none of a mission without a home.
+
+    Raises MissionError, naming the rally point, for one beyond any map.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> items = (MissionItem(1, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0),)
+    >>> return_places(Mission(Home(36.5, 8.0, 300.0), items), GeoOrigin(36.5, 8.0), None)[0].up
+    300.0
+    """
+    if mission.home is None:
+        return ()
+    heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
+    return _return_places(mission, mission.home, origin, heights)
 
 
 def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
@@ -102,20 +118,18 @@ def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
     )
 
 
-def _return_places(
-    mission: Mission, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights"
-) -> tuple[ReturnPlace, ...]:
+def _return_places(mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights") -> tuple[ReturnPlace, ...]:
     """Home and the rally points on the map.  Raises MissionError, naming the rally point, for one beyond any map."""
-    east, north = to_map(origin, itinerary.home.lat_deg, itinerary.home.lon_deg)
-    home = ReturnPlace(float(east), float(north), heights.home_amsl())
-    places = [home]
+    east, north = to_map(origin, home.lat_deg, home.lon_deg)
+    launch = ReturnPlace(float(east), float(north), heights.home_amsl())
+    places = [launch]
     stops = rally_stops(mission)
     numbers = [number for number, item in enumerate(mission.rally, 1) if item.has_position]
     points = on_map(mission.source, stops, origin).tolist()
     for number, stop, (point_east, point_north) in zip(numbers, stops, points, strict=True):
         # Ground stations have no rally point without a height: one is home's.
-        up = heights.amsl(stop, point_east, point_north, home.up)
-        base = home.up if stop.frame in OVER_HOME else 0.0
+        up = heights.amsl(stop, point_east, point_north, launch.up)
+        base = launch.up if stop.frame in OVER_HOME else 0.0
         places.append(ReturnPlace(point_east, point_north, up, base, number))
     return tuple(places)
 
@@ -163,14 +177,12 @@ def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> 
 class _Heights:
     """Heights above mean sea level of heights in any frame."""
 
-    def __init__(
-        self, source: str, itinerary: Itinerary, origin: GeoOrigin, terrain: Terrain | None, notes: Notes
-    ) -> None:
+    def __init__(self, source: str, home: Home, origin: GeoOrigin, terrain: Terrain | None, notes: Notes) -> None:
         self.source = source
         self.origin = origin
         self.terrain = terrain
         self.notes = notes
-        self.home = itinerary.home
+        self.home = home
         self._home_amsl: float | None = None
 
     def amsl(self, stop: ItineraryStop, east: float, north: float, last: float) -> float:

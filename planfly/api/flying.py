@@ -32,6 +32,7 @@ from planfly.open_mission import (
     read_named_fences,
 )
 from planfly.pipeline import autopilot_log, fly_and_judge
+from planfly.return_flights import returns_line
 from planfly.stages import stage
 from planfly.targets import file_target, refuse_existing
 from planner.plan import Plan
@@ -79,6 +80,11 @@ class FlownMission:
         """The verdict's answer."""
         return self.verdict.flyable
 
+    @property
+    def returns_line(self) -> str:
+        """Returns from a few places of the flight in a line; "" for a mission without a home."""
+        return returns_line(self.setup, self.track)
+
     def __repr__(self) -> str:
         return f"<FlownMission {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
 
@@ -95,12 +101,19 @@ class Judged:
     verdict: whether it flies, with a finding for every rule and place.
     loss: what of a flight log could not be read, in a line; "" where nothing is missing.
     lossy: whether some of a log could not be read.
+    track: what was flown; None for a plan or a mission.
     """
 
     setup: FlightSetup
     verdict: Verdict
     loss: str = ""
     lossy: bool = False
+    track: Track | None = None
+
+    @property
+    def returns_line(self) -> str:
+        """Returns from a few places of the flight, or of the planned path, in a line; "" without a home."""
+        return returns_line(self.setup, self.track)
 
 
 FencePaths = str | Path | Sequence[str | Path]
@@ -162,7 +175,7 @@ def fly(
         changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
         guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,
     )  # fmt: skip
-    opened = _opened(mission, scenario, terrain, seed, fence, change)
+    opened = opened_mission(mission, scenario, terrain, seed, fence, change)
     target = None if log is None else _log_target(log, opened, mission, program, overwrite)
     limits = FlightLimits(max_hours, max_log)
     with stage(f"flying {flight_text(opened.setup)}") as advance:
@@ -282,20 +295,20 @@ def judge(
             aircraft=aircraft, airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law,
             flight=flight, datum=datum,
         )  # fmt: skip
-        return Judged(found.setup, found.verdict, lossy=found.lossy)
+        return Judged(found.setup, found.verdict, lossy=found.lossy, track=found.track)
     source = _source_of(what)
-    _refuse(source, {"plan": plan, "flight": flight, "datum": datum}, "goes with an imported log, not with this file")
+    refuse(source, {"plan": plan, "flight": flight, "datum": datum}, "goes with an imported log, not with this file")
     fences = named_fences(fence)
     log = Path(what) if isinstance(what, str | Path) and is_log(Path(what)) else None
     if log is not None or isinstance(what, FlightLog | FlownMission):
-        _refuse(source, flown_with | {"guidance": guidance, "autopilot_law": autopilot_law}, _AS_FLOWN)
-        _refuse(source, {"scenario": scenario}, _WHERE_FLOWN)
+        refuse(source, flown_with | {"guidance": guidance, "autopilot_law": autopilot_law}, _AS_FLOWN)
+        refuse(source, {"scenario": scenario}, _WHERE_FLOWN)
     if log is not None:
         what = read_log(log)
     if isinstance(what, FlightLog | FlownMission):
         return _judge_flight(what, terrain, fences)
     change = partial(changed_scenario, guidance=guidance, autopilot_law=autopilot_law, **flown_with)
-    setup = _opened(what, scenario, terrain, None, fences, change).setup
+    setup = opened_mission(what, scenario, terrain, None, fences, change).setup
     return Judged(setup, judge_geometry(setup))
 
 
@@ -343,7 +356,7 @@ def _source_of(what: FlightLog | FlownMission | Plan | str | Path) -> str:
     return what.scenario.name if isinstance(what, Plan) else str(what)
 
 
-def _refuse(source: str, given: Mapping[str, Any], allowed: str) -> None:
+def refuse(source: str, given: Mapping[str, Any], allowed: str) -> None:
     """Refuse keywords that do not go with what is judged.  Raises ScenarioError."""
     for name, value in given.items():
         if value is not None:
@@ -357,12 +370,13 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
     if fences.items or fences.zones:
         setup = replace(setup.in_scenario(fences.on_scenario(setup.scenario)), mission=fences.on_mission(setup.mission))
     if isinstance(flight, FlightLog):
-        return Judged(setup, judge_log(replace(flight, setup=setup)), loss_text(flight), not flight.complete)
+        verdict = judge_log(replace(flight, setup=setup))
+        return Judged(setup, verdict, loss_text(flight), not flight.complete, flight.track)
     verdict = flight.verdict if setup is flight.setup else judge_flight(setup, flight.track, flight.ended)
-    return Judged(setup, verdict)
+    return Judged(setup, verdict, track=flight.track)
 
 
-def _opened(
+def opened_mission(
     mission: Plan | str | Path,
     scenario: str | Path | None,
     terrain: str | Path | None,
@@ -370,6 +384,7 @@ def _opened(
     fence: FencePaths | NamedFences,
     change: ScenarioChange,
 ) -> OpenedMission:
+    """A plan or a mission file, opened with what is asked for; arguments as of `fly`.  Raises PlanflyError."""
     world, ground = (None if name is None else str(name) for name in (scenario, terrain))
     fences = fence if isinstance(fence, NamedFences) else named_fences(fence)
     if isinstance(mission, Plan):

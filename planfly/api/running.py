@@ -23,6 +23,7 @@ from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from planfly.refine import refine as refine_rounds
+from planfly.return_flights import returns_line
 from planfly.stages import stage
 from planfly.targets import RUN_FILES, RUN_FOLDER, filled_pattern, prepare_folder, refuse_folder
 from planner.plan import Plan, plan_json
@@ -42,6 +43,7 @@ class Round:
     folder: where its files are.
     notes: on the mission's route.
     has_log: whether a flight log was written.
+    returns_line: returns from a few places of the flight in a line; "" where nothing was flown.
     """
 
     number: int
@@ -51,6 +53,7 @@ class Round:
     folder: Path
     notes: tuple[str, ...] = ()
     has_log: bool = False
+    returns_line: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +239,9 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             command=task.command, events=flown.events,
         )  # fmt: skip
     notes = tuple(setup.route.notes)
-    return Round(number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=len(flown.track) > 0)
+    line = returns_line(flown.setup, flown.track)
+    has_log = len(flown.track) > 0
+    return Round(number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=line)
 
 
 def _keep(folder: Path, number: int) -> None:

@@ -17,7 +17,7 @@ from planfly.terminal.options import (
     world_options,
 )
 from planfly.terminal.output import give_answer
-from planfly.terminal.results import print_verdict, print_warnings
+from planfly.terminal.results import print_returns, print_verdict, print_warnings
 from world.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ def check(args: argparse.Namespace) -> int:
     give_answer(args, lambda: _document(judged))
     print_warnings([judged.loss] if judged.loss else [])
     print_verdict(judged.verdict, judged.setup.route.notes)
+    print_returns(judged.returns_line)
     if judged.lossy:
         return LOSS
     return verdict_code(judged.verdict)

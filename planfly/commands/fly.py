@@ -11,7 +11,7 @@ from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import call, flight_options, log_rate_option, result_options, world_options
 from planfly.terminal.output import give_answer
-from planfly.terminal.results import print_verdict, print_warnings
+from planfly.terminal.results import print_returns, print_verdict, print_warnings
 
 if TYPE_CHECKING:
     from planfly import FlownMission
@@ -47,6 +47,7 @@ def fly(args: argparse.Namespace) -> int:
     flown = call(planfly.fly, args, log=log, overwrite=args.overwrite or not named)
     print_warnings(flown.mission.warnings)
     print_verdict(flown.verdict, flown.setup.route.notes)
+    print_returns(flown.returns_line)
     if flown.log is None:
         print("log       none: nothing was flown")
     else:

@@ -47,6 +47,7 @@ COMMANDS = (
     Command("fly", _FLY, "FlyAnswer"),
     Command("serve", _FLY),
     Command("check", _LOOK, "VerdictDocument"),
+    Command("returns", _LOOK, "ReturnsAnswer"),
     Command("report", _LOOK, "ReportAnswer"),
     Command("compare", _LOOK, "CompareAnswer"),
     Command("replay", _LOOK, "ReplayAnswer"),

@@ -12,6 +12,7 @@ from logs.recording.recorder import Recorder
 from planfly.airframe import Airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.pipeline import fly_and_judge, make_setup
+from planfly.return_flights import returns_line
 from planner.search.kernel_calls import PARTS, call_kernels
 from world.compile_events import tell_before_compiling
 from world.scenario import Scenario, from_spec
@@ -72,6 +73,7 @@ def _fly() -> None:
     scenario, airframe = _world()
     setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
     flown = fly_and_judge(setup, airframe, None)
+    returns_line(setup, flown.track)
     with Recorder(Path(os.devnull), setup) as recorder:
         recorder.write(flown.track)
         recorder.finish(flown.ended, flown.verdict)

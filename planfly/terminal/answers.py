@@ -9,7 +9,11 @@ from pydantic.dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
 from logs.verdict.findings import Verdict, verdict_json
+from logs.verdict.returns.judge_returns import ReturnRange
+from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.aircraft import AircraftNumbers
+from planfly.api.returning import ReturnsFound, Suggested
+from world.frames import to_geo
 
 # ----------------------------------------------------------------------
 # What ``verdict.json`` holds, as data that a JSON schema is made of.
@@ -570,6 +574,130 @@ class ReflyAnswer:
     exit_code: int
     lines: list[str]
     files: list[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class CauseEntry:
+    """What can take the aircraft off its mission."""
+
+    name: str
+    does: str
+    """return, land, on, circle, glide, parachute, terminate, level or guided."""
+    parameter: str
+    """That decides it; empty where none does."""
+    value: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ReturnEntry:
+    """Seconds in a row whose returns go to the same place and come to the same; numbers are of the worst of them."""
+
+    first_s: float
+    last_s: float
+    count: int
+    kind: str
+    """ground, threat, zone, lost, energy, unknown, low or safe."""
+    target: str
+    """home, or a rally point by its number."""
+    reason: str
+    """Why there; empty where there is nothing to choose."""
+    worst_at_s: float
+    clearance_m: float | None
+    clearance_east_m: float | None
+    clearance_north_m: float | None
+    outside_m: float | None
+    """Least distance outside a missile's sphere; null where there is none."""
+    threat: str | None
+    zone: str | None
+    energy_wh: float | None
+    left_wh: float | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class RallyEntry:
+    """A rally point."""
+
+    lat_deg: float
+    lon_deg: float
+    over_home_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ReturnSuggestion:
+    """What would help."""
+
+    parameters: dict[str, float]
+    rally: list[RallyEntry] | None
+    """In place of the mission's rally points; null leaves those."""
+    safe: int
+    unsafe: int
+    headline: str
+    """What the returns come to with it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ReturnsAnswer:
+    """planfly returns: the returns in ranges of seconds, the worst first."""
+
+    schema: Literal["planfly.returns/1"] = "planfly.returns/1"
+    exit_code: int
+    what: str
+    headline: str
+    safe: bool
+    every_s: float
+    least_clearance_m: float
+    causes: list[CauseEntry]
+    ranges: list[ReturnEntry]
+    suggestions: list[ReturnSuggestion]
+    """Of --suggest."""
+    notes: list[str]
+
+
+def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
+    """A suggestion as an answer has it."""
+    rally = None
+    if one.remedy.rally is not None:
+        rally = []
+        for point in one.remedy.rally:
+            lat, lon = (float(value) for value in to_geo(found.setup.scenario.origin, point.east, point.north))
+            rally.append(
+                RallyEntry(lat_deg=round(lat, 7), lon_deg=round(lon, 7), over_home_m=round(point.up - point.base, 1))
+            )
+    return ReturnSuggestion(
+        parameters=one.remedy.parameters,
+        rally=rally,
+        safe=one.returns.count("safe"),
+        unsafe=len(one.returns.each) - one.returns.count("safe"),
+        headline=headline(one.returns),
+    )
+
+
+def return_entry(found: ReturnsFound, group: ReturnRange) -> ReturnEntry:
+    """A range of returns as an answer has it."""
+    one, scenario = group.worst, found.setup.scenario
+
+    def number(value: float) -> float | None:
+        return round(value, 1) if math.isfinite(value) else None
+
+    return ReturnEntry(
+        first_s=round(group.first, 2),
+        last_s=round(group.last, 2),
+        count=group.count,
+        kind=one.kind,
+        target=one.target.name,
+        reason=one.target.reason,
+        worst_at_s=round(one.time, 2),
+        clearance_m=number(one.clearance),
+        clearance_east_m=number(one.clearance_at[0]),
+        clearance_north_m=number(one.clearance_at[1]),
+        outside_m=number(one.outside),
+        threat=scenario.threats.names[one.threat] if one.kind == "threat" else None,
+        zone=found.returns.airspace.zones[one.zone].name if one.zone >= 0 else None,
+        energy_wh=number(one.energy),
+        left_wh=number(one.left),
+        text=range_text(group, found.returns, scenario),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

@@ -19,6 +19,12 @@ def print_verdict(verdict: "Verdict", notes: Iterable[str]) -> None:
     print("\n".join(verdict_lines(verdict, notes)))
 
 
+def print_returns(line: str) -> None:
+    """How its returns to launch go, in a line; nothing for ""."""
+    if line:
+        print(f"returns   {line} (more: planfly returns)")
+
+
 def print_warnings(warnings: Iterable[str]) -> None:
     """Warnings, on standard error."""
     for warning in warnings:

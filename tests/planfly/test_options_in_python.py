@@ -18,6 +18,7 @@ FUNCTIONS = {
     "fly": ("fly",),
     "serve": ("serve",),
     "check": ("judge", "fly_by_each"),
+    "returns": ("returns",),
     "report": ("report", "foxglove_layout"),
     "compare": ("compare",),
     "replay": ("timeline", "instruments", "movie", "play_to_foxglove", "play_to_stations"),

@@ -26,6 +26,7 @@ VERBS = {
         "check",
         "judge",
         "read_log",
+        "returns",
         "figures",
         "report",
     ),
@@ -46,7 +47,17 @@ RESULTS = {
     *("AircraftNumbers", "BestFound", "CampaignFlight", "CampaignResult", "Comparison", "ExportedFiles", "FlightLog"),
     "IdentifiedAircraft",
     *("FlownMission", "ImportedFlight", "Instruments", "Judged", "Optimiser", "PaperTables", "Plan", "PlanThenFly"),
-    *("Reflown", "Round", "RunResult", "TimelineEntry", "Track", "Verdict", "WindsFound", "WrittenReport"),
+    *(
+        "Reflown",
+        "ReturnsFound",
+        "Round",
+        "RunResult",
+        "TimelineEntry",
+        "Track",
+        "Verdict",
+        "WindsFound",
+        "WrittenReport",
+    ),
 }
 ERRORS = {
     *("PlanflyError", "FlightError", "LogError", "MissionError", "ParameterError", "ScenarioError", "StartError"),

@@ -97,6 +97,14 @@ DEFINITIONS = {
     "rally_limit": Definition("RALLY_LIMIT_KM", 5.0, 0.0, 20_000.0, _KILOMETRE),
     "rally_includes_home": Definition("RALLY_INCL_HOME", 0.0, 0.0, 1.0),
     "rtl_autoland": Definition("RTL_AUTOLAND", 0.0, 0.0, 4.0),
+    "throttle_failsafe": Definition("THR_FAILSAFE", 1.0, 0.0, 2.0),
+    "short_failsafe": Definition("FS_SHORT_ACTN", 0.0, 0.0, 4.0),
+    "long_failsafe": Definition("FS_LONG_ACTN", 0.0, 0.0, 5.0),
+    "station_failsafe": Definition("FS_GCS_ENABL", 0.0, 0.0, 3.0),
+    "low_battery": Definition("BATT_FS_LOW_ACT", 0.0, 0.0, 7.0),
+    "critical_battery": Definition("BATT_FS_CRT_ACT", 0.0, 0.0, 7.0),
+    "fence_enable": Definition("FENCE_ENABLE", 0.0, 0.0, 2.0),
+    "fence_action": Definition("FENCE_ACTION", 1.0, 0.0, 8.0),
 }
 # Bit of FLIGHT_OPTIONS that has a return climb to its height before it turns.
 CLIMB_BEFORE_TURN = 1 << 4
@@ -135,6 +143,8 @@ class ArduPilotParameters:
     rally_limit: m, a nearest rally point further away than this is not flown to; 0 for no limit.
     rally_includes_home: 1 where a return goes home if that is nearer than any rally point; 0 where not.
     rtl_autoland: 0 where a return stays in its circle; other values have it land.
+    throttle_failsafe to fence_action: when it leaves its mission by itself, and what it does then; see
+        `flight.autopilots.arduplane.failsafes`.
     """
 
     not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN
@@ -185,6 +195,14 @@ class ArduPilotParameters:
     rally_limit: float = field(init=False)
     rally_includes_home: float = field(init=False)
     rtl_autoland: float = field(init=False)
+    throttle_failsafe: float = field(init=False)
+    short_failsafe: float = field(init=False)
+    long_failsafe: float = field(init=False)
+    station_failsafe: float = field(init=False)
+    low_battery: float = field(init=False)
+    critical_battery: float = field(init=False)
+    fence_enable: float = field(init=False)
+    fence_action: float = field(init=False)
 
     def __post_init__(self) -> None:
         """Take the values to SI."""

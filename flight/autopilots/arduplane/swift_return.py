@@ -52,8 +52,8 @@ Floats = NDArray[np.float64]
 RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up", "roll")
 
 # How a return ended: in its circle for `flight.mission.itinerary.UNLIMITED` s, in the ground, off the elevation data,
-# or neither in three times the time that its way takes.
-CIRCLED, HIT, OFF_GROUND, NEVER = 1, 2, 3, 4
+# neither in three times the time that its way takes, or below the least that was asked of it.
+CIRCLED, HIT, OFF_GROUND, NEVER, CUT = 1, 2, 3, 4, 5
 # What is told of a return.  Heights above ground and distances outside kill spheres, m; -1 for no threat.
 RETURN_FLOWN = record_dtype(
     ("ended", np.int64),
@@ -237,11 +237,13 @@ def fly_returns(
     around: Surroundings,
     *,
     keep: bool = False,
+    least: tuple[Floats, Floats] | None = None,
 ) -> SwiftReturns:
     """Fly a return from each of n starts.
 
     starts: (n,) of `RETURN_START`.  targets: n circles, where each of them goes.
     keep: whether their ways are kept.
+    least: (n,) heights above ground and (n,) distances outside spheres, m, below which a return need not be flown on.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import load_parameters
@@ -269,12 +271,14 @@ def fly_returns(
     flown = np.zeros(len(starts), RETURN_FLOWN)
     longest = int(max((_most_seconds(s, e, aircraft) for s, e in zip(starts, ends, strict=True)), default=0.0)) + 2
     way = np.zeros((longest if keep else 0, 3))
-    ways = []
+    ways, law = [], parameters.record()
+    floor, apart = (np.full(len(starts), -math.inf),) * 2 if least is None else least
     for k in range(len(starts)):
         most = _most_seconds(starts[k], ends[k], aircraft)
         _fly_return(
-            starts[k], ends[k], parameters.record(), aircraft.record, aircraft.excess, aircraft.power, around.heights,
-            around.to_pixel, around.spheres, around.radii, around.known, most, way, flown[k],
+            starts[k], ends[k], law, aircraft.record, aircraft.excess, aircraft.power, around.heights,
+            around.to_pixel, around.spheres, around.radii, around.known, most,
+            float(floor[k]), float(apart[k]), way, flown[k],
         )  # fmt: skip
         if keep:
             ways.append(way[: int(flown[k]["rows"])].copy())
@@ -291,7 +295,8 @@ def _most_seconds(start: Record, end: Record, aircraft: PointMass) -> float:
 @compiled
 def _fly_return(
     start: Record, end: Record, parameters: Record, aircraft: Record, excess: Floats, power: Floats, heights: Heights,
-    to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float, way: Floats, out: Record,
+    to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float, floor: float,
+    apart: float, way: Floats, out: Record,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Fly one return for ``most`` s at the longest, and fill in what is told of it."""
     waypoints = np.zeros(2, WAYPOINT)
@@ -318,6 +323,8 @@ def _fly_return(
             out.to_circle = time
         out.seconds = time
         _look(estimated, time, heights, to_pixel, spheres, radii, known, out)
+        if out.ended == NEVER and (out.clearance < floor or out.outside < apart):
+            out.ended = CUT
         if out.ended != NEVER:
             break
         if circled > 0.0 or (distance < near and abs(estimated.up - b.up) < AT_HEIGHT):

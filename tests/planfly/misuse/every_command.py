@@ -55,6 +55,7 @@ EVERY = {
         Given(("fly", "short.waypoints", "--scenario", "field.toml", "--log", "new.mcap"), (0, 4), "new.mcap"),
         Given(("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")),
         Given(("check", "flight.mcap", "--json", "new.json"), (0, 4), "new.json"),
+        Given(("returns", "plan.json", "--every", "20", "--json", "new.json"), (0, 4), "new.json"),
         Given(("report", "flight.mcap", "--out", "out"), (0, 4), "out"),
         Given(("compare", "flight.mcap", "flight.mcap", "--out", "out"), target="out"),
         Given(("replay", "flight.mcap", "--speed", "1000")),

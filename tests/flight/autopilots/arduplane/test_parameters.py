@@ -107,13 +107,13 @@ def test_a_file_comes_before_the_aircraft_and_that_before_the_defaults(tmp_path:
     assert load_parameters(aircraft) == default_parameters()
     (tmp_path / "ardupilot.parm").write_text("WP_RADIUS 70\nROLL_LIMIT_DEG 30\nSERVO1_FUNCTION 4\n", encoding="utf-8")
     mine = tmp_path / "mine.param"
-    mine.write_text("WP_RADIUS 50\nFS_LONG_ACTN 0\n", encoding="utf-8")
+    mine.write_text("WP_RADIUS 50\nSERIAL1_BAUD 57\n", encoding="utf-8")
     found = load_parameters(aircraft, mine)
     assert found.by_origin("file") == {"WP_RADIUS": 50.0}
     assert found.by_origin("aircraft") == {"ROLL_LIMIT_DEG": 30.0}
     assert found.by_origin("default")["NAVL1_PERIOD"] == 17.0
     # Of the file that a person gave; the aircraft's own holds what its servos need, too.
-    assert (found.unused, found.source) == (("FS_LONG_ACTN",), str(mine))
+    assert (found.unused, found.source) == (("SERIAL1_BAUD",), str(mine))
 
 
 def test_the_record_holds_every_field() -> None:

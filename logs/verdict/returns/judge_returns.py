@@ -1,0 +1,377 @@
+"""Is every return to launch safe?  Each start is flown home by ArduPlane's law, and what it meets is judged.
+
+A return is flown on a point mass (`flight.autopilots.arduplane.swift_return`), in the mean wind.  Those of which that
+could be wrong are flown again in JSBSim by whoever asks, and what was wrong is set right for all like them.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft, find_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
+from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane.swift_return import (
+    HIT,
+    NEVER,
+    OFF_GROUND,
+    PointMass,
+    Surroundings,
+    fly_returns,
+    point_mass,
+    surroundings,
+)
+from flight.mission.placing import return_places
+from flight.mission.return_path import ReturnCircle, ReturnPlace, ReturnTarget, choose_target
+from flight.simulation.setup import FlightSetup
+from logs.verdict.measures.path_moves import MOVE
+from logs.verdict.measures.route_requirements import Airspace, airspace_of
+from logs.verdict.measures.zone_visits import path_zones
+from logs.verdict.returns.return_starts import ReturnStarts
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE, RESERVE
+from world.errors import MissionError
+from world.kernels import Record, Records
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+# What a return comes to, the worst first: it hits the ground, enters a missile's sphere, goes into a zone or out of
+# one, does not arrive, takes more energy than there is, leaves the elevation data, comes lower than the least height
+# above ground; or is safe.
+Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "low", "safe"]
+KINDS: tuple[Kind, ...] = ("ground", "threat", "zone", "lost", "energy", "unknown", "low", "safe")
+# What of them nobody would call a return that went well.
+UNSAFE = frozenset(KINDS[:5])
+
+# Nearer than this (m) to a limit the point mass could be wrong: it is within 7 m of 38 flights of ArduPlane.
+UNSURE = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnFlown:
+    """One return.
+
+    time: s of the flight at which it begins.  start: (3,) m.
+    target: where it goes, and why there.
+    kind: what it comes to.
+    clearance: least height above ground, m, NaN where that is not known; clearance_at: (3,) m, where.
+    outside: least distance outside a kill sphere, m, inf for none; threat: which, -1 for none.
+    zone: which zone it goes wrong at, an index of `Returns.airspace`, -1 for none.
+    energy: that it takes, Wh; left: what is left then, Wh; NaN where it is not known.
+    seconds: to its circle, NaN where it does not get there.
+    """
+
+    time: float
+    start: tuple[float, float, float]
+    target: ReturnTarget
+    kind: Kind
+    clearance: float
+    clearance_at: tuple[float, float, float]
+    outside: float
+    threat: int
+    zone: int
+    energy: float
+    left: float
+    seconds: float
+
+    @property
+    def safe(self) -> bool:
+        """Whether nothing is wrong with it."""
+        return self.kind == "safe"
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnRange:
+    """Seconds in a row from which returns go to the same place, and come to the same.
+
+    first, last: s.  count: how many returns.  worst: the worst of them.
+    """
+
+    first: float
+    last: float
+    count: int
+    worst: ReturnFlown
+
+
+@dataclass(frozen=True, slots=True)
+class Returns:
+    """Returns from everywhere on the way.
+
+    each: by their times.  every: s between two.
+    causes: what can take the aircraft off its mission, and what it does then.
+    limit: least height above ground that is asked for, m.
+    airspace: the zones.
+    reserve: energy that has to be left, Wh.
+    flown: whether they begin on a flown track; on the planned path otherwise.
+    again: of those that were flown again in JSBSim, the clearance there less the one on the point mass, m.
+    stands_in: whether ArduPlane's law stands in for an autopilot that has none of its own for this.
+    """
+
+    each: tuple[ReturnFlown, ...]
+    every: float
+    causes: tuple[Cause, ...]
+    limit: float
+    airspace: Airspace
+    reserve: float
+    flown: bool
+    again: tuple[float, ...] = ()
+    stands_in: bool = False
+
+    @property
+    def unsafe(self) -> tuple[ReturnFlown, ...]:
+        """Those of `UNSAFE`."""
+        return tuple(one for one in self.each if one.kind in UNSAFE)
+
+    def count(self, kind: Kind) -> int:
+        """How many come to this."""
+        return sum(one.kind == kind for one in self.each)
+
+    @property
+    def ranges(self) -> tuple[ReturnRange, ...]:
+        """All in ranges of seconds, the worst first."""
+        found = []
+        for _, group in groupby(self.each, _likeness):
+            ones = list(group)
+            found.append(ReturnRange(ones[0].time, ones[-1].time, len(ones), min(ones, key=badness)))
+        return tuple(sorted(found, key=lambda one: (*badness(one.worst), one.first)))
+
+
+def _likeness(one: ReturnFlown) -> tuple[object, ...]:
+    """Equal for returns that are told together."""
+    goes = (one.kind, one.target.name)
+    return (*goes, one.threat, one.zone) if one.kind in ("threat", "zone") else goes
+
+
+def badness(one: ReturnFlown) -> tuple[int, float]:
+    """By what returns are ordered, the worst first."""
+    measure = one.outside if one.kind == "threat" else one.left if one.kind == "energy" else one.clearance
+    return KINDS.index(one.kind), math.inf if math.isnan(measure) else measure
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnWorld:
+    """All that decides returns but where they begin.
+
+    parameters: of ArduPlane.  home, rally: on the map.
+    aircraft: as a point mass.  around: ground and spheres.
+    """
+
+    setup: FlightSetup
+    parameters: ArduPilotParameters
+    home: ReturnPlace
+    rally: tuple[ReturnPlace, ...]
+    aircraft: PointMass
+    around: Surroundings
+    airspace: Airspace
+    stands_in: bool = False
+
+    @property
+    def scenario(self) -> Scenario:
+        """The setup's."""
+        return self.setup.scenario
+
+    @property
+    def limit(self) -> float:
+        """Least height above ground, m."""
+        return self.setup.limits.min_clearance
+
+    def target(self, row: Record) -> ReturnTarget:
+        """Where a return from a start goes."""
+        rules = ArduPlane(self.parameters).return_rules
+        here = (float(row["east"]), float(row["north"]), float(row["up"]))
+        return choose_target(rules, here, self.home, self.rally)
+
+    def with_parameters(self, **values: float) -> "ReturnWorld":
+        """The same with other parameters, by ArduPlane's names and in its units."""
+        return replace(self, parameters=self.parameters.changed(**values))
+
+    def with_rally(self, rally: Sequence[ReturnPlace]) -> "ReturnWorld":
+        """The same with other rally points."""
+        return replace(self, rally=tuple(rally))
+
+
+def return_world(setup: FlightSetup) -> ReturnWorld:
+    """What decides the returns of a setup's mission.
+
+    The law is ArduPlane's, with the setup's parameters where it has any, with the aircraft's otherwise.
+    Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
+    """
+    places = return_places(setup.mission, setup.scenario.origin, setup.scenario.terrain)
+    if not places:
+        source = setup.mission.source
+        message = f"{source}: home: none is stated, so there is nowhere to return to"
+        raise MissionError(message, file=source, field="home")
+    aircraft: Aircraft = find_aircraft(setup.aircraft)
+    own = setup.autopilot.law.parameters
+    parameters = own if isinstance(own, ArduPilotParameters) else load_parameters(aircraft)
+    return ReturnWorld(
+        setup,
+        parameters,
+        places[0],
+        places[1:],
+        point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind),
+        surroundings(setup.scenario),
+        airspace_of(setup),
+        own is not parameters,
+    )
+
+
+# What flies a return in JSBSim: least height above ground and least distance outside a kill sphere, m; None where it
+# cannot be flown.
+FlyAgain = Callable[[ReturnWorld, Record], tuple[float, float] | None]
+# Returns that are flown again, at most.
+MOST_AGAIN = 4
+
+
+def judge_returns(
+    world: ReturnWorld, starts: ReturnStarts, every: float, fly_again: FlyAgain | None = None, most: int = MOST_AGAIN
+) -> Returns:
+    """Fly and judge the return from each start.
+
+    every: s between them.  fly_again: flies a return in JSBSim; None for no such flights.  most: of them.
+    """
+    ends = [world.target(row) for row in starts.rows]
+    flown, ways = fly_home(world, starts, ends)
+    each = [
+        _judged(world, starts, k, ends[k], flown[k], ways[k] if ways else np.zeros((0, 3))) for k in range(len(starts))
+    ]
+    again: list[float] = []
+    if fly_again is not None:
+        each, again = _set_right(world, starts, each, flown, fly_again, most)
+    law = world.parameters
+    setup = world.setup
+    return Returns(
+        each=tuple(each),
+        every=every,
+        causes=failsafe_causes(law, has_fence=bool(setup.mission.fences)),
+        limit=world.limit,
+        airspace=world.airspace,
+        reserve=RESERVE * setup.battery,
+        flown=starts.flown,
+        again=tuple(again),
+        stands_in=world.stands_in,
+    )
+
+
+def fly_home(
+    world: ReturnWorld,
+    starts: ReturnStarts,
+    ends: Sequence[ReturnTarget],
+    least: tuple[Floats, Floats] | None = None,
+) -> tuple[Records, tuple[Floats, ...]]:
+    """Returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their ways where there are zones to meet.
+
+    least: as of `flight.autopilots.arduplane.swift_return.fly_returns`.
+    """
+    radius = ArduPlane(world.parameters).return_rules.radius
+    circles = [ReturnCircle(*end.position, radius, end.slope_base) for end in ends]
+    keep = bool(world.airspace.zones)
+    found = fly_returns(starts.rows, circles, world.parameters, world.aircraft, world.around, keep=keep, least=least)
+    return found.flown, found.ways
+
+
+def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float) -> Kind:
+    """What a flown return comes to.
+
+    zone: that it goes wrong at, -1 for none.  left: Wh in the end, NaN where it is not known.
+    """
+    if flown["ended"] == HIT:
+        return "ground"
+    if flown["threat"] >= 0 and flown["outside"] <= 0.0:
+        return "threat"
+    if zone >= 0:
+        return "zone"
+    if flown["ended"] == NEVER:
+        return "lost"
+    if left < RESERVE * world.setup.battery:
+        return "energy"
+    if flown["ended"] == OFF_GROUND or math.isnan(flown["clearance"]):
+        return "unknown"
+    return "low" if flown["clearance"] < world.limit - CLEARANCE_TOLERANCE else "safe"
+
+
+def _judged(
+    world: ReturnWorld, starts: ReturnStarts, k: int, target: ReturnTarget, flown: Record, way: Floats
+) -> ReturnFlown:
+    zone = zone_met(world, way) if len(way) > 1 else -1
+    guessed = world.setup.envelope.battery_guessed and world.scenario.flight.battery_wh is None
+    used = 0.0 if math.isnan(starts.used[k]) else float(starts.used[k])
+    left = math.nan if guessed else float(world.setup.battery - used - flown["energy"])
+    row = starts.rows[k]
+    return ReturnFlown(
+        time=float(starts.time[k]),
+        start=(float(row["east"]), float(row["north"]), float(row["up"])),
+        target=target,
+        kind=kind_of(world, flown, zone, left),
+        clearance=float(flown["clearance"]),
+        clearance_at=tuple(float(flown[f"clearance_{axis}"]) for axis in ("east", "north", "up")),  # type: ignore[arg-type]
+        outside=float(flown["outside"]),
+        threat=int(flown["threat"]),
+        zone=zone,
+        energy=float(flown["energy"]),
+        left=left,
+        seconds=float(flown["to_circle"]),
+    )
+
+
+def zone_met(world: ReturnWorld, way: Floats) -> int:
+    """The zone that a way (t, 3) goes furthest wrong at, -1 for none."""
+    step = np.diff(way, axis=0)
+    moves: Records = np.zeros(len(step), MOVE)
+    run = np.hypot(step[:, 0], step[:, 1])
+    for axis, name in enumerate(("east", "north", "up")):
+        moves[name] = way[:-1, axis]
+    moves["course_east"] = np.divide(step[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["course_north"] = np.divide(step[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["length"], moves["climb"], moves["lasts"] = run, step[:, 2], 1.0
+    moves["time"] = np.arange(len(step))
+    visits = path_zones(moves, world.airspace.records, world.scenario.terrain)
+    worst = int(np.argmax(visits["depth"]))
+    return worst if visits[worst]["depth"] > 0.0 else -1
+
+
+# ----------------------------------------------------------------------
+# Returns that the point mass could have wrong, flown again in JSBSim.
+
+
+def _set_right(
+    world: ReturnWorld, starts: ReturnStarts, each: list[ReturnFlown], flown: Records, fly_again: FlyAgain, most: int
+) -> tuple[list[ReturnFlown], list[float]]:
+    """Fly the least sure of each stretch of unsure returns in JSBSim, and move the whole stretch as that one moved."""
+    out, differences = list(each), []
+    by_doubt = groupby(range(len(each)), lambda k: _doubt(world, each[k]) < UNSURE)
+    groups = [list(group) for unsure, group in by_doubt if unsure]
+    groups.sort(key=lambda group: min(_doubt(world, each[k]) for k in group))
+    for group in groups[:most]:
+        k = min(group, key=lambda k: _doubt(world, each[k]))
+        found = fly_again(world, starts.rows[k])
+        if found is None:
+            continue
+        higher, farther = found[0] - each[k].clearance, found[1] - each[k].outside
+        if math.isfinite(higher):
+            differences.append(higher)
+        for j in group:
+            moved = flown[j].copy()
+            moved["clearance"] += higher if math.isfinite(higher) else 0.0
+            moved["outside"] += farther if math.isfinite(farther) else 0.0
+            if each[j].kind in ("ground", "low", "safe"):
+                moved["ended"] = HIT if moved["clearance"] <= 0.0 else 1
+            out[j] = replace(
+                each[j],
+                clearance=float(moved["clearance"]),
+                outside=float(moved["outside"]),
+                kind=kind_of(world, moved, each[j].zone, each[j].left),
+            )
+    return out, differences
+
+
+def _doubt(world: ReturnWorld, one: ReturnFlown) -> float:
+    """How near to what decides it a return comes, m: the ground, the least height above it, or a kill sphere."""
+    near = [abs(one.clearance), abs(one.clearance - world.limit), abs(one.outside)]
+    return min(value for value in near if not math.isnan(value)) if one.kind not in ("zone", "unknown") else math.inf

@@ -1,0 +1,137 @@
+"""Where on its way an aircraft may be called home: one place for each second of a flight, or of a planned path."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY, ground_speed
+from flight.autopilots.arduplane.swift_return import RETURN_START
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import ROLL, Track
+from logs.verdict.measures.path_moves import path_moves
+from world.geometry import leg_courses
+from world.kernels import Records
+
+Floats = NDArray[np.float64]
+
+# Velocities of a track that holds none are taken over this long, s.
+_OVER = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnStarts:
+    """Where returns begin.
+
+    time: (n,) s.  rows: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.
+    used: (n,) energy used until then, Wh; NaN where it is not known.
+    flown: whether they are of a flown track, and not of the planned path.
+    """
+
+    time: Floats
+    rows: Records
+    used: Floats
+    flown: bool
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.time)
+
+    def at(self, chosen: NDArray[np.intp]) -> "ReturnStarts":
+        """Some of them."""
+        return ReturnStarts(self.time[chosen], self.rows[chosen], self.used[chosen], self.flown)
+
+
+def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts:
+    """Places of a track every so many seconds, up to where it returns to launch itself.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> starts = flown_starts(log.setup, log.track, 0.5)
+    >>> starts.flown, float(starts.time[0]), bool((np.diff(starts.time) > 0.4).all())
+    (True, 0.0, True)
+    """
+    whole = np.isfinite(track.position).all(axis=1) & np.isfinite(track.time)
+    if setup.route.return_from >= 0 and setup.source is None:
+        whole &= track.leg < setup.route.return_from
+    known = np.flatnonzero(whole)
+    if not known.size:
+        return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), True)
+    time = track.time[known]
+    wanted = np.arange(time[0], time[-1] + 1e-9, every)
+    # The nearest row; a pause in a log has none.
+    rows = known[np.unique(np.searchsorted(time, wanted - 1e-9).clip(0, len(known) - 1))]
+    velocity = _velocities(track, rows)
+    roll = track.attitude[rows, ROLL].astype(np.float64)
+    energy = track.energy[rows].astype(np.float64)
+    return ReturnStarts(track.time[rows], _records(track.position[rows], velocity, np.nan_to_num(roll)), energy, True)
+
+
+def _velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
+    """Velocities over the ground (n, 3) at rows; by the places around them where the track holds none."""
+    velocity = track.velocity[rows].astype(np.float64)
+    for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
+        near = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _OVER)
+        first, last = (near[0], near[-1]) if near.size else (rows[k], rows[k])
+        lasts = float(track.time[last] - track.time[first])
+        velocity[k] = (track.position[last] - track.position[first]) / lasts if lasts > 0.0 else 0.0
+    return np.asarray(np.nan_to_num(velocity))
+
+
+def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
+    """Places of the planned path every so many seconds, up to where it returns to launch itself; nothing was used.
+
+    >>> from logs.recording.example_log import example_log
+    >>> starts = planned_starts(example_log().setup, 1.0)
+    >>> bool(starts.rows["velocity_north"][0] > 0.0), starts.flown
+    (True, False)
+    """
+    route = setup.route
+    last = route.return_from - 1 if route.return_from >= 0 else route.legs - 1
+    moves = path_moves(setup.path, _ground_speeds(setup), 0, last)
+    moves = moves[moves["leg"] <= last]
+    if not len(moves):
+        return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), False)
+    times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), every)
+    at = np.searchsorted(moves["time"], times, side="right") - 1
+    move = moves[at]
+    share = np.clip((times - move["time"]) / np.maximum(1e-9, move["lasts"]), 0.0, 1.0)
+    run, turned = share * move["length"], share * move["length"] * move["curvature"]
+    bent = move["curvature"] != 0.0
+    curvature = np.where(bent, move["curvature"], 1.0)
+    ahead = np.where(bent, np.sin(turned) / curvature, run)
+    aside = np.where(bent, (1.0 - np.cos(turned)) / curvature, 0.0)
+    ce, cn = move["course_east"], move["course_north"]
+    position = np.stack(
+        [
+            move["east"] + ahead * ce + aside * cn,
+            move["north"] + ahead * cn - aside * ce,
+            move["up"] + (move["climb"] + move["bend"] * share) * share,
+        ],
+        axis=1,
+    )
+    speed = move["length"] / np.maximum(1e-9, move["lasts"])
+    east, north = ce * np.cos(turned) + cn * np.sin(turned), cn * np.cos(turned) - ce * np.sin(turned)
+    rise = (move["climb"] + 2.0 * move["bend"] * share) / np.maximum(1e-9, move["lasts"])
+    velocity = np.stack([speed * east, speed * north, rise], axis=1)
+    bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
+    return ReturnStarts(times, _records(position, velocity, bank), np.full(len(times), np.nan), False)
+
+
+def _ground_speeds(setup: FlightSetup) -> Floats:
+    """On each leg in the mean wind, m/s; the airspeed where the wind leaves none."""
+    route, found = setup.route, []
+    courses = leg_courses(route.waypoints)
+    for leg, speed in enumerate(route.airspeed.tolist()):
+        wind = setup.scenario.wind.along(float(courses[leg]), float(route.waypoints[leg, 2]))
+        over = ground_speed(speed, *wind)
+        found.append(over if over > 0.0 else speed)
+    return np.array(found)
+
+
+def _records(position: Floats, velocity: Floats, roll: Floats) -> Records:
+    rows: Records = np.zeros(len(position), RETURN_START)
+    for k, name in enumerate(("east", "north", "up")):
+        rows[name], rows[f"velocity_{name}"] = position[:, k], velocity[:, k]
+    rows["roll"] = roll
+    return rows

@@ -1,0 +1,131 @@
+"""Returns in words."""
+
+import math
+from collections.abc import Sequence
+
+from flight.autopilots.arduplane.failsafes import Cause
+from flight.mission.return_path import ReturnPlace
+from logs.verdict.returns.judge_returns import KINDS, Kind, ReturnFlown, ReturnRange, Returns
+from logs.verdict.returns.suggest_returns import Remedy
+from world.frames import to_geo
+from world.scenario import Scenario
+
+# What a number of returns does.
+_MANY: dict[Kind, str] = {
+    "ground": "hit the ground",
+    "threat": "enter a missile's sphere",
+    "zone": "violate a zone",
+    "lost": "do not arrive",
+    "energy": "take more energy than may be used",
+    "unknown": "leave the elevation data",
+    "low": "come lower than {limit:.0f} m above ground",
+}
+_DOES = {
+    "return": "returns",
+    "land": "goes to its landing sequence, or else returns",
+    "on": "goes on with its mission",
+    "circle": "circles where it is",
+    "glide": "glides straight on without its motor, which is no return",
+    "parachute": "releases its parachute",
+    "terminate": "ends its flight there",
+    "level": "flies level straight on, which is no return",
+    "guided": "circles at the fence's return point",
+}
+
+
+def counts_text(returns: Returns) -> str:
+    """How many returns come to what, the worst first; "" where all are safe."""
+    counted = [(returns.count(kind), _MANY[kind].format(limit=returns.limit)) for kind in KINDS if kind != "safe"]
+    return ", ".join(f"{count} {what}" for count, what in counted if count)
+
+
+def headline(returns: Returns) -> str:
+    """All returns in a line.
+
+    >>> from logs.verdict.measures.route_requirements import Airspace
+    >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
+    'no place to return from'
+    """
+    total = len(returns.each)
+    if not total:
+        return "no place to return from"
+    wrong = counts_text(returns)
+    if wrong:
+        safe = returns.count("safe")
+        return f"of {total} returns {wrong}; {safe} {'is' if safe == 1 else 'are'} safe"
+    lowest = min(returns.each, key=lambda one: one.clearance)
+    left = min((one.left for one in returns.each if not math.isnan(one.left)), default=math.nan)
+    energy = "" if math.isnan(left) else f", and {left:.0f} Wh are left at the least"
+    return f"all {total} returns are safe: never lower than {lowest.clearance:.0f} m above ground{energy}"
+
+
+def causes_text(causes: tuple[Cause, ...]) -> list[str]:
+    """What makes the aircraft return, and what does not, two lines.
+
+    >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
+    >>> from flight.autopilots.arduplane.parameters import default_parameters
+    >>> made = default_parameters().changed(FS_GCS_ENABL=1, FS_LONG_ACTN=1)
+    >>> for line in causes_text(failsafe_causes(made, has_fence=False)):
+    ...     print(line)
+    it returns: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
+    it does not: battery low: goes on with its mission (BATT_FS_LOW_ACT 0); battery critical: goes on with its ...
+    """
+
+    def stated(cause: Cause) -> str:
+        return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
+
+    back = [f"{cause.name}{stated(cause)}" for cause in causes if cause.returns]
+    lines = [f"it returns: {', '.join(back)}"] if back else []
+    others = [f"{cause.name}: {_DOES[cause.does]}{stated(cause)}" for cause in causes if not cause.returns]
+    return lines + ([f"it does not: {'; '.join(others)}"] if others else [])
+
+
+def range_text(found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
+    """A range of seconds: where its returns go, what they come to, and the worst of them."""
+    one = found.worst
+    when = f"{found.first:.0f} s" if found.count == 1 else f"{found.first:.0f} to {found.last:.0f} s"
+    reason = f" ({one.target.reason})" if one.target.reason else ""
+    return f"{when}: to {one.target.name}{reason}: {_outcome(one, found, returns, scenario)}"
+
+
+def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
+    worst = "" if found.count == 1 else f"at worst from {one.time:.0f} s, "
+    east, north, up = one.clearance_at
+    where = f"{east:.0f} m east, {north:.0f} m north"
+    digits = 1 if round(one.clearance) == round(returns.limit) else 0
+    low = f"{one.clearance:.{digits}f} m above ground at {where}"
+    match one.kind:
+        case "ground":
+            return f"{worst}hits the ground at {where}, {up:.0f} m AMSL"
+        case "threat":
+            return f"{worst}{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}"
+        case "zone":
+            return f"{worst}violates zone {returns.airspace.zones[one.zone].name}"
+        case "lost":
+            return f"{worst}does not get to its circle at {one.target.position[2]:.0f} m AMSL"
+        case "energy":
+            leaves = f"leaves {one.left:.0f} Wh, where {returns.reserve:.0f} Wh are to be left"
+            return f"{worst}takes {one.energy:.0f} Wh and {leaves}"
+        case "unknown":
+            return f"{worst}flies where the elevation is not known"
+    left = "" if math.isnan(one.left) else f", {one.left:.0f} Wh left"
+    outside = "" if math.isinf(one.outside) else f", {one.outside:.0f} m outside every missile's sphere"
+    return f"{worst}{low} at the least{outside}{left}"
+
+
+def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
+    """What is suggested, and what its returns come to."""
+    changed = [f"{name} {value:g}" for name, value in remedy.parameters.items()]
+    if remedy.rally is not None:
+        many = "rally point" if len(remedy.rally) == 1 else "rally points"
+        changed.append(f"{len(remedy.rally)} {many} ({'; '.join(rally_texts(remedy.rally, scenario))})")
+    return f"{' and '.join(changed)}: {headline(returns)}"
+
+
+def rally_texts(rally: Sequence[ReturnPlace], scenario: Scenario) -> list[str]:
+    """Latitude, longitude and height over home of rally points, as a ground station takes them."""
+    out = []
+    for point in rally:
+        lat, lon = (float(value) for value in to_geo(scenario.origin, point.east, point.north))
+        out.append(f"{lat:.7f}, {lon:.7f}, {point.up - point.base:.0f} m over home")
+    return out

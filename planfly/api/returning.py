@@ -1,0 +1,197 @@
+"""Will it come home?  The return to launch from everywhere on the way of a mission, a plan or a flight."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flight.simulation.setup import FlightSetup, VerticalDatum
+from flight.simulation.track import Track
+from logs.importers.open_log import is_imported_log
+from logs.recording.reader import FlightLog, read_log
+from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
+from logs.verdict.returns.returns_text import causes_text, headline, range_text, remedy_text
+from logs.verdict.returns.suggest_returns import Remedy, suggest_parameters, suggest_rally
+from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
+from planfly.api.planning import Wind, changed_scenario
+from planfly.arguments import check_arguments
+from planfly.first_start import with_warm_up
+from planfly.kernel_units.unit_kernels import FLYING
+from planfly.open_mission import is_log
+from planfly.pipeline import fly_and_judge
+from planfly.return_flights import fly_return, return_starts
+from planfly.stages import stage
+from planner.plan import Plan
+from world.scenario import over_terrain
+from world.scenario_tables import Guidance, Navigation
+
+if TYPE_CHECKING:
+    from planfly.imported_flights import ImportedFlight
+
+
+@dataclass(frozen=True, slots=True)
+class Suggested:
+    """What would help, and the returns that it leads to, by the law, the least sure in JSBSim."""
+
+    remedy: Remedy
+    returns: Returns
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class ReturnsFound:
+    """What `planfly.returns` returns.
+
+    setup: what was flown, and by what.
+    returns: each of them, and in ranges of seconds, the worst first.
+    suggested: what would help, the plainest first, each with the returns that it leads to; none where none was asked.
+    """
+
+    setup: FlightSetup
+    returns: Returns
+    suggested: tuple[Suggested, ...] = ()
+
+    @property
+    def safe(self) -> bool:
+        """Whether every return is."""
+        return bool(self.returns.each) and all(one.safe for one in self.returns.each)
+
+    @property
+    def undecided(self) -> bool:
+        """Whether none is known to be unsafe, and of some it is not known."""
+        return not self.returns.unsafe and not self.returns.count("low") and bool(self.returns.count("unknown"))
+
+    @property
+    def headline(self) -> str:
+        """All of them in a line."""
+        return headline(self.returns)
+
+    @property
+    def lines_of_causes(self) -> tuple[str, ...]:
+        """What makes it return, and what does not."""
+        return tuple(causes_text(self.returns.causes))
+
+    @property
+    def lines_of_ranges(self) -> tuple[str, ...]:
+        """Each range of seconds in words, the worst first."""
+        return tuple(range_text(one, self.returns, self.setup.scenario) for one in self.returns.ranges)
+
+    @property
+    def lines_of_suggestions(self) -> tuple[str, ...]:
+        """What would help, in words, each with what its returns come to."""
+        return tuple(remedy_text(one.remedy, one.returns, self.setup.scenario) for one in self.suggested)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person has to know of how they were flown."""
+        found = ["on a point mass by ArduPlane's law, in the mean wind"]
+        if self.returns.again:
+            most = max(abs(one) for one in self.returns.again)
+            found.append(f"{len(self.returns.again)} of the least sure flown again in JSBSim: up to {most:.0f} m apart")
+        if self.returns.stands_in:
+            found.append(
+                f"{self.setup.autopilot.title} would come home by a law that is not flown here: ArduPlane's stands in"
+            )
+        if self.setup.scenario.external:
+            found.append("the mission came without a scenario: threats are not known")
+        if not self.returns.flown:
+            found.append("from the planned path: nothing was flown, and no energy was used before")
+        return tuple(found)
+
+    def __repr__(self) -> str:
+        return f"<ReturnsFound {self.setup.scenario.name}: {self.headline}>"
+
+
+# Why a flight takes no other world.
+_AS_FLOWN = "a flight's returns are flown as it was flown; only `terrain` replaces its ground"
+
+
+@with_warm_up(*FLYING)
+def returns(
+    what: FlightLog | FlownMission | Plan | str | Path,
+    *,
+    every: float = 1.0,
+    suggest: bool = False,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    seed: int | None = None,
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
+    nav: Navigation | None = None,
+    plan: str | Path | None = None,
+    flight: int | None = None,
+    datum: VerticalDatum | None = None,
+) -> ReturnsFound:
+    """Fly the return to launch from everywhere on the way, and judge each.
+
+    what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: what `planfly.fly`
+    gave, a flight log or its path, or an autopilot's log.
+    every: s between two returns.  suggest: whether to look for what would make all of them safe.
+    scenario, terrain, fence, seed, wind, turbulence, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
+    plan or mission, as of `planfly.fly`; of a flight only terrain.
+    plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
+
+    Raises a `planfly.PlanflyError` for bad input, and for a mission without a home.
+
+    >>> import planfly
+    >>> found = planfly.returns(planfly.plan("jacksboro", seed=1), every=20)
+    >>> found.safe, found.returns.count("ground") > 0, found.returns.ranges[0].worst.target.name
+    (False, True, 'home')
+    """
+    check_arguments(every=every, seed=seed, flight=flight, datum=datum)
+    given: dict[str, Any] = {
+        "scenario": scenario, "fence": fence or None, "wind": wind, "turbulence": turbulence, "aircraft": aircraft,
+        "airspeed": airspeed, "params": params, "guidance": guidance, "autopilot_law": autopilot_law,
+    }  # fmt: skip
+    other, of_log = {"seed": seed, "nav": nav}, {"plan": plan, "flight": flight, "datum": datum}
+    path = Path(what) if isinstance(what, str | Path) else None
+    if path is not None and is_imported_log(path):
+        refuse(str(path), other, _AS_FLOWN)
+        found = _imported(path, terrain=terrain, **{**given, **of_log, "fence": fence})
+        return _judged(found.setup, found.track, every, suggest)
+    refuse(str(path or "mission"), of_log, "goes with an imported log")
+    if path is not None and is_log(path):
+        what = read_log(path)
+    if isinstance(what, FlightLog | FlownMission):
+        refuse(str(path or "flight"), given | other, _AS_FLOWN)
+        return _judged(_over(what.setup, terrain), what.track, every, suggest)
+    changes = {name: value for name, value in given.items() if name not in ("scenario", "fence")}
+    opened = opened_mission(what, scenario, terrain, seed, fence, partial(changed_scenario, **changes, nav=nav))
+    # Before it is flown, for a mission without a home.
+    return_world(opened.setup)
+    with stage("flying the mission"):
+        track = fly_and_judge(opened.setup, opened.airframe, None, reference=False).track
+    return _judged(opened.setup, track, every, suggest)
+
+
+def _imported(path: Path, **keywords: Any) -> "ImportedFlight":
+    # Imported here: no other call needs the libraries that read other programs' logs.
+    from planfly.api.imported import read_imported
+
+    return read_imported(path, **keywords)
+
+
+def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
+    """A setup with another ground, where one is named."""
+    return setup if terrain is None else setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
+
+
+def _judged(setup: FlightSetup, track: Track | None, every: float, suggest: bool) -> ReturnsFound:
+    world = return_world(setup)
+    starts = return_starts(setup, track, every)
+    with stage(f"flying {len(starts)} returns"):
+        found = ReturnsFound(setup, judge_returns(world, starts, every, fly_return))
+    if not suggest or found.safe or not len(starts):
+        return found
+    with stage("looking for what would make them safe"):
+        remedies = suggest_parameters(world, starts)
+        rally = suggest_rally(world, starts)
+    remedies += [] if rally is None else [rally]
+    with stage(f"flying the returns of {len(remedies)} suggestions"):
+        proved = [Suggested(one, judge_returns(one.on(world), starts, every, fly_return)) for one in remedies]
+    return replace(found, suggested=tuple(proved))

@@ -1,0 +1,98 @@
+"""``planfly returns``: the return to launch from everywhere on the way."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+import planfly
+from planfly.commands.check import LOGS
+from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, completed, files, number
+from planfly.terminal.command_parser import LineParser, coloured
+from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.options import (
+    call,
+    flown_by_options,
+    imported_log_options,
+    json_option,
+    steering_options,
+    world_options,
+)
+from planfly.terminal.output import give_answer
+
+if TYPE_CHECKING:
+    from planfly import ReturnsFound
+
+# Ranges of seconds that are listed.
+_LISTED = 20
+
+
+def returns_options(line: LineParser) -> None:
+    """The parser of ``planfly returns``."""
+    parser = line.command(
+        "returns",
+        "fly the return to launch from everywhere on the way: is each safe, where does it go, and why there?",
+        "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
+        "planfly returns flight.mcap --every 5",
+    )
+    completed(
+        parser.add_argument(
+            "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
+        ),
+        files(*MISSIONS, "mcap", *IMPORTED_LOGS),
+    )
+    group = parser.group("the returns")
+    group.add_argument(
+        "--every", metavar="S", type=number("every"), default=1.0, help="seconds between two returns (default: 1)"
+    )
+    group.add_argument(
+        "--suggest",
+        action="store_true",
+        help="look for the least RTL_ALTITUDE, a climb before the turn or the fewest rally points that make all safe",
+    )
+    imported_log_options(parser)
+    world_options(parser)
+    flown_by_options(parser)
+    steering_options(parser).add_argument(
+        "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: the plan's, or 1)"
+    )
+    json_option(parser.group("results"), "returns")
+
+
+def returns(args: argparse.Namespace) -> int:
+    """Judge every return: 0 for all safe, 4 where one is not, 3 where that is not known."""
+    found = call(planfly.returns, args)
+    code = FLYABLE if found.safe else LOSS if found.undecided else NOT_FLYABLE
+    print(f"returns   {coloured(found.headline, 'good' if found.safe else 'bad')}")
+    for text in found.lines_of_causes:
+        print(f"  {text}")
+    for text in found.lines_of_ranges[:_LISTED]:
+        print(f"  {text}")
+    if len(found.lines_of_ranges) > _LISTED:
+        print(f"  and {len(found.lines_of_ranges) - _LISTED} ranges more; --json FILE has them all")
+    for text in found.lines_of_suggestions:
+        print(coloured("  would help: ", "hint") + text)
+    if args.suggest and not found.safe and not found.suggested:
+        print("  no RTL_ALTITUDE, climb or rally points were found that would help")
+    for text in found.notes:
+        print(f"  note    {text}")
+    give_answer(args, lambda: _answer(str(args.what), found, code))
+    return code
+
+
+def _answer(what: str, found: "ReturnsFound", code: int) -> object:
+    from planfly.terminal.answers import CauseEntry, ReturnsAnswer, return_entry, suggestion_entry
+
+    returns = found.returns
+    return ReturnsAnswer(
+        exit_code=code,
+        what=what,
+        headline=found.headline,
+        safe=found.safe,
+        every_s=returns.every,
+        least_clearance_m=returns.limit,
+        causes=[
+            CauseEntry(name=one.name, does=one.does, parameter=one.parameter, value=one.value) for one in returns.causes
+        ],
+        ranges=[return_entry(found, one) for one in returns.ranges],
+        suggestions=[suggestion_entry(found, one) for one in found.suggested],
+        notes=list(found.notes),
+    )

@@ -1,0 +1,76 @@
+"""``planfly returns``: a mission flown, and its log; what it prints, answers and ends with; bad input."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import planfly
+from planfly.cli import main
+from tests.logs.verdict.returns.hill import SCENARIO, mission_text
+
+
+@pytest.fixture
+def hill(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "hill.toml").write_text(SCENARIO, encoding="utf-8")
+    (tmp_path / "hill.waypoints").write_text(mission_text(), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["returns", "hill.waypoints", "--scenario", "hill.toml", "--every", "20", "--json", "mission.json"]
+    assert main(asked) == 4
+    out = capsys.readouterr().out
+    assert "hit the ground" in out
+    assert "it returns: the pilot's RTL, the mission's end" in out
+    assert "RC lost: goes on with its mission (FS_LONG_ACTN 0)" in out
+    assert "flown again in JSBSim" in out
+    answer = json.loads((hill / "mission.json").read_text(encoding="utf-8"))
+    assert answer["ranges"][0]["kind"] == "ground"
+    assert main(["fly", "hill.waypoints", "--scenario", "hill.toml", "--log", "hill.mcap"]) == 0
+    assert "returns   of " in capsys.readouterr().out
+    assert main(["returns", "hill.mcap", "--every", "20", "--json", "log.json", "--quiet"]) == 4
+    of_log = json.loads((hill / "log.json").read_text(encoding="utf-8"))
+    assert of_log["headline"] == answer["headline"]
+    assert main(["check", "hill.waypoints", "--scenario", "hill.toml"]) == 0
+    assert "returns   of " in capsys.readouterr().out
+
+
+def test_parameters_make_it_safe(hill: Path) -> None:
+    (hill / "mine.parm").write_text("RTL_ALTITUDE 600\nFS_LONG_ACTN 1\nROLL_LIMIT_DEG 30\n", encoding="utf-8")
+    found = planfly.returns("hill.waypoints", scenario="hill.toml", params="mine.parm", every=20)
+    assert found.safe
+    assert any(cause.name == "RC lost" and cause.returns for cause in found.returns.causes)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["none.waypoints"], "none.waypoints"),
+        (["hill.waypoints", "--flight", "2"], "goes with an imported log"),
+        (["homeless.plan"], "home: none is stated"),
+    ],
+)
+def test_bad_input_is_one_line(hill: Path, words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    items = [
+        {"type": "SimpleItem", "command": 16, "frame": 0, "autoContinue": True, "doJumpId": k,
+         "params": [0, 0, 0, None, 46.0, 8.0 + 0.02 * k, 600]}
+        for k in (1, 2)
+    ]  # fmt: skip
+    plan = {"fileType": "Plan", "version": 1, "groundStation": "x", "mission": {"version": 2, "items": items}}
+    (hill / "homeless.plan").write_text(json.dumps(plan), encoding="utf-8")
+    assert main(["returns", *words, "--scenario", "hill.toml"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert said in captured.err
+    assert len(captured.err.strip().splitlines()) == 1
+
+
+def test_seconds_out_of_range_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["returns", "hill.waypoints", "--every", "0"])
+    assert ended.value.code == 2
+    assert "seconds from 0.1 to 3,600 are expected" in capsys.readouterr().err
+    with pytest.raises(planfly.ArgumentError, match="every 4000"):
+        planfly.returns("hill.waypoints", every=4000)
