@@ -162,8 +162,7 @@ def returns(
         return _judged(_over(what.setup, terrain), what.track, every, suggest)
     changes = {name: value for name, value in given.items() if name not in ("scenario", "fence")}
     opened = opened_mission(what, scenario, terrain, seed, fence, partial(changed_scenario, **changes, nav=nav))
-    # Before it is flown, for a mission without a home.
-    return_world(opened.setup)
+    return_world(opened.setup)  # Raises before it is flown.
     with stage("flying the mission"):
         track = fly_and_judge(opened.setup, opened.airframe, None, reference=False).track
     return _judged(opened.setup, track, every, suggest)

@@ -179,6 +179,8 @@ _FLOWN_TO, _FAR = 60, 4500.0
 _CIRCLE = 280.0
 # Rally points of a set; times that a search begins again with what it left unsafe, and with finer candidates there.
 _MOST, _ROUNDS, _FINER = 10, 4, 3
+# Of the best single points, so many are tried with every other one.
+_PAIRS = 30
 
 
 def suggest_rally(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
@@ -298,12 +300,20 @@ class _Search:
         """Candidates that are good for the starts asked, as many as can be; chosen: to begin with."""
         self._fly(asked[~self._known[asked]])
         while len(chosen) < _MOST and self._count(asked, chosen) < len(asked):
-            counts = [self._count(asked, [*chosen, c]) for c in range(len(self.places))]
-            if max(counts) <= self._count(asked, chosen):
+            more = self._longer(asked, chosen)
+            if self._count(asked, more) <= self._count(asked, chosen):
                 break
-            chosen.append(int(np.argmax(counts)))
-            chosen = self._swapped(asked, chosen)
+            chosen = self._swapped(asked, more)
         return self._pruned(asked, chosen)
+
+    def _longer(self, asked: NDArray[np.intp], chosen: list[int]) -> list[int]:
+        """With the best point more; or the best two, where one alone takes away as much as it gives."""
+        every = range(len(self.places))
+        counts = [self._count(asked, [*chosen, c]) for c in every]
+        if max(counts) > self._count(asked, chosen):
+            return [*chosen, int(np.argmax(counts))]
+        first = np.argsort(counts, kind="stable")[::-1][:_PAIRS].tolist()
+        return max(([*chosen, a, c] for a in first for c in every), key=lambda more: self._count(asked, more))
 
     def _fly(self, asked: NDArray[np.intp]) -> None:
         """Fly from starts to their nearest candidates; the others count as bad."""
