@@ -92,11 +92,11 @@ _FEW = 50
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:
-    """Returns from a few places of a flight, or of the planned path, in a line; "" for a mission without a home.
+    """Returns from a few places of a flight, or of the planned path, in a line; "" without a home or a terrain.
 
     Those in JSBSim are left out.
     """
-    if setup.mission.home is None:
+    if setup.mission.home is None or setup.scenario.terrain is None:
         return ""
     try:
         world = return_world(setup)

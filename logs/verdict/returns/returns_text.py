@@ -17,7 +17,7 @@ _MANY: dict[Kind, str] = {
     "zone": "violate a zone",
     "lost": "do not arrive",
     "energy": "take more energy than may be used",
-    "unknown": "leave the elevation data",
+    "unknown": "fly where the ground is not known",
     "low": "come lower than {limit:.0f} m above ground",
 }
 _DOES = {
