@@ -54,6 +54,8 @@ _SHARE, _CRUISE = 0.8, 25.0
 _FIXED = {"side_force": 0.25, "lift_of_rate": 0.4, "lift_of_elevator": 0.4}
 _INERTIA = {"roll_inertia": 0.15, "pitch_inertia": 0.12, "yaw_inertia": 0.12}
 _STEEP = 1.2
+# Either of the missions takes longer than this, s.
+_MISSION_SECONDS = 600.0
 MISSIONS = Path(__file__).parent / "identification_missions"
 
 
@@ -109,8 +111,12 @@ def identify(
     return estimate, logs[-1], time.process_time() - began
 
 
+class NotFlown(Exception):
+    """An aircraft that does not fly missions A and B to their ends."""
+
+
 def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Aircraft]:
-    """Missions A and B by ArduPlane's law, each in a wind of its own and light turbulence."""
+    """Missions A and B by ArduPlane's law, each in a wind of its own and light turbulence.  Raises NotFlown."""
     aircraft = changed_aerosonde(folder / f"v{seed}", truth)
     tracks = []
     for k, file in enumerate(sorted(MISSIONS.glob("*.waypoints"))):
@@ -121,6 +127,8 @@ def fly_missions(folder: Path, truth: Truth, seed: int) -> tuple[list[Track], Ai
             params=str(aircraft.folder / "ardupilot.parm"),
         )  # fmt: skip
         tracks.append(made.track)
+        if made.track.time[-1] < _MISSION_SECONDS:
+            raise NotFlown(f"seed {seed}: {file.name} ended after {made.track.time[-1] / 60.0:.1f} min")
     return tracks, aircraft
 
 
@@ -217,10 +225,18 @@ def main() -> None:
     args = parser.parse_args()
     rows = []
     Path(args.out).parent.mkdir(parents=True, exist_ok=True)
-    for seed in range(args.first, args.first + args.count):
-        rows.append(one_variant(seed, args.repeats, args.shorts, args.sensors, missions=args.missions))
-        print(json.dumps(rows[-1]), flush=True)
-        Path(args.out).write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    seed = args.first
+    while len(rows) < args.count:
+        try:
+            row = one_variant(seed, args.repeats, args.shorts, args.sensors, missions=args.missions)
+        except NotFlown as error:
+            # The next seed takes its place.
+            print(error, flush=True)
+        else:
+            rows.append(row)
+            print(json.dumps(row), flush=True)
+            Path(args.out).write_text(json.dumps(rows, indent=1), encoding="utf-8")
+        seed += 1
     print(json.dumps(summary(rows), indent=1))
 
 
