@@ -91,6 +91,8 @@ class ReturnsFound:
             found.append(
                 f"{self.setup.autopilot.title} would come home by a law that is not flown here: ArduPlane's stands in"
             )
+        if self.setup.scenario.terrain is None:
+            found.append("no terrain was given: --terrain names an elevation file")
         if self.setup.scenario.external:
             found.append("the mission came without a scenario: threats are not known")
         if not self.returns.flown:

@@ -68,7 +68,7 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
     >>> for line in causes_text(failsafe_causes(made, has_fence=False)):
     ...     print(line)
     it returns: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
-    it does not: battery low: goes on with its mission (BATT_FS_LOW_ACT 0); battery critical: goes on with its ...
+    it does not: battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): goes on with its mission
     """
 
     def stated(cause: Cause) -> str:
@@ -76,8 +76,12 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
 
     back = [f"{cause.name}{stated(cause)}" for cause in causes if cause.returns]
     lines = [f"it returns: {', '.join(back)}"] if back else []
-    others = [f"{cause.name}: {_DOES[cause.does]}{stated(cause)}" for cause in causes if not cause.returns]
-    return lines + ([f"it does not: {'; '.join(others)}"] if others else [])
+    others: dict[str, list[str]] = {}
+    for cause in causes:
+        if not cause.returns:
+            others.setdefault(_DOES[cause.does], []).append(f"{cause.name}{stated(cause)}")
+    told = [f"{', '.join(names)}: {does}" for does, names in others.items()]
+    return lines + ([f"it does not: {'; '.join(told)}"] if told else [])
 
 
 def range_text(found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
@@ -92,7 +96,7 @@ def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: S
     worst = "" if found.count == 1 else f"at worst from {one.time:.0f} s, "
     east, north, up = one.clearance_at
     where = f"{east:.0f} m east, {north:.0f} m north"
-    digits = 1 if round(one.clearance) == round(returns.limit) else 0
+    digits = 1 if abs(one.clearance - returns.limit) < 1.0 else 0
     low = f"{one.clearance:.{digits}f} m above ground at {where}"
     match one.kind:
         case "ground":

@@ -24,7 +24,7 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFi
     out = capsys.readouterr().out
     assert "hit the ground" in out
     assert "it returns: the pilot's RTL, the mission's end" in out
-    assert "RC lost: goes on with its mission (FS_LONG_ACTN 0)" in out
+    assert "it does not: RC lost (FS_LONG_ACTN 0), station lost (FS_GCS_ENABL 0), battery low" in out
     assert "flown again in JSBSim" in out
     answer = json.loads((hill / "mission.json").read_text(encoding="utf-8"))
     assert answer["ranges"][0]["kind"] == "ground"
@@ -35,6 +35,13 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFi
     assert of_log["headline"] == answer["headline"]
     assert main(["check", "hill.waypoints", "--scenario", "hill.toml"]) == 0
     assert "returns   of " in capsys.readouterr().out
+
+
+def test_without_terrain_nothing_is_known(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["returns", "hill.waypoints", "--every", "50"]) == 3
+    out = capsys.readouterr().out
+    assert "fly where the ground is not known" in out
+    assert "--terrain names an elevation file" in out
 
 
 def test_parameters_make_it_safe(hill: Path) -> None:
