@@ -421,11 +421,21 @@ class WindTable(ScenarioTable):
     seed: Seed | None = None
 
 
+class ReturnsTable(ScenarioTable):
+    """[returns]: what a verdict asks of the way home from everywhere.
+
+    require: "rtl" where every return to launch has to be safe.
+    """
+
+    require: Annotated[list[Literal["rtl"]], Field(max_length=1)]
+
+
 class ScenarioFile(ScenarioTable):
     """A whole scenario file.
 
     zones: None where there are none, so that what is written of a scenario without them stays as it was.
     zones_file: GeoJSON or KML, one or several; in a made scenario their zones stand among the others.
+    returns: None where nothing is asked of them, as zones.
     """
 
     name: Name
@@ -442,6 +452,7 @@ class ScenarioFile(ScenarioTable):
     planner: PlannerTable = PlannerTable()
     flight: FlightTable = FlightTable()
     wind: WindTable = WindTable()
+    returns: ReturnsTable | None = None
 
     @model_validator(mode="after")
     def _area_where_there_is_no_tile(self) -> "ScenarioFile":

@@ -138,6 +138,7 @@ def test_every_default() -> None:
             "battery_wh": None,
         },
         "wind": {"speed_mps": 0.0, "from_deg": 0.0, "gradient": 0.0, "turbulence": "none", "seed": None},
+        "returns": None,
     }
 
 
@@ -212,6 +213,7 @@ CASES: dict[str, tuple[str, str, str]] = {
     "dive nan": ("", "[limits]\nmax_dive_deg = nan", "limits.max_dive_deg: nan: allowed above 0..below 90"),
     "waypoints": ("", "[planner]\nwaypoints = 2", "planner.waypoints: 2: allowed 3..500"),
     "seed": ("", "[planner]\nseed = -1", "planner.seed: -1: allowed 0..9223372036854775807"),
+    "returns": ("", '[returns]\nrequire = ["land"]', 'returns.require.0: "land": Input should be'),
     "goals": ("", "[planner.goals]\nlength_ratio = 0.5", "planner.goals.length_ratio: 0.5: allowed 1..100"),
     "airspeed": ("", "[flight]\nairspeed_mps = 14", "flight.airspeed_mps: 14: allowed 15..60"),
     "guidance": ("", '[flight]\nguidance = "luck"', 'flight.guidance: "luck"'),

@@ -5,7 +5,8 @@ waypoint and no slope to anybody, and what stands for it in the route is not jud
 area, speed, stall and energy are judged on it as on every other leg.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,8 +16,15 @@ from flight.simulation.tick import AT_HEIGHT, NEAR
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import FLIGHT
+from logs.verdict.returns.judge_returns import judge_returns, return_world
+from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
+from logs.verdict.returns.returns_text import headline
 from logs.verdict.rule import Rule
+from world.errors import MissionError
 
+# Returns that are flown where all are required to be safe, about.
+_MANY = 200
 # Rules that hold a flight to its legs.
 _OF_LEGS = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 
@@ -29,7 +37,8 @@ def return_findings(
     How planfly's own flights ended is known beside their track: `flown_return_findings` judges them.
     """
     if geometric:
-        return _finding(requirements, None, "not flown yet")
+        asked = _required(requirements, partial(planned_starts, requirements.setup))
+        return _finding(requirements, None, "not flown yet") + asked
     if requirements.setup.source is None:
         return []
     return _flown(requirements, aligned is not None and bool(aligned.passed[-1]) and circled(requirements, aligned))
@@ -44,7 +53,30 @@ def flown_return_findings(
     """
     arrived = aligned is not None and bool(aligned.passed[-1]) and ended == "completed"
     why = "" if ended == "completed" else f": {ended}"
-    return _flown(requirements, arrived, why)
+    track = None if aligned is None else aligned.track
+    starts = partial(planned_starts, requirements.setup)
+    if track is not None:
+        starts = partial(flown_starts, requirements.setup, track)
+    return _flown(requirements, arrived, why) + _required(requirements, starts)
+
+
+def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
+    """Whether every return from the way is safe, where the scenario requires it; nothing where it does not.
+
+    starts: makes them, so many seconds apart.
+    """
+    setup = requirements.setup
+    table = setup.scenario.spec.returns
+    if table is None or "rtl" not in table.require:
+        return []
+    every = max(1.0, setup.path.length / setup.airspeed / _MANY)
+    try:
+        returns = judge_returns(return_world(setup), starts(every), every)
+        ok, reason = bool(returns.each) and all(one.safe for one in returns.each), headline(returns)
+    except MissionError as error:
+        ok, reason = False, str(error)
+    method = "each flown on a point mass by ArduPlane's law"
+    return [make_finding("return", FLIGHT, ok=ok, reason=reason, source="scenario", method=method)]
 
 
 def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
@@ -103,7 +135,7 @@ def without_style(
         for item in findings
         if not ((item.rule in _OF_LEGS and item.place in places) or (item.rule == "turn" and item.place == corner))
     ]
-    if aligned is None or not any(item.rule == "return" and item.ok for item in kept):
+    if aligned is None or not any(item.rule == "return" and item.place != FLIGHT and item.ok for item in kept):
         return tuple(kept)
     # All of the way is on some leg, and one that is drawn and has nothing of it was none.
     unflown = {requirements.leg(i) for i in range(first, requirements.legs) if not aligned.flew(i)}

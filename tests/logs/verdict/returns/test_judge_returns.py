@@ -8,6 +8,7 @@ import pytest
 
 from flight.mission.items import Command, Frame, MissionItem
 from flight.simulation.setup import FlightSetup
+from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.returns.judge_returns import KINDS, Returns, badness, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import headline, range_text
@@ -124,6 +125,18 @@ def test_a_flight_in_jsbsim_sets_the_unsure_right(tmp_path: Path) -> None:
     # What could not be flown stays as it was.
     unflown = judge_returns(world, starts, 4.0, lambda *_: None)
     assert [(one.kind, one.clearance) for one in unflown.each] == [(one.kind, one.clearance) for one in before.each]
+
+
+def test_a_scenario_that_requires_them_fails_where_one_is_not_safe(tmp_path: Path) -> None:
+    asked = '[returns]\nrequire = ["rtl"]\n'
+    verdict = judge_geometry(hill_setup(tmp_path, asked))
+    (failed,) = [one for one in verdict.failed if one.rule == "return"]
+    assert "hit the ground" in failed.reason
+    assert not verdict.flyable
+    assert judge_geometry(hill_setup(tmp_path)).flyable
+    # From above the hill and back there is nothing that could be hit.
+    near = judge_geometry(hill_setup(tmp_path, asked, mission_text(0.0, 2000.0)))
+    assert [one.ok for one in near.findings if one.rule == "return"] == [True]
 
 
 def test_without_a_home_there_is_nowhere_to_return_to(tmp_path: Path) -> None:
