@@ -42,11 +42,14 @@ demo: setup
 test: $(TESTED) clients
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-# Compiled once, while types are checked and pages made: each of pytest's processes would compile for itself.
-	$(BIN)/python -m tests.kernels >/dev/null & compiled=$$!; $(BIN)/mypy && $(BUILD_PAGES) && wait $$compiled
-	@echo "tested with the versions of constraints.txt:"
-	@$(BIN)/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
-	$(BIN)/python -m pytest $(SPREAD)
+# Types are checked and the pages made beside the rest, in silence unless they fail: pytest's summary comes last.
+# Kernels are compiled once, before the tests: each of pytest's processes would compile for itself.
+	@mkdir -p build; { $(BIN)/mypy && $(BUILD_PAGES); } >build/checks.log 2>&1 & checked=$$!; \
+	$(BIN)/python -m tests.kernels >/dev/null; \
+	echo "tested with the versions of constraints.txt:"; \
+	$(BIN)/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"; \
+	$(BIN)/python -m pytest $(SPREAD); tested=$$?; \
+	wait $$checked || { cat build/checks.log; exit 1; }; exit $$tested
 
 bench: $(TESTED)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 from planfly.process_setup import prepare_process
+from tests.shared import remove_made
 from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files
 
 # Looking for garbage among all that tests import takes a tenth of their time.
@@ -45,6 +46,12 @@ def _what_a_file_takes(request: pytest.FixtureRequest) -> Iterator[None]:
     note(CORE_SECONDS, **{file: round(sum(os.times()[:4]) - before, 1)})
     if request.session.testsfailed == failed:
         end_file(file)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """Remove what the processes of a run have shared, once one of them has ended: all end together."""
+    remove_made(node.workerinput["testrunuid"])
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.soak import SOAK
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 MODULES = sorted(
@@ -14,9 +16,11 @@ MODULES = sorted(
     for file in (ROOT / package).rglob("*.py")
     if ">>> " in file.read_text(encoding="utf-8")
 )
+# Each makes a whole run with its pictures; the tests of the API do, too.
+LONG = {"planfly.api.running", "planfly.api.reporting"}
 
 
-@pytest.mark.parametrize("module", MODULES)
+@pytest.mark.parametrize("module", [name for name in MODULES if SOAK or name not in LONG])
 def test_examples_give_what_they_say(module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE

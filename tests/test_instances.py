@@ -13,11 +13,12 @@ from tests.instances import (
     passable,
     random_scenario,
 )
+from tests.soak import some
 from world.scenario import from_spec, load_scenario
 from world.scenario_file import parse_scenario
 
 
-@pytest.mark.parametrize("threats", SIZES)
+@pytest.mark.parametrize("threats", some(SIZES, 2))
 def test_the_hard_files_are_what_the_generator_makes(threats: int) -> None:
     committed = (SCENARIOS / f"hard-{threats:02d}.toml").read_text(encoding="utf-8")
     assert committed == hard_scenario(threats)

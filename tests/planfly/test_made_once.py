@@ -116,6 +116,7 @@ def test_run_makes_everything_once(count: Count) -> None:
     assert count("run", "tight", code=4) == ONCE | FLIGHT | {"plan_path": 1}
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_round_more_makes_only_what_its_tighter_limits_change(count: Count) -> None:
     twice = dict.fromkeys(("plan_path", *FLIGHT), 2)
     assert count("run", "tight", "--refine", "1", code=4) == ONCE | twice | {"make_limits": 2}

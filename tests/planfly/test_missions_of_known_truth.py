@@ -15,6 +15,7 @@ from planfly.cli import main
 from planfly.pipeline import fly_and_judge, make_setup
 from tests.mission_lines import ORIGIN, mission, wp
 from tests.setups import spec_around
+from tests.soak import some
 from world.scenario import from_spec
 
 # Home and ground in metres AMSL, unless a mission says otherwise.
@@ -156,7 +157,7 @@ def failed(verdict: Verdict) -> set[str]:
     return {item.rule for item in verdict.findings if item.ok is False}
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", some(CASES, 2))
 def test_ardupilots_law_knows_the_answer_too(name: str) -> None:
     case = CASES[name]
     setup = setup_of(case, "ardupilot")

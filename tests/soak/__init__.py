@@ -8,11 +8,12 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+Case = TypeVar("Case")
 SOAK = os.environ.get("PLANFLY_SOAK") == "1"
 # Whether files are run as a whole, so that those that pass can be left out another time: `make soak` does.
 WHOLE = SOAK and os.environ.get("PLANFLY_SOAK_WHOLE") == "1"
@@ -32,6 +33,11 @@ def scaled(full: int, few: int) -> int:
     if not SOAK:
         return few
     return max(few, round(full * float(os.environ.get("PLANFLY_SOAK_SHARE", "1"))))
+
+
+def some(cases: Iterable[Case], every: int) -> list[Case]:
+    """All cases in a soak; otherwise the first and each so many after it."""
+    return list(cases) if SOAK else list(cases)[::every]
 
 
 def note(row: str, **figures: float | int | str) -> None:

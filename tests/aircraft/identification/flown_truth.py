@@ -14,6 +14,7 @@ from planfly.identification.base_numbers import base_model, scaled
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
 from tests.instrumented_flights import Truth, drawn_sensors, fly_identification, sensed
+from tests.shared import made_once
 
 TRUTH = Truth(
     mass=1.2, lift_slope=0.9, lift_offset=0.046, zero_lift_drag=1.35, thrust=0.85, pitch_damping=0.7,
@@ -34,6 +35,10 @@ class Flown(NamedTuple):
 
 @cache
 def flown_truth() -> Flown:
+    return made_once("flown-truth", _fly)
+
+
+def _fly() -> Flown:
     with tempfile.TemporaryDirectory() as folder:
         track, changed = fly_identification(Path(folder), TRUTH, 3)
         log = sensed(track, changed, SENSORS, 3)

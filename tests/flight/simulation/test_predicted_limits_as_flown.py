@@ -33,6 +33,7 @@ def test_calm_legs(calm: list[Limit]) -> None:
         assert abs(limit.optimistic) <= 10.0, limit
 
 
+@pytest.mark.skipif(not SOAK, reason="in calm air it is seen above: in make soak")
 def test_in_wind_the_prediction_is_on_the_safe_side_but_not_by_much(windy: list[Limit]) -> None:
     assert {limit.kind for limit in windy} == {"climb", "dive", "leg"}
     for limit in windy:

@@ -14,6 +14,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from flight.simulation.track import COLUMNS
 from tests.setups import MakeSetup, standard
+from tests.soak import some
 
 
 def fly(setup: FlightSetup) -> str:
@@ -22,7 +23,7 @@ def fly(setup: FlightSetup) -> str:
     return hashlib.sha256(b"".join(getattr(track, name).tobytes() for name in COLUMNS)).hexdigest()
 
 
-@pytest.mark.parametrize("method", ["fork", "spawn"])
+@pytest.mark.parametrize("method", some(["spawn", "fork"], 2))
 def test_two_processes_at_once_give_the_same_bytes(make_setup: MakeSetup, method: str) -> None:
     setups = [make_setup(standard()[:3], wind=(7.0, 30.0), turbulence="moderate", seed=seed) for seed in (5, 6)]
     here = [fly(setup) for setup in setups]

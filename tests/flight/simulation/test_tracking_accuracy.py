@@ -33,6 +33,7 @@ def test_wind_and_moderate_turbulence() -> None:
     assert float(np.percentile([item.height_max for item in found], 95)) <= 0.8
 
 
+@pytest.mark.skipif(not SOAK, reason="sixty hertz, which flights have, are tried above: in make soak")
 def test_thirty_hertz_in_turbulence() -> None:
     found = bench.moderate(range(20 if SOAK else 2), guidance_hz=30)
     assert all(item.completed for item in found)
@@ -43,7 +44,7 @@ def test_thirty_hertz_in_turbulence() -> None:
 
 
 def test_any_wind() -> None:
-    found = bench.anywhere(range(100 if SOAK else 4))
+    found = bench.anywhere(range(100 if SOAK else 2))
     assert all(item.completed for item in found)
     assert float(np.percentile([item.worst for item in found], 95)) <= 0.8
 
@@ -54,6 +55,7 @@ def test_an_aircraft_that_differs_from_its_model() -> None:
         assert max(item.worst for item in found) <= 1.5, name
 
 
+@pytest.mark.skipif(not SOAK, reason="laws that nobody flies by: in make soak")
 def test_lateral_reference_laws_are_further_off_on_straight_legs() -> None:
     found = bench.reference_laws(range(20 if SOAK else 1))
     least = {"L1, ArduPlane's defaults": 10.0, "L1, best-tuned": 3.0, "vector field, best-tuned": 3.0}

@@ -16,7 +16,7 @@ from tests.logs.verdict.judging import bare, of
 from tests.missions import KINDS, MadeMission, infeasible
 from tests.soak import scaled
 
-JUDGED, FLOWN = range(scaled(100, 3 * len(KINDS))), range(scaled(100, len(KINDS)))
+JUDGED, FLOWN = range(scaled(100, len(KINDS))), range(scaled(100, len(KINDS) // 2))
 
 Floats = NDArray[np.float64]
 

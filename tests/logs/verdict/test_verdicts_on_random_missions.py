@@ -13,7 +13,7 @@ from tests.missions import KINDS, MadeMission, feasible, infeasible
 from tests.soak import SOAK, scaled
 
 MARGINS = (0.2, 0.1) if SOAK else (0.2,)
-BEYOND, INSIDE = range(scaled(100, 2 * len(KINDS))), range(scaled(100, 8))
+BEYOND, INSIDE = range(scaled(100, len(KINDS))), range(scaled(100, 4))
 
 
 def levels(made: MadeMission) -> dict[str, Verdict]:

@@ -37,7 +37,7 @@ from tests.planfly.campaigns.made_campaigns import (
 )
 from tests.planfly.campaigns.made_searches import GOAL, flying_here, keep_part, same, searched
 from tests.planfly.campaigns.slow_client import winds_goal
-from tests.soak import SOAK, note, scaled
+from tests.soak import SOAK, note, scaled, some
 
 pytestmark = pytest.mark.filterwarnings("default")
 LEG = Place("leg", 3)
@@ -96,9 +96,11 @@ def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: Campaig
     goal = replace(GOAL, flights=120)
     told = searched(wind_base, tmp_path / "told", goal, fly=flight_that_states_its_margin)
     bare = searched(wind_base, tmp_path / "bare", goal)
-    for some, none in zip(told.boundaries, bare.boundaries, strict=True):
-        assert some.width < 0.8 * none.width
+    for wise, bare_one in zip(told.boundaries, bare.boundaries, strict=True):
+        assert wise.width < 0.8 * bare_one.width
     assert searched(wind_base, tmp_path / "told", goal, fly=flight_that_states_its_margin) == told
+    if not SOAK:
+        return
     # And where a part of it is there alone.
     keep_part(wind_base, tmp_path / "told", tmp_path / "part", {*range(70), 72}, goal)
     again = searched(wind_base, tmp_path / "part", goal, fly=flight_that_states_its_margin)
@@ -106,7 +108,7 @@ def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: Campaig
 
 
 @pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", some((2, 0, 3, 1), 4))
 def test_what_was_stopped_anywhere_comes_out_the_same(
     wind_base: CampaignBase, whole: tuple[WindsFound, Path], tmp_path: Path, seed: int
 ) -> None:
@@ -129,7 +131,7 @@ def test_what_was_stopped_anywhere_comes_out_the_same(
 
 @pytest.mark.usefixtures("here")
 def test_more_flights_or_fewer_go_on_as_if_asked_at_once(wind_base: CampaignBase, tmp_path: Path) -> None:
-    few, many = (WindsGoal(0.9, 0.95, 4, 20.0, flights) for flights in (31, 100))
+    few, many = (WindsGoal(0.9, 0.95, 4, 20.0, flights) for flights in (31, 60))
     first, asked_many = (searched(wind_base, tmp_path / name, goal) for name, goal in (("a", few), ("many", many)))
     assert len(first.flights) == 31
     assert same((searched(wind_base, tmp_path / "a", many), tmp_path / "a"), (asked_many, tmp_path / "many"))

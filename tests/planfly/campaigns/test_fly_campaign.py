@@ -246,15 +246,15 @@ def test_a_real_scheduler_gives_the_same_table(base: CampaignBase, tmp_path: Pat
         [*dask, "scheduler", "--host", "127.0.0.1", "--port", "18786", "--no-dashboard"], env=environment
     )
     line = [*dask, "worker", "tcp://127.0.0.1:18786", "--nthreads", "1", "--host", "127.0.0.1", "--no-dashboard"]
-    workers = [subprocess.Popen(line, env=environment) for _ in range(2)]
+    workers = [subprocess.Popen(line, env=environment) for _ in range(2 if SOAK else 1)]
     keep(base, tmp_path / "part", (0, 3, 4))
     try:
-        for name in ("far", "part"):
+        for name in ("far", "part") if SOAK else ("part",):
             flown(base, Goal(None, False, count), tmp_path / name, Workers(None, "tcp://127.0.0.1:18786"))
     finally:
         for process in (*workers, scheduler):
             process.terminate()
             process.wait()
     want = expected(base, tmp_path / "one", count)
-    assert table(tmp_path / "far" / DATABASE) == want
+    assert not SOAK or table(tmp_path / "far" / DATABASE) == want
     assert table(tmp_path / "part" / DATABASE) == want

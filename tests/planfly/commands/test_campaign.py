@@ -18,6 +18,7 @@ from planfly.campaigns.tables import same_flight
 from planfly.cli import main
 from tests.planfly.campaigns.made_campaigns import write_short
 from tests.planfly.terminal.answers.checked_answers import validate
+from tests.soak import some
 
 pytestmark = pytest.mark.filterwarnings("default")
 TABLE = '[{}]\ndistribution = "{}"\nloc = {}\nscale = 0.01\nsource = "by hand"\n'
@@ -83,7 +84,7 @@ def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys
     assert not (tmp_path / "none").exists()
 
 
-@pytest.mark.parametrize("command", [["campaign", "--flights", "2000"], ["winds", "--directions", "4"]])
+@pytest.mark.parametrize("command", some([["campaign", "--flights", "2000"], ["winds", "--directions", "4"]], 2))
 def test_a_folder_that_is_removed_ends_it_at_the_next_flight(tmp_path: Path, command: list[str]) -> None:
     """With exit code 1 and a line that says so, long before its last flight."""
     mission, scenario = write_short(tmp_path)

@@ -13,6 +13,7 @@ import pytest
 from logs.recording.reader import read_log
 from planfly.cli import main
 from tests.autopilots import need_arduplane, write_fake
+from tests.soak import some
 
 ROOT = Path(__file__).parents[3]
 MISSION = """QGC WPL 110
@@ -100,7 +101,7 @@ def test_the_autopilots_log_is_not_written_over_another(
     assert mine.read_bytes() == b"mine"
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", some([signal.SIGTERM, signal.SIGINT], 2))
 def test_a_signal_ends_the_program_and_leaves_none_of_its_files(
     mission: Path, tmp_path: Path, number: signal.Signals
 ) -> None:

@@ -301,6 +301,7 @@ def test_no_attack_on_a_signed_link_ends_a_flight(serve: Callable[..., Served], 
     assert read_log(vehicle.folder / "logs" / "flight-001.mcap").complete
 
 
+@pytest.mark.skipif(not SOAK, reason="others stand by, too, and this one is the largest: in make soak")
 def test_the_default_scenario_stands_by(serve: Callable[..., Served]) -> None:
     vehicle = serve()
     with UdpStation(vehicle.port) as station:

@@ -67,7 +67,7 @@ def limited(which: int, most: int) -> Callable[[], None]:
     return lambda: resource.setrlimit(which, (most, most))
 
 
-@some("fly", "import")
+@some("fly")
 def test_600_mb_of_address_space(name: str, inputs: Path, tmp_path: Path) -> None:
     """Most libraries together are larger; OpenBLAS, for one, would never return."""
     given, folder = EVERY[name], tmp_path / "work"
@@ -111,7 +111,7 @@ def full_disk(folder: Path, inputs: Path) -> Iterator[Callable[[], None] | None]
         subprocess.run(["umount", str(folder)], check=True)
 
 
-@some("export", "check")
+@some("check")
 def test_a_full_disk(name: str, inputs: Path, tmp_path: Path) -> None:
     given, folder = EVERY[name], tmp_path / "full"
     with full_disk(folder, inputs) as change:
@@ -128,7 +128,7 @@ READ_ONLY = 'mount --make-rprivate / && mount --bind . . && mount -o remount,ro,
 NOWHERE = {"HOME": "/nonexistent", "NUMBA_CACHE_DIR": "/proc/none", "XDG_CACHE_HOME": "/proc/none"}
 
 
-@some("recover", "help")
+@some("recover")
 def test_no_home_and_nothing_to_write(name: str, inputs: Path, tmp_path: Path) -> None:
     """A service account on a read-only install: each command runs; kernels are compiled for it alone."""
     given, folder = EVERY[name], tmp_path / "work"

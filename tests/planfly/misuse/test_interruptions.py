@@ -70,11 +70,11 @@ FEW = (
         signal.SIGINT,
         grown="f.mcap",
     ),
-    Case(PAPER, "planning", 1.5, signal.SIGINT),
     Case(SERVE, "flight logs", 0.3, signal.SIGINT),
     Case(CAMPAIGN, "flying", 3.0, signal.SIGINT),
-    # It ends as a campaign does.
+    # They end as a campaign does.
     *((Case(("winds", *CAMPAIGN[1:]), "flying", 3.0, signal.SIGINT),) if SOAK else ()),
+    *((Case(PAPER, "planning", 1.5, signal.SIGINT),) if SOAK else ()),
     # Kernels are compiled meanwhile.
     Case(("run", "jacksboro", "--out", "out"), "", 4.0, signal.SIGTERM, cold=True),
 )

@@ -133,6 +133,7 @@ def test_the_ports_of_the_table_are_those_of_the_options() -> None:
 _bound: list[object] = []
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_no_other_command_opens_a_socket(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")

@@ -14,6 +14,7 @@ from benchmarks.airspace.many_zones import crowded_scenario
 from benchmarks.airspace.scenarios import draw_scenario, passable, ring_distance
 from planfly.airframe import load_airframe
 from planfly.pipeline import make_plan
+from tests.soak import SOAK, some
 
 # Of the bench's: the first draws of these numbers that the grid search passes.
 DRAWS = {0: 1, 3: 3}
@@ -27,7 +28,7 @@ def sampled(path: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", DRAWS)
+@pytest.mark.parametrize("number", some(DRAWS, 2))
 def test_planned_where_a_grid_can_and_flown_inside_all(number: int) -> None:
     flown = fly(number)
     assert flown.kept is not None
@@ -61,7 +62,7 @@ def test_without_its_zones_and_its_greatest_height_the_same_way_is_planned_throu
 
 
 def test_a_way_between_many_zones_of_many_corners() -> None:
-    scenario = crowded_scenario(200, 50)
+    scenario = crowded_scenario(*((200, 50) if SOAK else (60, 30)))
     plan = make_plan(scenario, load_airframe(scenario), 1)
     assert plan.safe
     places = sampled(plan.waypoints)[:, :2]

@@ -17,6 +17,7 @@ from world.errors import LogError, PlanflyError
 # A log that is cut short: every command that reads it says so, and ends with 3.
 
 
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.parametrize("command", ["check", "report", "replay", "recover"])
 def test_an_unfinished_log_ends_with_3_and_its_end_time(
     broken: Path, tmp_path: Path, command: str, capfd: pytest.CaptureFixture[str]

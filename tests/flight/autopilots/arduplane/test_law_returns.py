@@ -1,4 +1,7 @@
-"""ArduPlane's law flies home as ArduPlane did: 38 kept flights, and what each rule of a return is by itself."""
+"""ArduPlane's law flies home as ArduPlane did: 38 kept flights, and what each rule of a return is by itself.
+
+Every third of them; all with PLANFLY_SOAK=1.
+"""
 
 import math
 
@@ -10,6 +13,7 @@ from flight.autopilots.arduplane.law import demand_height, navigate_legs
 from flight.guidance.path import waypoint_records
 from tests.flight.autopilots.arduplane.kept_flights import KEPT, flown_return, kept_track, return_setup
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, waypoints
+from tests.soak import some
 from world.kernels import Record
 
 # Law less flight, where the least clearance before the circle is compared, m.
@@ -25,7 +29,7 @@ def kind(flight: str) -> str:
     return "default" if KEPT[flight]["rtl_altitude_m"] == "100" else "climbs"
 
 
-@pytest.mark.parametrize("flight", KEPT)
+@pytest.mark.parametrize("flight", some(KEPT, 3))
 def test_a_return_is_flown_as_arduplane_flew_it(flight: str) -> None:
     real, flown = KEPT[flight], flown_return(flight)
     assert f"NAV_RETURN_TO_LAUNCH: to {real['target']}, " in flown.route.notes[0]
@@ -40,7 +44,7 @@ def test_a_return_is_flown_as_arduplane_flew_it(flight: str) -> None:
         assert abs(flown.arrived - float(real["to_circle_s"])) < ARRIVAL
 
 
-@pytest.mark.parametrize("flight", KEPT)
+@pytest.mark.parametrize("flight", some(KEPT, 3))
 def test_on_the_way_it_is_where_arduplane_was(flight: str) -> None:
     flown = flown_return(flight)
     for time, east, north, up in kept_track(flight):

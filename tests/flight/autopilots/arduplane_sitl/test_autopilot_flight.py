@@ -19,6 +19,7 @@ from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopil
 from flight.simulation.setup import FlightSetup
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
 from tests.setups import setup_maker
+from tests.soak import some
 from world.errors import FlightError
 
 AEROSONDE = load_aircraft("aerosonde")
@@ -52,7 +53,7 @@ def make_setup(**keywords: object) -> FlightSetup:
     return MAKE(WAY, **keywords)
 
 
-@pytest.mark.parametrize("fault", ["none", "32-outputs", "no-space"])
+@pytest.mark.parametrize("fault", some(["32-outputs", "none", "no-space"], 3))
 def test_an_autopilot_flies_the_mission_to_its_end(fake_autopilot: MakeFake, tmp_path: Path, fault: str) -> None:
     before, folders, kept = children(), left_behind(), tmp_path / "flight.BIN"
     rows: list[object] = []
@@ -77,24 +78,27 @@ def test_an_autopilot_flies_the_mission_to_its_end(fake_autopilot: MakeFake, tmp
 
 @pytest.mark.parametrize(
     ("fault", "said"),
-    [
-        (
-            "magic",
-            "speaks another version of the physics interface: a packet of 40 bytes that begins with 4711; allowed",
-        ),
-        ("deaf", "does not understand the physics it is sent: asked for frame 300 again for 1 s"),
-        ("silent", "silent for 1 s; ended"),
-        ("crash", "ended with exit code 3: out of memory"),
-        ("signal", "was ended by SIGSEGV"),
-        ("panic", "panicked: Failed to load defaults"),
-        ("mute", "said nothing over MAVLink within 30 s"),
-        ("copter", "is no ArduPlane: its heartbeat says vehicle type 2"),
-        ("no-ekf", "did not come to know where it is (EKF) within 60 s"),
-        ("refuses", "refused the mission at item 2 (DO_CHANGE_SPEED): MAV_MISSION_UNSUPPORTED"),
-        ("will-not-arm", "refused arming (command 400) within 5 s; it last said: Arm: no will"),
-        ("crash-in-air", "ended with exit code 1"),
-        ("reboot", "began anew in the air: frame 1 after frame"),
-    ],
+    some(
+        [
+            (
+                "magic",
+                "speaks another version of the physics interface: a packet of 40 bytes that begins with 4711; allowed",
+            ),
+            ("deaf", "does not understand the physics it is sent: asked for frame 300 again for 1 s"),
+            ("silent", "silent for 1 s; ended"),
+            ("crash", "ended with exit code 3: out of memory"),
+            ("signal", "was ended by SIGSEGV"),
+            ("panic", "panicked: Failed to load defaults"),
+            ("mute", "said nothing over MAVLink within 30 s"),
+            ("copter", "is no ArduPlane: its heartbeat says vehicle type 2"),
+            ("no-ekf", "did not come to know where it is (EKF) within 60 s"),
+            ("refuses", "refused the mission at item 2 (DO_CHANGE_SPEED): MAV_MISSION_UNSUPPORTED"),
+            ("will-not-arm", "refused arming (command 400) within 5 s; it last said: Arm: no will"),
+            ("crash-in-air", "ended with exit code 1"),
+            ("reboot", "began anew in the air: frame 1 after frame"),
+        ],
+        2,
+    ),
 )
 def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
     fake_autopilot: MakeFake, monkeypatch: pytest.MonkeyPatch, fault: str, said: str

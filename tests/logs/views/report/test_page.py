@@ -246,6 +246,8 @@ def test_pictures_are_drawn_into_page_and_files(tmp_path: Path) -> None:
     assert base64.b64encode(paths[1].read_bytes()).decode() in html
     # Nine, without that of an exposure: this flight is exposed to nothing.
     assert html.count("data:image/png;base64,iVBOR") == 8
+    if not SOAK:
+        return
     before = {path.name: path.read_bytes() for path in paths}
     more = write_report(out, make_setup(), make_track(), VERDICT, svg=True, **ARGUMENTS)
     assert {path.name: path.read_bytes() for path in paths} == before
@@ -253,9 +255,8 @@ def test_pictures_are_drawn_into_page_and_files(tmp_path: Path) -> None:
     assert [path.stem for path in drawn] == list(FILES)
     first = [path.read_bytes() for path in drawn]
     assert all(ElementTree.fromstring(data).tag.endswith("svg") for data in first)
-    if SOAK:
-        write_report(out, make_setup(), make_track(), VERDICT, svg=True, **ARGUMENTS)
-        assert [path.read_bytes() for path in drawn] == first
+    write_report(out, make_setup(), make_track(), VERDICT, svg=True, **ARGUMENTS)
+    assert [path.read_bytes() for path in drawn] == first
 
 
 @pytest.mark.usefixtures("undrawn")

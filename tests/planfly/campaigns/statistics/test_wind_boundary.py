@@ -117,7 +117,7 @@ def search(draw: Callable[[], float], flights: int = 300) -> WindBoundary:
 def test_it_finds_the_quantile(law: Any, within: float) -> None:
     """Of either law, without being told which, and with nothing known of what is drawn."""
     truth = float(law.ppf(0.01))
-    found = [search(partial(law.rvs, random_state=np.random.default_rng(seed))) for seed in range(scaled(20, 2))]
+    found = [search(partial(law.rvs, random_state=np.random.default_rng(seed))) for seed in range(scaled(20, 1))]
     assert np.median([abs(one.estimate - truth) for one in found]) < within
     assert sum(one.low - 0.1 <= truth <= one.high + 0.1 for one in found) >= 0.75 * len(found)
 
@@ -126,7 +126,7 @@ def test_ways_of_failing_that_draws_decide_are_told_apart() -> None:
     """Two ways: little of the first quantity, as much of it.  As many flights that tell no more leave it open."""
     truth = _quantile_of_two()
     known, unknown = [], []
-    for seed in range(scaled(20, 2)):
+    for seed in range(scaled(20, 1)):
         for numbers, found in ((normal_numbers(5, seed), known), (no_numbers(), unknown)):
             direction, random = Direction(20.0, 0.99, numbers), np.random.default_rng(seed)
             fly(direction, 300, partial(_two_ways, random), together=10)
@@ -160,7 +160,7 @@ def test_narrow_passes_that_no_failing_follows_from_do_not_move_it() -> None:
     """
     truth = _limit_of(0.01)
     found = []
-    for seed in range(scaled(20, 2)):
+    for seed in range(scaled(20, 1)):
         direction, random = Direction(20.0, 0.99, normal_numbers(3, seed)), np.random.default_rng(seed)
         for _ in range(50):
             for speed, draw in next_flights(direction, 6):
