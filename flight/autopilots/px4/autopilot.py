@@ -7,6 +7,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from aircraft.catalog import Aircraft
+from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import Autopilot, Floats, SpeedLimits, StoredAutopilot, StoredParameters, Tick
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_tick
@@ -18,10 +19,12 @@ from flight.autopilots.px4.parameters import (
     load_parameters,
     stored_parameters,
 )
+from flight.autopilots.px4.tracking_error import tracking_error
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.return_path import ReturnRules
 from world.kernels import Record
-from world.scenario_tables import NEWEST_PX4, FlightTable
+from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation
+from world.wind import Turbulence
 
 
 @dataclass(frozen=True)
@@ -146,6 +149,12 @@ class Px4(Autopilot):
     def stated_bank(self) -> float | None:
         """FW_R_LIM of a person's file."""
         return self.parameters["FW_R_LIM"] if "FW_R_LIM" in self.parameters.by_origin("file") else None
+
+    def tracking_error(
+        self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
+    ) -> TrackingError | None:
+        """How far its law strays with these parameters; it flies no waypoint over."""
+        return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
     def with_parameters(self, **values: float) -> "Px4":
         """The law with other parameters."""

@@ -146,7 +146,7 @@ def _end_mission(
     estimated: Record, b: Record, memory: Record, parameters: Record, own: Record, dt: float
 ) -> None:  # pragma: no cover - compiled
     """End the flight at the last waypoint, where its height is reached, or not for as long as is waited for it."""
-    here = memory.done or (own.circling and b.circle == 0.0)
+    here = own.waited > 0.0 or memory.done or own.circling
     if not here or b.circle != 0.0:
         return
     own.waited += dt

@@ -75,6 +75,15 @@ def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSet
     assert np.degrees(np.abs(down.attitude[:, 0])).max() < 5.0
 
 
+def test_it_does_not_circle_at_the_end_for_ever(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    # 800 m down at 2 m/s take 400 s; it is over 300 s after it came there.
+    setup = make_setup([[0, -11000, 1200.0], [0, 0, 1200.0], [0, 1000, 400.0]])
+    flown = simulate(replace(setup, autopilot=Px4(load_parameters(aerosonde, None, "1.16"))), aerosonde)
+    assert flown.ended == "completed"
+    assert flown.track.time[-1] == pytest.approx((12_000.0 - 60.0) / 26.4 + 300.0, abs=6.0)
+    assert flown.track.position[-1, 2] > 500.0
+
+
 def test_it_holds_a_leg_in_wind(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     setup = make_setup([[0, 0, 500.0], [0, 3000, 500.0]], wind=(8.0, 270.0))
     track = simulate(replace(setup, autopilot=Px4(load_parameters(aerosonde))), aerosonde).track

@@ -43,8 +43,8 @@ def test_it_turns_to_the_next_leg_where_px4_does() -> None:
     # PX4's own switch is up to 0.3 s late: 7 m.
     assert len(off) == 33
     assert np.median(np.abs(off)) < 2.0
-    assert (np.abs(off) < 3.0).mean() > 0.9
-    assert np.abs(off).max() < 4.0
+    assert (np.abs(off) < 3.0).mean() > 0.85
+    assert np.abs(off).max() < 5.0
 
 
 def test_it_overshoots_corners_as_far_as_px4() -> None:
@@ -72,7 +72,7 @@ def test_its_heights_on_slopes_are_those_of_px4(flight: str) -> None:
         both = time <= own_time[-1]
         off.append(position[both, 2] - np.interp(time[both], own_time, own_position[:, 2]))
     squares = np.concatenate(off) ** 2
-    assert np.sqrt(squares.mean()) < 2.0
+    assert np.sqrt(squares.mean()) < (0.3 if flight.startswith("corners") else 1.0)
 
 
 def test_a_flight_with_circles_takes_as_long() -> None:

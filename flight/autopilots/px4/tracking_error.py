@@ -1,0 +1,149 @@
+"""How far PX4 strays from the legs of a plan with its parameters: corners flown by its own law on the plane.
+
+Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.px4.navigator` and the lag of the
+bank.  In wind, the still air's excursion at the highest ground speed on the way is the measure, and `WIND_SPREAD` more.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY
+from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
+from flight.autopilots.px4.lateral import wanted_bank
+from flight.autopilots.px4.law import PX4_MEMORY, ROLL_LAG
+from flight.autopilots.px4.navigator import navigate, reach_radius
+from flight.autopilots.px4.parameters import Px4Parameters
+from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.guidance.navigation_error import ERRORS, MOTION
+from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
+from world.scenario_tables import Navigation
+from world.wind import Turbulence
+
+Floats = NDArray[np.float64]
+
+# A corner counts as left where the aircraft stays this near to the next leg (m) for so long (s).
+_SETTLED, _STAYS = 2.0, 8.0
+# From a corner the legs reach this far, m; flights end there at the latest, and begin so far before they may turn.
+_LEG, _BEFORE = 4000.0, 200.0
+# Time step of these flights, s.
+_STEP = 0.05
+# What is left for the wind, as a share of still air's excursion, and more of it at a right angle: what it made of
+# ArduPlane's corners (`flight.autopilots.arduplane.tracking_error`), which knows no wind as PX4's guidance does.
+WIND_SPREAD = 1.1, 0.5
+# Of navigation's standard deviation, what is left room for.
+_SIGMAS = 3.0
+# Beside straight legs and from its lagged height in light turbulence, navigation left out, m.
+_ACROSS, _UP = 2.0, 3.0
+# Of FW_T_CLMB_R_SP and FW_T_SINK_R_SP, the share that a plan asks for, by turbulence: slopes are flown steeper than
+# they are drawn, for they are done a loiter's radius early, and what is missing at a waypoint is circled for.
+_SHARE = {"none": 0.8, "light": 0.7, "moderate": 0.6}
+
+
+def tracking_error(
+    parameters: Px4Parameters,
+    airspeed: float,
+    nav: Navigation,
+    *,
+    turbulence: Turbulence = "none",
+) -> TrackingError:
+    """What a plan leaves free for PX4 with these parameters, at an equivalent airspeed (m/s).
+
+    nav: how well it knows where it is.  turbulence: of the wind.
+
+    >>> from flight.autopilots.px4.parameters import default_parameters
+    >>> error = tracking_error(default_parameters("1.16"), 25.0, "gnss")
+    >>> round(error.lag, 3), error.corner_acceptance(math.radians(30.0), 25.0)
+    (3.5, 56.0)
+    """
+    acceptance, excursion, before, after = _corners(parameters, airspeed)
+    known = _SIGMAS * ERRORS[nav][0]
+    made = parameters
+    return TrackingError(
+        airspeed=airspeed,
+        acceptance=acceptance,
+        excursion=excursion,
+        before=before,
+        after=after,
+        across=math.hypot(_ACROSS, known),
+        up=math.hypot(_UP, known),
+        lag=(1.0 - made["FW_T_HRATE_FF"]) * made["FW_T_ALT_TC"],
+        step=0.0,
+        climb_rate=_SHARE[turbulence] * min(made["FW_T_CLMB_R_SP"], made["FW_T_CLMB_MAX"]),
+        sink_rate=_SHARE[turbulence] * min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
+    )
+
+
+# How a corner is tracked, m: turned at which distance, how far from its legs, along how much of each.
+CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
+
+
+@lru_cache(maxsize=8)
+def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
+    corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
+    _fill(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, np.zeros(3, WAYPOINT))
+    share, more = WIND_SPREAD
+    corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
+    # Plans are the same on every machine, and a library's sines are not.
+    acceptance, excursion, before, after = (corners[name].round(2) for name in field_names(CORNER_TRACKING))
+    for table in (acceptance, excursion, before, after):
+        table.setflags(write=False)
+    return acceptance, excursion, before, after
+
+
+@compiled
+def _fill(
+    parameters: Record, airspeed: float, turns: Floats, speeds: Floats, corners: Records, waypoints: Records
+) -> None:  # pragma: no cover - compiled
+    """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
+    for i in range(turns.size):
+        for j in range(speeds.size):
+            corner = corners[i, j]
+            corner.acceptance = reach_radius(speeds[j], parameters)
+            if turns[i] > 0.0:
+                corner.before = corner.acceptance
+                corner.excursion, corner.after = _fly_corner(parameters, airspeed, turns[i], speeds[j], waypoints)
+
+
+@inner
+def _fly_corner(
+    parameters: Record, airspeed: float, turn: float, speed: float, waypoints: Records
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Furthest from the two legs, and how far along the second one until it stays near to it, m.
+
+    The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
+    """
+    estimated, own = np.zeros(1, MOTION)[0], np.zeros(1, PX4_MEMORY)[0]
+    east, north = math.sin(turn), math.cos(turn)
+    waypoints[0].north = -_LEG
+    waypoints[2].east, waypoints[2].north = _LEG * east, _LEG * north
+    own.from_north, own.nearest = -_LEG, math.inf
+    way = speed * _STEP
+    estimated.north = -reach_radius(speed, parameters) - _BEFORE
+    lag = ROLL_LAG * parameters.roll_time
+    left = math.exp(-_STEP / lag)
+    course, side, clock, furthest, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while along < 0.75 * _LEG and clock < 120.0:
+        estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
+        navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, own, _STEP)
+        wanted = GRAVITY * math.tan(wanted_bank(own.side_acceleration, parameters))
+        # The lag to the letter, and the way on the mean course.
+        turned = (wanted * _STEP + (side - wanted) * lag * (1.0 - left)) / speed
+        side = wanted + (side - wanted) * left
+        estimated.east += way * math.sin(course + 0.5 * turned)
+        estimated.north += way * math.cos(course + 0.5 * turned)
+        course += turned
+        clock += _STEP
+        along = estimated.east * east + estimated.north * north
+        away = math.hypot(estimated.east, estimated.north)
+        first = abs(estimated.east) if estimated.north < 0.0 else away
+        second = abs(estimated.east * north - estimated.north * east) if along > 0.0 else away
+        furthest = max(furthest, min(first, second))
+        if own.leg == 1 and second > _SETTLED:
+            settled = max(0.0, along)
+        if own.leg == 1 and along > settled + _STAYS * speed:
+            break
+    return furthest, settled

@@ -1,0 +1,60 @@
+"""How far PX4 strays from a plan's legs: its corners against those that PX4 itself flew, and its height."""
+
+import math
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import Aircraft
+from aircraft.tracking import TURNS
+from flight.autopilots.px4.parameters import load_parameters
+from flight.autopilots.px4.tracking_error import WIND_SPREAD, tracking_error
+from tests.flight.autopilots.px4.kept_flights import kept
+from world.scenario_tables import Px4Version
+
+# Degrees of the corners at waypoints 2 to 5 of the kept flights.
+CORNERS = {2: 60.0, 3: 90.0, 4: 60.0, 5: 45.0}
+
+
+def still(aerosonde: Aircraft, version: Px4Version, turn_deg: float, airspeed: float) -> float:
+    """The excursion at a corner in still air, what is left for wind taken off."""
+    error = tracking_error(load_parameters(aerosonde, None, version), airspeed, "perfect")
+    share, more = WIND_SPREAD
+    spread = share + more * (TURNS / (0.5 * math.pi)) ** 2
+    table = [np.interp(1.0, [0.6, 1.0], row[:2]) for row in error.excursion / spread[:, None]]
+    return float(np.interp(math.radians(turn_deg), TURNS, table))
+
+
+@pytest.mark.parametrize("waypoint", sorted(CORNERS))
+def test_a_corner_takes_the_room_that_px4_took(waypoint: int, aerosonde: Aircraft) -> None:
+    """At 600 m, 25 m/s are 25.7 m/s true."""
+    flown = kept("corners-1.17").overshoot(waypoint)
+    assert still(aerosonde, "1.17", CORNERS[waypoint], 25.75) == pytest.approx(flown, rel=0.12)
+
+
+def test_turning_early_halves_a_right_angles_overshoot(aerosonde: Aircraft) -> None:
+    early, late = (still(aerosonde, version, 90.0, 25.75) for version in ("1.16", "1.17"))
+    assert early == pytest.approx(kept("corners-1.16").overshoot(3), rel=0.12)
+    assert late > 1.4 * early
+
+
+def test_a_straight_leg_takes_none(aerosonde: Aircraft) -> None:
+    error = tracking_error(load_parameters(aerosonde, None, "1.16"), 25.0, "perfect")
+    assert (error.excursion[0] == 0.0).all()
+    assert (error.before[0] == 0.0).all()
+    # It turns 2.24 s before a waypoint, at the ground speeds of the table.
+    assert error.acceptance[3].tolist() == pytest.approx([33.6, 56.0, 78.4, 100.8])
+    assert (error.excursion[3] > 0.0).all()
+
+
+@pytest.mark.parametrize(("turbulence", "share"), [("none", 0.8), ("light", 0.7), ("moderate", 0.6)])
+def test_slopes_are_those_of_the_reference_and_late_by_its_lag(
+    turbulence: str, share: float, aerosonde: Aircraft
+) -> None:
+    made = load_parameters(aerosonde).changed(FW_T_CLMB_R_SP=5.0, FW_T_HRATE_FF=0.5, FW_T_ALT_TC=4.0)
+    error = tracking_error(made, 25.0, "gnss", turbulence=turbulence)  # type: ignore[arg-type]  # a name of the table
+    assert (error.climb_rate, error.sink_rate, error.lag, error.step) == pytest.approx(
+        (share * 5.0, share * 2.0, 2.0, 0.0)
+    )
+    # Three standard deviations of 1.5 m beside 2 and 3 m.
+    assert (error.across, error.up) == pytest.approx((math.hypot(2.0, 4.5), math.hypot(3.0, 4.5)))
