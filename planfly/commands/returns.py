@@ -29,7 +29,7 @@ def returns_options(line: LineParser) -> None:
     """The parser of ``planfly returns``."""
     parser = line.command(
         "returns",
-        "fly the return to launch from everywhere on the way, and say whether each is safe, where it goes, and why there",
+        "fly the return to launch from everywhere on the way: say whether each is safe, where it goes and why",
         "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
         "planfly returns flight.mcap --every 5",
     )
