@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import ClassVar, NamedTuple, get_args
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters
@@ -220,6 +219,9 @@ def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float
     >>> [round(gain, 2) for gain in speed_filter_gains(0.07, 0.2, 0.2)]
     [1.92, 0.26, 2.12, 0.67]
     """
+    # Imported here: planning by another autopilot does without.
+    from scipy.linalg import solve_continuous_are
+
     chain, noise = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed * speed, rate * rate])
     spread = solve_continuous_are(chain.T, np.eye(2), np.diag([0.0, process * process]), noise)
     gains = spread @ np.linalg.inv(noise)

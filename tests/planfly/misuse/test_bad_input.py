@@ -68,7 +68,7 @@ SCENARIOS = {
     "negative generations": SCENARIO + "[planner]\ngenerations = -1\n",
     "aircraft": SCENARIO + '[flight]\naircraft = "zeppelin"\n',
     "airspeed": SCENARIO + "[flight]\nairspeed_mps = 58\n",
-    "autopilot": SCENARIO + '[flight]\nautopilot = "px4"\n',
+    "autopilot": SCENARIO + '[flight]\nautopilot = "px5"\n',
     "guidance of another autopilot": SCENARIO + '[flight]\nautopilot = "ardupilot"\nguidance = "l1"\n',
     "parameters of guidance": SCENARIO + '[flight]\nguidance = "path"\nparams = "mine.parm"\n',
     "parameters missing": SCENARIO + '[flight]\nparams = "nowhere.parm"\n',
