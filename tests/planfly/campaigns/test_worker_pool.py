@@ -98,6 +98,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.skipif(not SOAK, reason="megabytes of two whole processes: in make soak")
 @pytest.mark.skipif(sys.platform != "linux", reason="the largest size is read from /proc")
 def test_what_planning_takes_is_gone_before_the_first_flight(tmp_path: Path) -> None:
     """Largest resident size of a process that opens the demo in another, MB, and of one that does so itself."""

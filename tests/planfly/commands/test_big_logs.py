@@ -35,6 +35,7 @@ def peak(log: Path, target: Path) -> float:
     return float(megabytes)
 
 
+@pytest.mark.skipif(not SOAK, reason="beside a log of 200 MB: in make soak")
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc/self/status is Linux's")
 def test_memory_grows_by_less_than_the_log(tmp_path: Path) -> None:
     few, many = (big_log(tmp_path / f"{size}.BIN", size * MEGABYTE) for size in (2, 14))
