@@ -91,6 +91,9 @@ class ReturnsFound:
             found.append(
                 f"{self.setup.autopilot.title} would come home by a law that is not flown here: ArduPlane's stands in"
             )
+        parameters = self.setup.autopilot.parameters
+        if parameters is None or not parameters.source:
+            found.append("no parameter file was given: the settings above are not yours, --params states them")
         if self.setup.scenario.terrain is None:
             found.append("no terrain was given: --terrain names an elevation file")
         if self.setup.scenario.external:

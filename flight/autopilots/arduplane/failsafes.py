@@ -1,8 +1,7 @@
 """What makes ArduPlane leave its mission, and what it does then, by its parameters.
 
-Read in ArduPlane 4.6's sources, not triggered: `Plane::failsafe_short_on_event`, `failsafe_long_on_event` and
-`handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp, `Plane::exit_mission_callback` in
-commands_logic.cpp.
+Read in ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event`, `failsafe_long_on_event` and
+`handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp.
 """
 
 from typing import Literal, NamedTuple
@@ -34,14 +33,15 @@ class Cause(NamedTuple):
 
 _LONG: dict[int, Does] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "land"}
 _SHORT: dict[int, Does] = {0: "on", 1: "circle", 2: "level", 3: "on", 4: "level"}
+# What only a quadplane can do, to land on its rotors (4, 6), is to any other aeroplane what 2 is.
 _BATTERY: dict[int, Does] = {
     0: "on",
     1: "return",
     2: "land",
     3: "terminate",
-    4: "return",
+    4: "land",
     5: "parachute",
-    6: "on",
+    6: "land",
     7: "land",
 }
 _FENCE: dict[int, Does] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "land"}
@@ -66,9 +66,13 @@ def failsafe_causes(parameters: ArduPilotParameters, *, has_fence: bool) -> tupl
     long = int(parameters.long_failsafe)
     causes = [Cause("the pilot's RTL", "return"), Cause("the mission's end", "return")]
     short = int(parameters.short_failsafe)
-    if _SHORT.get(short, "on") != "on" and parameters.throttle_failsafe > 0.0:
+    leaves_auto = _SHORT.get(short, "on") != "on" and parameters.throttle_failsafe > 0.0
+    if leaves_auto:
         causes.append(Cause("RC lost for 1.5 s", _SHORT[short], "FS_SHORT_ACTN", short))
-    if parameters.throttle_failsafe == 1.0:
+    if parameters.throttle_failsafe == 1.0 and leaves_auto and long == 0:
+        # It is no longer in AUTO, and from any other mode FS_LONG_ACTN 0 is a return.
+        causes.append(Cause("RC lost", "return", "FS_SHORT_ACTN", short))
+    elif parameters.throttle_failsafe == 1.0:
         causes.append(Cause("RC lost", _LONG.get(long, "on"), "FS_LONG_ACTN", long))
     else:
         causes.append(Cause("RC lost", "on", "THR_FAILSAFE", int(parameters.throttle_failsafe)))
