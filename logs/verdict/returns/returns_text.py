@@ -10,7 +10,16 @@ from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
 from world.scenario import Scenario
 
-# What a number of returns does.
+# What one return does, and what several do.
+_ONE: dict[Kind, str] = {
+    "ground": "hits the ground",
+    "threat": "enters a missile's sphere",
+    "zone": "violates a zone",
+    "lost": "does not arrive",
+    "energy": "takes more energy than may be used",
+    "unknown": "flies where the ground is not known",
+    "low": "comes lower than {limit:.0f} m above ground",
+}
 _MANY: dict[Kind, str] = {
     "ground": "hit the ground",
     "threat": "enter a missile's sphere",
@@ -35,8 +44,9 @@ _DOES = {
 
 def counts_text(returns: Returns) -> str:
     """How many returns come to what, the worst first; "" where all are safe."""
-    counted = [(returns.count(kind), _MANY[kind].format(limit=returns.limit)) for kind in KINDS if kind != "safe"]
-    return ", ".join(f"{count} {what}" for count, what in counted if count)
+    counted = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
+    texts = {kind: (_ONE if count == 1 else _MANY)[kind].format(limit=returns.limit) for kind, count in counted.items()}
+    return ", ".join(f"{count} {texts[kind]}" for kind, count in counted.items() if count)
 
 
 def headline(returns: Returns) -> str:
