@@ -85,6 +85,14 @@ def test_no_climb_beyond_the_limits_is_asked_for(off: float, rate: float) -> Non
     assert own.pitch_demand == pytest.approx(rate / 25.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(("demand", "throttle"), [(60.0, 0.8), (10.0, 0.3)])
+def test_a_change_of_speed_takes_half_of_the_energy_there_is(demand: float, throttle: float) -> None:
+    # Half way from trim, 0.6, to full throttle and to idle, whatever FW_T_CLMB_MAX and FW_T_SINK_MIN are.
+    own = memory(airspeed_demand=demand)
+    demanded(own, FW_T_THR_DAMPING=0.0, FW_T_THR_INTEG=0.0, FW_THR_MIN=0.0, FW_THR_MAX=1.0)
+    assert own.throttle_demand == pytest.approx(throttle)
+
+
 def test_pitch_keeps_to_its_limits_less_the_trim() -> None:
     own = memory(height_reference=1500.0, height_asked=1500.0)
     for _ in range(150):
