@@ -524,8 +524,9 @@ class WorkerPool:
         client.register_plugin(CampaignPlugin(self._name, base, mine, fly))
 
     def close(self) -> None:
-        """Let workers that live on forget the campaign."""
-        self._client.unregister_worker_plugin(self._name)
+        """Let workers that live on forget the campaign; one that dies meanwhile has nothing to forget."""
+        with contextlib.suppress(OSError):
+            self._client.unregister_worker_plugin(self._name)
 
     def threads(self) -> int:
         """Flights that the workers can fly at a time, at least 1."""
@@ -601,16 +602,12 @@ class WorkerPool:
 def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[WorkerPool]:
     """WorkerPool of a campaign on these workers; workers of our own end with it, others forget it.
 
-    An interruption waits for no answer of workers of our own: they end with this process.
     Raises SchedulerError as `connected`.
     """
     with connected(workers) as client:
-        pool, live_on = WorkerPool(client, base, fly), True
+        pool = WorkerPool(client, base, fly)
         try:
             yield pool
-        except Interrupted:
-            live_on = workers.scheduler is not None
-            raise
         finally:
-            if live_on:
+            if workers.scheduler is not None:
                 pool.close()

@@ -40,6 +40,11 @@ def some(cases: Iterable[Case], every: int) -> list[Case]:
     return list(cases) if SOAK else list(cases)[::every]
 
 
+def at_most(seconds: float) -> float:
+    """A bound on time: itself in a soak, where little else runs; four times it otherwise, as a loaded core is slow."""
+    return seconds if SOAK else 4.0 * seconds
+
+
 def note(row: str, **figures: float | int | str) -> None:
     """Put a row of figures into the file, in a soak; rows of the same run stand beside each other."""
     _change(row, lambda there: there | figures)

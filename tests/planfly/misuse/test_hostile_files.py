@@ -20,6 +20,7 @@ from rasterio.transform import Affine
 
 from planfly.cli import main
 from tests.logs.made_flight import make_setup, make_track, record
+from tests.soak import at_most
 
 ROOT = Path(__file__).parents[3]
 MAGIC = b"\x89MCAP0\r\n"
@@ -125,7 +126,7 @@ def test_hostile_logs(make: Callable[[], bytes], command: str, judge: Judge, tmp
     (folder / "x.mcap").write_bytes(make())
     code, seconds, printed = judge(folder, command, "x.mcap")
     assert code == 2
-    assert seconds < 1.0
+    assert seconds < at_most(1.0)
     assert len(printed.strip().splitlines()) == 1
     assert printed.startswith("planfly: x.mcap: ")
 
@@ -142,7 +143,7 @@ def test_an_attachment_with_a_climbing_name_in_a_whole_log(judge: Judge, tmp_pat
     assert main(["check", str(tmp_path / "good.mcap")]) in (0, 4)
     code, seconds, printed = judge(folder, "check", "x.mcap")
     assert code == 3
-    assert seconds < 1.0
+    assert seconds < at_most(1.0)
     assert "incomplete" in printed
 
 
@@ -197,6 +198,6 @@ def test_hostile_terrain(name: str, make: Callable[[Path], None] | None, judge: 
         make(folder / name)
     code, seconds, printed = judge(folder, "check", "m.waypoints", "--terrain", name)
     assert code == 2, printed
-    assert seconds < 1.0
+    assert seconds < at_most(1.0)
     assert name in printed
     assert len([line for line in printed.strip().splitlines() if not line.startswith("warning: ")]) == 1

@@ -22,12 +22,12 @@ from tests.autopilots import find_arduplane
 from tests.instances import make_instance, scenario_text
 from tests.planfly.conftest import FIELD
 from tests.planfly.misuse.every_command import check_whole
-from tests.soak import SOAK, note
+from tests.soak import SOAK, at_most, note
 from tests.stopwatch import Stopwatch, processes_of
 
 pytestmark = pytest.mark.alone
 
-LIMIT = 1.0
+LIMIT = at_most(1.0)
 # s in which a process of its own that only waits for the command's end has ended, too.
 _GONE = 1.0
 MOMENTS = 8
