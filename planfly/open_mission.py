@@ -18,12 +18,11 @@ from logs.verdict.rules.fence_rule import zone_test
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.pipeline import make_setup
 from planner.plan import Plan, parse_plan, plan_json, read_plan
-from world.airspace.zone_files import SUFFIXES, read_zone_file
+from world.airspace.zone_files import FileZones, is_zone_file, read_zone_file
 from world.errors import MissionError, PlanflyError
 from world.files import did_you_mean
 from world.frames import GeoOrigin
 from world.scenario import Scenario, load_scenario, with_zones
-from world.scenario_tables import ZoneTable
 
 # ----------------------------------------------------------------------
 # Fences named beside a mission or log: files of fence items, and of zones.
@@ -34,11 +33,11 @@ class NamedFences:
     """What the files hold.
 
     items: of fences, which join the mission's own.
-    zones: of GeoJSON and KML, by the file that each comes from; they join the scenario's.
+    zones: of files of zones, by the file that each comes from; they join the scenario's.
     """
 
     items: tuple[MissionItem, ...] = ()
-    zones: tuple[tuple[str, tuple[ZoneTable, ...]], ...] = ()
+    zones: tuple[tuple[str, FileZones], ...] = ()
 
     def on_mission(self, mission: Mission) -> Mission:
         """A mission with the fence items beside its own."""
@@ -51,8 +50,8 @@ class NamedFences:
 
     def on_scenario(self, scenario: Scenario) -> Scenario:
         """A scenario with the zones beside its own.  Raises ScenarioError as `with_zones` does."""
-        for source, tables in self.zones:
-            scenario = with_zones(scenario, tables, source)
+        for source, found in self.zones:
+            scenario = with_zones(scenario, found.zones, source, found.notes)
         return scenario
 
 
@@ -69,8 +68,8 @@ def read_named_fences(files: Sequence[str]) -> NamedFences:
     zones = []
     for file in files:
         path = Path(file)
-        if path.suffix.lower() in SUFFIXES:
-            zones.append((file, tuple(read_zone_file(path, file))))
+        if is_zone_file(path):
+            zones.append((file, read_zone_file(path, file)))
             continue
         found = read_fence(path)
         # Shapes are checked while it is known which file they are from.

@@ -12,6 +12,8 @@ _Given = TypeVar("_Given")
 _STACK_VALUES = 2**17
 # In the environment of a process that `prepare_process` set up, and so of those that it starts.
 _MARK = "PLANFLY_OWN_PROCESS"
+# In the environment of the one that a campaign's are forked from: its parent, which may be gone before it can ask.
+PARENT = "PLANFLY_FORKED_FOR"
 
 
 def prepare_process() -> None:

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from world.airspace.zone_files import read_zone_files
+from world.airspace.zone_files import FileZones, read_zone_files
+from world.airspace.zone_times import is_active, parse_span
 from world.airspace.zones import Zone
-from world.airspace.zones_on_map import check_ends, make_zones
+from world.airspace.zones_on_map import FAR, check_ends, make_zones, near_zones
 from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
 from world.files import did_you_mean, whole_path
@@ -158,6 +159,25 @@ class Scenario:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What its zones are not taken as they stand in their files, and which of them are left out for the time."""
+        notes = list(self.spec.zone_notes or ())
+        timed = [table for table in self.spec.zones or () if table.times]
+        if timed and self.spec.at is None:
+            count = "1 zone has times of activity, and counts"
+            if len(timed) > 1:
+                count = f"{len(timed):,} zones have times of activity, and count"
+            notes.append(f"{count} at all times (--at applies them)")
+        elif timed:
+            span = " to ".join(f"{one:%Y-%m-%d %H:%M}" for one in parse_span(str(self.spec.at)))
+            off = len(self.spec.zones or ()) - len(self.zones)
+            are = "is" if off == 1 else "are"
+            notes.append(
+                f"{off:,} of {len(timed):,} zones with times of activity {are} not active {span} UTC: left out"
+            )
+        return tuple(notes)
+
     def to_json(self) -> dict[str, Any]:
         """The scenario as plain JSON data; `from_spec` reads it back."""
         stated = self.spec.model_copy(update={"flight": self.spec.flight.stated()})
@@ -249,8 +269,10 @@ def from_spec(
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
     if spec.zones_file is not None:
         # Written down with the scenario's own, so that a log without the files makes the same scenario.
-        zones = [*(spec.zones or ()), *read_zone_files(spec.zones_file, source, base)]
-        spec = spec.model_copy(update={"zones": zones, "zones_file": None})
+        found = read_zone_files(spec.zones_file, source, base)
+        spec = spec.model_copy(update={"zones_file": None})
+    else:
+        found = FileZones()
     if terrain is not None:
         spec, base = _with_terrain(spec, terrain, source, base), None
     raster = None
@@ -280,7 +302,7 @@ def from_spec(
     area = spec.area or checked_table(
         lambda: AreaTable(east_m=bounds[0].tolist(), north_m=bounds[1].tolist()), f"{source}: area"
     )
-    spec = spec.model_copy(update={"origin": place, "area": area})
+    spec = _with_file_zones(spec.model_copy(update={"origin": place, "area": area}), found, source, origin, bounds)
     return _assemble(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
 
 
@@ -305,6 +327,30 @@ def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | No
             lambda: OriginTable(lat_deg=centre.lat_deg, lon_deg=centre.lon_deg), f"{source}: origin"
         )
     return spec.model_copy(update=changes)
+
+
+def _with_file_zones(
+    spec: ScenarioFile, found: FileZones, source: str, origin: GeoOrigin, bounds: Floats
+) -> ScenarioFile:
+    """A scenario's file with the zones of other files beside its own, those that are near."""
+    if not found.zones and not found.notes:
+        return spec
+    near = near_zones(found.zones, origin, bounds)
+    notes = [*(spec.zone_notes or ()), *found.notes]
+    if far := len(found.zones) - len(near):
+        notes.append(
+            f"{source}: {far:,} of {len(found.zones):,} zones lie more than {FAR / 1000.0:g} km from the area: left out"
+        )
+    changes = {"zones": [*(spec.zones or ()), *near] or None, "zone_notes": notes or None}
+    return spec.model_copy(update=changes)
+
+
+def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
+    """The zones that may be active when the scenario is flown."""
+    if spec.at is None:
+        return list(spec.zones or ())
+    span = parse_span(spec.at)
+    return [table for table in spec.zones or () if is_active(table.times or (), *span)]
 
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
@@ -341,7 +387,7 @@ def _assemble(
     ends = () if replaced else (("start", start), ("destination", destination))
     for name, point in ends:
         check_inside(name, point, source, bounds, floor, ceiling, ground)
-    zones = make_zones(spec.zones or (), source, origin, ground)
+    zones = make_zones(_active_zones(spec), source, origin, ground)
     # Of a mission that came without a scenario they are where it goes: for the verdict to find, too.
     check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
@@ -475,8 +521,8 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 
 
-def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str) -> Scenario:
-    """A scenario with more zones; source: names them in messages.
+def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, notes: Sequence[str] = ()) -> Scenario:
+    """A scenario with more zones, those that are near; source: names them in messages.  notes: on their file.
 
     Raises ScenarioError for a shape that is none, for a level above ground where there is no terrain, and for more
     zones than a scenario may have; and, but in a scenario made around a mission, for a zone that an end violates.
@@ -485,13 +531,36 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str) -> 
     >>> [zone.name for zone in with_zones(load_scenario("tight"), [mast], "masts.geojson").zones]
     ['mast']
     """
-    if len(scenario.zones) + len(tables) > MAX_ZONES:
-        raise ScenarioError(f"{source}: {len(tables):,} zones more: at most {MAX_ZONES:,} in all", file=source)
-    zones = make_zones(tables, source, scenario.origin, scenario.terrain)
+    before = len(scenario.spec.zones or ())
+    found = FileZones(list(tables), list(notes))
+    spec = _with_file_zones(scenario.spec, found, source, scenario.origin, scenario.bounds)
+    added = (spec.zones or [])[before:]
+    if before + len(added) > MAX_ZONES:
+        raise ScenarioError(f"{source}: {len(added):,} zones more: at most {MAX_ZONES:,} in all", file=source)
+    only = _active_zones(spec.model_copy(update={"zones": added}))
+    zones = make_zones(only, source, scenario.origin, scenario.terrain)
     ends = (("start", scenario.start), ("destination", scenario.destination))
     check_ends(zones, source, () if scenario.external else ends, scenario.terrain)
-    spec = scenario.spec.model_copy(update={"zones": [*(scenario.spec.zones or ()), *tables]})
     return replace(scenario, spec=spec, zones=(*scenario.zones, *zones))
+
+
+def at_time(scenario: Scenario, at: str | None) -> Scenario:
+    """A scenario flown at a time, as `world.airspace.zone_times.parse_span` reads it; None keeps its own.
+
+    Raises ScenarioError for what is no such time.
+
+    >>> at_time(load_scenario("tight"), "2026-05-01T10:00Z").spec.at
+    '2026-05-01T10:00Z'
+    """
+    if at is None:
+        return scenario
+    try:
+        parse_span(at)
+    except ValueError as error:
+        raise ScenarioError.of_argument("at", at, str(error)) from error
+    spec = scenario.spec.model_copy(update={"at": at})
+    zones = make_zones(_active_zones(spec), scenario.name, scenario.origin, scenario.terrain)
+    return replace(scenario, spec=spec, zones=zones)
 
 
 def with_threats(

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from world.airspace.zone_times import parse_period, parse_span
 from world.height_datum import MAX_SEA_LEVEL, NamedDatum, StatedDatum
 
 # ----------------------------------------------------------------------
@@ -84,6 +85,19 @@ def _latitude_first(corner: list[float]) -> list[float]:
     return corner
 
 
+def _known_period(text: str) -> str:
+    """The text, if it states a period of time."""
+    parse_period(text)
+    return text
+
+
+def _known_span(text: str) -> str:
+    """The text, if it states when a flight begins, or from when to when it lasts."""
+    parse_span(text)
+    return text
+
+
+_ZoneTime = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_known_period)]
 _MetreCorner = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 _Degrees = Annotated[float, within(-180.0, 180.0)]
 _DegreeCorner = Annotated[list[_Degrees], Field(min_length=2, max_length=2), AfterValidator(_latitude_first)]
@@ -99,6 +113,7 @@ class ZoneTable(ScenarioTable):
     number of them.
     east_m, north_m or lat_deg, lon_deg, with radius_m: a cylinder.
     floor, ceiling: above mean sea level or above ground; none where neither is given.
+    times: when it is active, as `world.airspace.zone_times` reads them; None for always.
     """
 
     name: Name
@@ -116,6 +131,7 @@ class ZoneTable(ScenarioTable):
     floor_agl_m: Height | None = None
     ceiling_amsl_m: Amsl | None = None
     ceiling_agl_m: Height | None = None
+    times: Annotated[list[_ZoneTime], Field(min_length=1, max_length=1000)] | None = None
 
     @model_validator(mode="after")
     def _one_shape(self) -> "ZoneTable":
@@ -434,7 +450,9 @@ class ScenarioFile(ScenarioTable):
     """A whole scenario file.
 
     zones: None where there are none, so that what is written of a scenario without them stays as it was.
-    zones_file: GeoJSON or KML, one or several; in a made scenario their zones stand among the others.
+    zones_file: a file of zones or several; in a made scenario their zones stand among the others, and `zone_notes` says
+    what of the files is not taken as it stands.
+    at: when it is flown, as `world.airspace.zone_times` reads it: zones that are not active then are left out.
     returns: None where nothing is asked of them, as zones.
     """
 
@@ -448,6 +466,8 @@ class ScenarioFile(ScenarioTable):
     threats: list[ThreatTable] = Field(default_factory=list, max_length=20_000)
     zones: Annotated[list[ZoneTable], Field(max_length=MAX_ZONES)] | None = None
     zones_file: FilePath | Annotated[list[FilePath], Field(max_length=100)] | None = None
+    zone_notes: Annotated[list[str], Field(max_length=1000)] | None = None
+    at: Annotated[str, Field(max_length=100), AfterValidator(_known_span)] | None = None
     limits: LimitsTable = LimitsTable()
     planner: PlannerTable = PlannerTable()
     flight: FlightTable = FlightTable()

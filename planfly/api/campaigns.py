@@ -125,6 +125,7 @@ def campaign(
     fence: FencePaths = (),
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -151,7 +152,6 @@ def campaign(
     workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
     out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
     overwrite: replace it.
-
     A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
     Raises a `planfly.PlanflyError` for bad input; for a number out of its range it is a ValueError, too.
 
@@ -164,7 +164,7 @@ def campaign(
     goal = make_goal(flights, prove, at_least, confidence)
     asked = _asked(
         target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
+        turbulence=turbulence, at=at, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as place:
         if resume:
@@ -205,6 +205,7 @@ def campaign_flight(
     fence: FencePaths = (),
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -223,7 +224,7 @@ def campaign_flight(
     goal = continued_goal(folder, flights, prove, at_least, confidence)
     asked = _asked(
         target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
+        turbulence=turbulence, at=at, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     base = asked.open(_dispersions(spread), OutputDirectory(folder, DATABASE, resume=True, overwrite=False))
     row = _row_of(base, goal, folder, index)
@@ -260,6 +261,7 @@ def winds(
     fence: FencePaths = (),
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -282,7 +284,6 @@ def winds(
     scenario to nav: as of `planfly.fly`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
     resume: go on with the search that is there.  overwrite: replace it.
-
     A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
     Raises a `planfly.PlanflyError` for bad input; for a number out of its range it is a ValueError, too.
 
@@ -295,7 +296,7 @@ def winds(
     check_arguments(workers=workers, seed=seed)
     asked = _asked(
         target, scenario, terrain, fence, seed, aircraft=aircraft, airspeed=airspeed, wind=wind,
-        turbulence=turbulence, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
+        turbulence=turbulence, at=at, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as place:
         folder = place.folder

@@ -136,6 +136,7 @@ def fly(
     seed: int | None = None,
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -156,7 +157,7 @@ def fly(
     scenario: to fly it in, a name or a TOML file; None for the plan's own, or one made around the mission.
     terrain: an elevation file in place of the scenario's.  fence: files of fences and zones beside its own.
     seed: of the turbulence; None takes the plan's, the scenario's, or 1.
-    wind, turbulence, aircraft, airspeed, params, guidance, autopilot_law, nav: as of `planfly.plan`.
+    wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: as of `planfly.plan`.
     autopilot: the program of ArduPilot SITL, which then flies.
     log_hz: rows a second in the log.  max_hours, max_log: where a flight ends that would go on, h and MB.
 
@@ -172,7 +173,7 @@ def fly(
     if program is not None:
         check_binary(program)
     change = partial(
-        changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
+        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
         guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,
     )  # fmt: skip
     opened = opened_mission(mission, scenario, terrain, seed, fence, change)
@@ -197,6 +198,7 @@ def fly_by_each(
     fence: FencePaths = (),
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
 ) -> dict[str, FlownMission]:
@@ -222,6 +224,7 @@ def fly_by_each(
             fence=fence,
             wind=wind,
             turbulence=turbulence,
+            at=at,
             aircraft=aircraft,
             airspeed=airspeed,
             autopilot_law=name,
@@ -259,6 +262,7 @@ def judge(
     fence: FencePaths = (),
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -272,7 +276,7 @@ def judge(
 
     what: a flight log or its path, an autopilot's log, what `planfly.fly` gave, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.
-    scenario, wind, turbulence, aircraft, airspeed, params, guidance, autopilot_law: of a plan or mission, as of
+    scenario, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law: of a plan or mission, as of
     `planfly.fly`; a flight is judged as it was flown.
     terrain, fence: in place of the ground, and beside the fences, that it carries.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
@@ -284,14 +288,14 @@ def judge(
     >>> judged.verdict.level, judged.setup.scenario.name, judged.loss
     ('geometric', 'tight', '')
     """
-    flown_with: dict[str, Any] = {"wind": wind, "turbulence": turbulence, "aircraft": aircraft}
+    flown_with: dict[str, Any] = {"wind": wind, "turbulence": turbulence, "at": at, "aircraft": aircraft}
     flown_with |= {"airspeed": airspeed, "params": params}
     if isinstance(what, str | Path) and is_imported_log(Path(what)):
         # Imported here: no other check needs the libraries that read other programs' logs.
         from planfly.api.imported import read_imported
 
         found = read_imported(
-            what, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence,
+            what, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence, at=at,
             aircraft=aircraft, airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law,
             flight=flight, datum=datum,
         )  # fmt: skip
@@ -320,6 +324,7 @@ def check(
     fence: FencePaths = (),
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -341,7 +346,8 @@ def check(
     ('geometric', False)
     """
     return judge(
-        what, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence, aircraft=aircraft,
+        what, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence,
+        at=at, aircraft=aircraft,
         airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law, plan=plan, flight=flight,
         datum=datum,
     ).verdict  # fmt: skip

@@ -51,6 +51,7 @@ def read_imported(
     fence: FencePaths = (),
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -83,7 +84,7 @@ def read_imported(
         wind_given=wind is not None,
         fences=named_fences(fence),
     )
-    change = partial(changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft)
+    change = partial(changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft)
     return import_flight(Path(log), options, change)
 
 
@@ -98,6 +99,7 @@ def import_log(
     fence: FencePaths = (),
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     flight: int | None = None,
@@ -111,7 +113,7 @@ def import_log(
     plan: the mission or plan.json that was to be flown, in place of the log's own mission.
     flight: which of the log's flights, from 1; None for the longest in AUTO.
     datum: what the log's heights are above where it does not say, "amsl" or "ellipsoid".
-    scenario, terrain, fence, wind, turbulence, aircraft: as of `planfly.fly`; without an aircraft no limits of an
+    scenario, terrain, fence, wind, turbulence, at, aircraft: as of `planfly.fly`; without an aircraft no limits of an
     aircraft are judged.
     airspeed: refused: the flight is judged by the speeds of its log.
     Raises a `planfly.PlanflyError` for bad input; nothing is written then.
@@ -119,7 +121,7 @@ def import_log(
     if target is not None:
         refuse_existing(Path(target), overwrite, Path(log))
     found = read_imported(
-        log, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence,
+        log, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence, at=at,
         aircraft=aircraft, airspeed=airspeed, flight=flight, datum=datum,
     )  # fmt: skip
     if target is not None:

@@ -23,6 +23,7 @@ from world.errors import ArgumentError, ScenarioError
 from world.files import whole_path, write_whole
 from world.scenario import (
     Scenario,
+    at_time,
     embedded_scenarios,
     load_scenario,
     with_flight,
@@ -90,6 +91,7 @@ def changed_scenario(
     *,
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -121,7 +123,7 @@ def changed_scenario(
         autopilot=autopilot,
     )
     from_course = None if from_deg is None else math.radians(from_deg)
-    return with_wind(with_flight(scenario, **entries), speed, from_course, turbulence)
+    return with_wind(with_flight(at_time(scenario, at), **entries), speed, from_course, turbulence)
 
 
 # ----------------------------------------------------------------------
@@ -141,6 +143,7 @@ def plan(
     seconds: float | None = None,
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -158,6 +161,8 @@ def plan(
     algorithm: a name of ``planfly plan --help``; None for the default.
     budget: evaluations at most.  seconds: time at most; the best path so far is given then.
     wind: speed, m/s, and where it comes from, degrees; turbulence: "none", "light" or "moderate".
+    at: when it is flown, "START" or "START/END" by ISO 8601 with offsets from UTC: zones that are not active then are
+    left out; None leaves none out.
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     autopilot_law: "ardupilot", "px4" (the newest release that planfly knows), "px4-1.16", "px4-1.17" or "ideal".
     guidance: planfly's own law ("path", "l1", "vector-field") in place of ArduPlane's.  nav: "perfect", "rtk", "gnss".
@@ -176,7 +181,7 @@ def plan(
     (22, 3)
     """
     change = partial(
-        changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
+        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
         guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     check_arguments(seed=seed, budget=budget, seconds=seconds)
@@ -197,6 +202,7 @@ def replan(
     seconds: float | None = None,
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -222,7 +228,7 @@ def replan(
     (3, True)
     """
     change = partial(
-        changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
+        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
         guidance=guidance, autopilot_law=autopilot_law, nav=nav,
     )  # fmt: skip
     check_arguments(seed=seed, budget=budget, seconds=seconds, at_leg=at_leg)

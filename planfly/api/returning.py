@@ -122,6 +122,7 @@ def returns(
     seed: int | None = None,
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -137,10 +138,9 @@ def returns(
     what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: what `planfly.fly`
     gave, a flight log or its path, or an autopilot's log.
     every: s between two returns.  suggest: whether to look for what would make all of them safe.
-    scenario, terrain, fence, seed, wind, turbulence, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
+    scenario, terrain, fence, seed, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
     plan or mission, as of `planfly.fly`; of a flight only terrain.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
-
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a home.
 
     >>> import planfly
@@ -150,8 +150,8 @@ def returns(
     """
     check_arguments(every=every, seed=seed, flight=flight, datum=datum)
     given: dict[str, Any] = {
-        "scenario": scenario, "fence": fence or None, "wind": wind, "turbulence": turbulence, "aircraft": aircraft,
-        "airspeed": airspeed, "params": params, "guidance": guidance, "autopilot_law": autopilot_law,
+        "scenario": scenario, "fence": fence or None, "wind": wind, "turbulence": turbulence, "at": at,
+        "params": params, "aircraft": aircraft, "airspeed": airspeed, "guidance": guidance, "autopilot_law": autopilot_law,
     }  # fmt: skip
     other, of_log = {"seed": seed, "nav": nav}, {"plan": plan, "flight": flight, "datum": datum}
     path = Path(what) if isinstance(what, str | Path) else None

@@ -116,6 +116,7 @@ def run(
     terrain: str | Path | None = None,
     wind: Wind | None = None,
     turbulence: str | None = None,
+    at: str | None = None,
     aircraft: str | Path | None = None,
     airspeed: float | None = None,
     params: str | Path | None = None,
@@ -138,7 +139,6 @@ def run(
     out: the folder; {name} and {seed} in it stand for the scenario's name and the seed.
     overwrite: whether results that lie there are replaced, as they always are in the default folder.
     on_round: called with each round once it is over.  The other keywords are as of `planfly.fly`.
-
     Raises a `planfly.PlanflyError` for bad input, before anything is written.
 
     >>> import planfly, tempfile
@@ -152,7 +152,7 @@ def run(
     if program is not None:
         check_binary(program)
     change = partial(
-        changed_scenario, wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed, params=params,
+        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
         guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,
     )  # fmt: skip
     world = change(opened_scenario(scenario, terrain))
@@ -161,7 +161,7 @@ def run(
     refuse_folder(folder, overwrite or out == RUN_FOLDER)
     repeated = {
         "refine": refine, "terrain": terrain, "aircraft": aircraft, "airspeed": airspeed, "wind": wind,
-        "turbulence": turbulence, "params": params, "guidance": guidance, "nav": nav, "autopilot": autopilot,
+        "turbulence": turbulence, "at": at, "params": params, "guidance": guidance, "nav": nav, "autopilot": autopilot,
     } | {"autopilot-law": autopilot_law}  # fmt: skip
     name = world.name if isinstance(scenario, Scenario) else str(scenario)
     line, limits = command_line(name, number, repeated), FlightLimits(max_hours, max_log)

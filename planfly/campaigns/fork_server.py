@@ -7,15 +7,17 @@ import atexit
 import contextlib
 import os
 import shutil
+import signal
 import socket
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
-from planfly.kernel_units.ready_kernels import UNITS
-from planfly.kernel_units.unit_kernels import BOTH
-from planfly.process_setup import prepare_child
-from world.compile_events import tell_before_compiling
+from planfly.process_setup import PARENT, prepare_child
+
+# s between two looks at whether the parent is there.
+_LOOK = 0.1
 
 
 class _NotCompiledYet(Exception):
@@ -24,6 +26,10 @@ class _NotCompiledYet(Exception):
 
 def load_kernels() -> None:
     """Load the compiled kernels of a default plan and flight, as far as they are in the cache."""
+    # Imported here: it takes long, and by then the parent is looked to.
+    from planfly.kernel_units.ready_kernels import UNITS
+    from planfly.kernel_units.unit_kernels import BOTH
+    from world.compile_events import tell_before_compiling
 
     def refuse() -> None:
         raise _NotCompiledYet
@@ -52,10 +58,28 @@ def end(folders: list[Path]) -> None:
     os._exit(0)
 
 
+@contextlib.contextmanager
+def ending_with(parent: int) -> Iterator[None]:
+    """End this process within a moment of its parent's end, which it would notice only after all imports."""
+
+    def look(*_: object) -> None:
+        if os.getppid() != parent:
+            end(socket_folders())
+
+    signal.signal(signal.SIGALRM, look)
+    signal.setitimer(signal.ITIMER_REAL, _LOOK, _LOOK)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+
+
 if "multiprocessing.forkserver" in " ".join(sys.orig_argv):
-    prepare_child()
-    for needed in ("planfly.campaigns.report", "planfly.pipeline", "scipy.stats"):
-        import_module(needed)
-    load_kernels()
+    with ending_with(int(os.environ.get(PARENT, os.getppid()))):
+        prepare_child()
+        for needed in ("planfly.campaigns.report", "planfly.pipeline", "scipy.stats"):
+            import_module(needed)
+        load_kernels()
     # The processes that are forked from this one forget it.
     atexit.register(end, socket_folders())

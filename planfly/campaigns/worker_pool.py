@@ -38,6 +38,7 @@ from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.private_cluster import private_security
 from planfly.pipeline import Advance
+from planfly.process_setup import PARENT
 from world.errors import PlanflyError
 from world.files import temporary_folder
 from world.interruption import Interrupted, children_ignore_sigint, end_children, end_with_parent
@@ -76,6 +77,7 @@ def child_processes() -> "ForkServerContext | SpawnContext":
     context = multiprocessing.get_context("forkserver")
     # What it preloads is settled when it starts; dask would name modules of its own.
     context.set_forkserver_preload(list(_PRELOADED))
+    os.environ[PARENT] = str(os.getpid())
     with children_ignore_sigint():
         forkserver.ensure_running()
     return context

@@ -58,7 +58,7 @@ def check(args: argparse.Namespace) -> int:
         return _check_for(args)
     judged = call(planfly.judge, args)
     if judged.verdict.level == "geometric":
-        print_warnings(judged.setup.mission.warnings)
+        print_warnings([*judged.setup.mission.warnings, *judged.setup.scenario.notes])
     give_answer(args, lambda: _document(judged))
     print_warnings([judged.loss] if judged.loss else [])
     print_verdict(judged.verdict, judged.setup.route.notes)

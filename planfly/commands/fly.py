@@ -45,7 +45,7 @@ def fly(args: argparse.Namespace) -> int:
     named = args.log is not None
     log = args.log if named else f"{RUN_FOLDER}/flight.mcap"
     flown = call(planfly.fly, args, log=log, overwrite=args.overwrite or not named)
-    print_warnings(flown.mission.warnings)
+    print_warnings([*flown.mission.warnings, *flown.setup.scenario.notes])
     print_verdict(flown.verdict, flown.setup.route.notes)
     print_returns(flown.returns_line)
     if flown.log is None:
@@ -69,6 +69,6 @@ def _answer(mission: str, flown: "FlownMission", code: int) -> object:
         seed=flown.setup.seed,
         log=None if flown.log is None else str(flown.log),
         autopilot_log=None if flown.autopilot_log is None else str(flown.autopilot_log),
-        warnings=list(flown.mission.warnings),
+        warnings=[*flown.mission.warnings, *flown.setup.scenario.notes],
         verdict=verdict_document(flown.verdict),
     )

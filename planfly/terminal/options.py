@@ -22,6 +22,7 @@ from planfly.terminal.arguments import (
     wind,
 )
 from planfly.terminal.command_parser import CommandParser, OptionTaker
+from world.airspace.zone_suffixes import SUFFIXES as ZONES
 from world.elevation_formats import EMBEDDED, SUFFIXES
 
 Returned = TypeVar("Returned")
@@ -100,9 +101,18 @@ def fence_option(group: OptionTaker) -> None:
         metavar="FILE",
         action="append",
         default=[],
-        help="also keep within this fence: .fence, .waypoints, .txt or .plan, or zones in .geojson or .kml; repeatable",
+        help="also keep within this fence: .fence, .waypoints, .txt or .plan, or zones: .geojson, .json (of ED-269 and "
+        "ED-318, too), .kml, .openair, .gpkg; repeatable",
     )
-    completed(found, files("fence", "geojson", "kml", *MISSIONS))
+    completed(found, files("fence", *(suffix[1:] for suffix in ZONES), *MISSIONS))
+
+
+def time_option(group: OptionTaker) -> None:
+    """When it is flown."""
+    group.add_argument(
+        "--at", metavar="TIME", help="when it is flown, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: "
+        "zones that are not active then are left out (default: all count)",
+    )  # fmt: skip
 
 
 def flown_by_options(parser: CommandParser) -> None:
@@ -126,6 +136,7 @@ def flown_by_options(parser: CommandParser) -> None:
         "(default: the scenario's, or none)",
     )  # fmt: skip
     turbulence_option(group)
+    time_option(group)
 
 
 def turbulence_option(group: OptionTaker) -> None:

@@ -1,122 +1,38 @@
-"""Files of zones: read by `FORMATS` into the [[zones]] tables that a scenario file would have them in."""
+"""Files of zones: read by their suffixes into the [[zones]] tables that a scenario file would have them in."""
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from world.airspace.zones import holes_lie_inside
+from world.airspace.geopackage import geopackage_features
+from world.airspace.openair import is_openair, openair_zones
+from world.airspace.uas_zones import ed269_zones, ed318_zones, is_ed269, is_ed318
+from world.airspace.zone_entries import PUBLISHED, zone_entries
+from world.airspace.zone_suffixes import GEOPACKAGE, SUFFIXES
+from world.airspace.zones import holes_lie_inside, mended_rings
 from world.errors import ScenarioError
 from world.scenario_file import checked_table
 from world.scenario_tables import MAX_ZONES, ZoneTable
-
-# ----------------------------------------------------------------------
-# What files of zones say beside their shapes: kind, floor and ceiling, as entries of a [[zones]] table.
-
-# Keys that mean what they mean in a scenario file.
-_OWN = ("kind", "floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
-# A property that begins so and is none of ours, nor another's that is read, may be one of ours misspelt.
-_LIKE_OURS = ("floor", "ceiling", "radius")
-# openAIP's limits: the API's keys and numbers, and the keys and names of its converters from OpenAir and AIXM.
-# https://docs.openaip.net, and the results in https://github.com/openAIP/openaip-openair-parser
-_LIMITS = {"lowerLimit": "floor", "lowerCeiling": "floor", "upperLimit": "ceiling", "upperCeiling": "ceiling"}
-_UNITS = {0: 1.0, "M": 1.0, 1: 0.3048, "FT": 0.3048, 6: 30.48, "FL": 30.48}
-_DATUMS = {
-    0: "agl", "GND": "agl", "AGL": "agl", "SFC": "agl", 1: "amsl", "MSL": "amsl", 2: "standard", "STD": "standard",
-}  # fmt: skip
-# m.  A flight level is a pressure, not a height: between a low of 965 hPa and a high of 1,060 at the sea it lies up to
-# this far below or above where it is at 1,013.25 hPa (27 ft per hPa, ICAO Doc 7488).
-FLIGHT_LEVEL_ERROR = 400.0
-# m.  Heights that a table takes: no flight is beyond them.
-_LOWEST, _HIGHEST = -500.0, 9000.0
-# The FAA's limits in its open data (Class Airspace, Special Use Airspace): LOWER_VAL, LOWER_UOM, LOWER_CODE, and UPPER.
-_FAA = {"LOWER": "lowerLimit", "UPPER": "upperLimit"}
-# A value that is not applicable there.
-_FAA_NONE = -9998.0
-
-
-def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Entries of a [[zones]] table that a zone's properties state; an exclusion where no kind is stated.
-
-    A flight level bounds an exclusion by the height that it is within `FLIGHT_LEVEL_ERROR` of, on the safe side.
-    Raises ScenarioError for a limit that is none, for a flight level of an inclusion, and for a property that looks
-    like one of ours and is not.
-
-    >>> zone_entries({"lowerLimit": {"value": 0, "unit": 1, "referenceDatum": 0}, "ceiling_agl_m": 90.0}, "a file")
-    {'kind': 'exclusion', 'ceiling_agl_m': 90.0}
-    """
-    entries: dict[str, Any] = {"kind": "exclusion"}
-    for key, value in {**_faa_limits(properties, source), **properties}.items():
-        if value is None:
-            continue
-        if key in _LIMITS:
-            entries |= _limit(value, key, properties.get("kind"), source)
-        elif key in _OWN:
-            entries[key] = value
-        elif key.lower().startswith(_LIKE_OURS):
-            raise ScenarioError.at(source, key, value, f"unknown; known are {', '.join(_OWN)}", shown="")
-    if entries.get("floor_amsl_m") == _HIGHEST:
-        # All of it is above every flight.
-        entries.pop("ceiling_amsl_m", None)
-    return entries
-
-
-def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Limits as the FAA writes them, as openAIP's."""
-    found = {}
-    for side, key in _FAA.items():
-        if (value := properties.get(f"{side}_VAL")) is None:
-            continue
-        try:
-            height = float(value)
-        except (TypeError, ValueError) as error:
-            raise ScenarioError.at(source, f"{side}_VAL", value, "a number is expected", shown="") from error
-        if height != _FAA_NONE:
-            unit, datum = properties.get(f"{side}_UOM"), properties.get(f"{side}_CODE")
-            found[key] = {"value": height, "unit": unit, "referenceDatum": datum}
-    return found
-
-
-def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
-    """The entry that one of openAIP's limits comes to; none for the ground as a floor."""
-    if not isinstance(value, dict):
-        allowed = "a table of value, unit and referenceDatum is expected"
-        raise ScenarioError.at(source, key, value, allowed, shown="")
-    height, unit, datum = value.get("value"), value.get("unit"), value.get("referenceDatum")
-    if isinstance(height, bool) or not isinstance(height, int | float):
-        raise ScenarioError.at(source, f"{key}.value", height, "a number is expected", shown="")
-    # A list, say, is not even looked for.
-    if not isinstance(unit, int | str) or unit not in _UNITS:
-        allowed = f"allowed {', '.join(map(str, _UNITS))}"
-        raise ScenarioError.at(source, f"{key}.unit", unit, allowed, shown="")
-    if not isinstance(datum, int | str) or datum not in _DATUMS:
-        allowed = f"allowed {', '.join(map(str, _DATUMS))}"
-        raise ScenarioError.at(source, f"{key}.referenceDatum", datum, allowed, shown="")
-    side, metres, counted = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
-    if side == "floor" and counted == "agl" and metres <= 0.0:
-        return {}
-    if counted == "standard" or _UNITS[unit] == _UNITS["FL"]:
-        if kind == "inclusion":
-            allowed = "a flight level bounds no inclusion; give a height in metres"
-            raise ScenarioError.at(source, key, value, allowed, shown="")
-        counted, metres = "amsl", metres + (FLIGHT_LEVEL_ERROR if side == "ceiling" else -FLIGHT_LEVEL_ERROR)
-    return {f"{side}_{counted}_m": min(_HIGHEST, max(_LOWEST, metres))}
-
 
 # ----------------------------------------------------------------------
 # Zones of a GeoJSON file (RFC 7946): polygons, multipolygons with their holes, and points with a radius.
 
 # Names of the CRS that the older GeoJSON of 2008 may state and that means longitude and latitude on WGS84.
 _DEGREES = ("CRS84", "4326")
+# Of a zone: where it stands in its file, and its entries as a [[zones]] table has them, or why it keeps nobody out.
+Found = tuple[str, dict[str, Any] | str]
 
 
-def geojson_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Where each zone stands in a file, and its entries as a [[zones]] table has them.
+def geojson_zones(text: str, source: str) -> Iterator[Found]:
+    """The zones of a file of GeoJSON, of which ED-318 is a kind, or of the JSON of ED-269.
 
-    A multipolygon is one zone of several parts.  Raises ScenarioError for what is no GeoJSON, and for a geometry that
-    is no zone.
+    A multipolygon is one zone of several parts.  Raises ScenarioError for what is neither, and for a geometry that is
+    no zone.
 
     >>> square = '{"type": "Polygon", "coordinates": [[[8, 46], [8.01, 46], [8.01, 46.01], [8, 46]]]}'
     >>> [(where, entries["name"], len(entries["rings_deg"][0])) for where, entries in geojson_zones(square, "a file")]
@@ -128,6 +44,9 @@ def geojson_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]
         raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
     if not isinstance(data, dict):
         raise ScenarioError(f"{source}: a GeoJSON object is expected, got {type(data).__name__}", file=source)
+    if is_ed269(data):
+        yield from ed269_zones(data, source)
+        return
     _check_crs(data, source)
     kind = data.get("type")
     if kind == "FeatureCollection":
@@ -135,7 +54,10 @@ def geojson_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]
         if not isinstance(features, list):
             raise ScenarioError(f"{source}: features: a list is expected", file=source, field="features")
         for k, feature in enumerate(features):
-            yield _geojson_zone(feature, f"features[{k}]", k, source)
+            if is_ed318(feature):
+                yield from ed318_zones(feature, f"features[{k}]", k, source)
+            else:
+                yield _geojson_zone(feature, f"features[{k}]", k, source)
     elif kind == "Feature":
         yield _geojson_zone(data, "feature", 0, source)
     else:
@@ -218,7 +140,7 @@ _LEVEL = 0.5
 _NUMBERS = ("floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
 
 
-def kml_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
+def kml_zones(text: str, source: str) -> Iterator[Found]:
     """Where each zone stands in a file, and its entries as a [[zones]] table has them.
 
     An extruded polygon is a zone up to its height, as `altitudeMode` counts it; one that is clamped to the ground has
@@ -341,27 +263,51 @@ def _extended(placemark: _Element, source: str) -> dict[str, Any]:
 # ----------------------------------------------------------------------
 # The formats by suffix, and files read in them.
 
-# Of a text, and of its name in messages: where each zone stands, and its entries.
-Reader = Callable[[str, str], Iterator[tuple[str, dict[str, Any]]]]
-FORMATS: dict[str, Reader] = {".geojson": geojson_zones, ".json": geojson_zones, ".kml": kml_zones}
-SUFFIXES = tuple(FORMATS)
+# Of a text, and of its name in messages.
+Reader = Callable[[str, str], Iterator[Found]]
+# All suffixes but that of a GeoPackage, which is no text.
+FORMATS: dict[str, Reader] = dict(
+    zip(SUFFIXES, (geojson_zones, geojson_zones, kml_zones, openair_zones, openair_zones), strict=False)
+)
 # Bytes of a file at most.
-MAX_BYTES = 16 * 2**20
+MAX_BYTES = 64 * 2**20
 
 
-def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) -> list[ZoneTable]:
+@dataclass(slots=True)
+class FileZones:
+    """What a file of zones holds: its zones, and what of it is not taken as it stands, a line each."""
+
+    zones: list[ZoneTable] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def is_zone_file(path: Path) -> bool:
+    """Whether a file is one of zones, by its suffix; a .txt by its first command, as OpenAir has it."""
+    suffix = path.suffix.lower()
+    if suffix != ".txt":
+        return suffix in SUFFIXES
+    try:
+        with path.open(encoding="latin-1") as file:
+            return is_openair(file.read(65536))
+    except OSError:
+        return False
+
+
+def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) -> FileZones:
     """Read the zones of a scenario's files, one or several.
 
     source: names the scenario in messages.  base: folder that relative paths count from.  Raises ScenarioError as
     `read_zone_file` does, and for more zones than a scenario may have.
     """
-    tables: list[ZoneTable] = []
+    found = FileZones()
     for file in [files] if isinstance(files, str) else files:
-        tables += read_zone_file(Path(base or "", file), f"{source}: zones_file: {file}", MAX_ZONES - len(tables))
-    return tables
+        more = read_zone_file(Path(base or "", file), f"{source}: zones_file: {file}", MAX_ZONES - len(found.zones))
+        found.zones += more.zones
+        found.notes += more.notes
+    return found
 
 
-def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> list[ZoneTable]:
+def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
     """Read the zones of a file, in the format of its suffix.
 
     source: names it in messages.  most: zones that it may have.  Raises ScenarioError for a file that cannot be read,
@@ -373,38 +319,71 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> list[ZoneT
     ...     _ = path.write_text(
     ...         '{"type": "Polygon", "coordinates": [[[8, 46], [8.01, 46], [8.01, 46.01], [8, 46]]]}', encoding="ascii"
     ...     )
-    ...     [(zone.name, zone.kind) for zone in read_zone_file(path, "a file")]
+    ...     [(zone.name, zone.kind) for zone in read_zone_file(path, "a file").zones]
     [('zone 1', 'exclusion')]
     """
-    reader = FORMATS.get(path.suffix.lower())
-    if reader is None:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
         allowed = f"a file of zones is {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         message = f"{source}: suffix {path.suffix!r}: {allowed}"
         raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
-    tables: list[ZoneTable] = []
-    for where, entries in reader(_text(path, source), source):
-        if len(tables) >= most:
+    read, free, mended = FileZones(), Counter[str](), list[str]()
+    for where, entries in _found(path, suffix, source):
+        if isinstance(entries, str):
+            free[entries] += 1
+            continue
+        if len(read.zones) >= most:
             message = f"{source}: more zones than may be: at most {MAX_ZONES:,} in all files"
             raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
-        tables.append(_table(entries, f"{source}: {where}"))
-    if not tables:
+        if entries.pop(PUBLISHED, False) and (rings := mended_rings(entries["rings_deg"])) is not None:
+            mended.append(str(entries["name"]))
+            entries["rings_deg"] = rings
+        if entries.get("rings_deg") == []:
+            raise ScenarioError(f"{source}: {where}: its outline encloses no area", file=source, field="rings_deg")
+        read.zones.append(_table(entries, f"{source}: {where}"))
+    if not read.zones and not free:
         raise ScenarioError(f"{source}: there is no zone in it", file=source)
-    return tables
+    for reason, count in free.items():
+        keep = "1 zone keeps" if count == 1 else f"{count:,} zones keep"
+        read.notes.append(f"{source}: {keep} nobody out: {reason}")
+    if mended:
+        names = ", ".join(mended[:5]) + (f", {len(mended) - 5:,} more" if len(mended) > 5 else "")
+        read.notes.append(f"{source}: outlines that cross themselves are taken as the area they enclose: {names}")
+    return read
 
 
-def _text(path: Path, source: str) -> str:
+def _found(path: Path, suffix: str, source: str) -> Iterator[Found]:
+    """The zones of a file in the format of its suffix."""
+    if suffix == GEOPACKAGE:
+        _check_size(path, source)
+        for k, (where, feature) in enumerate(geopackage_features(path, source)):
+            yield _geojson_zone(feature, where, k, source)
+        return
+    yield from FORMATS[suffix](_text(path, source, openair=FORMATS[suffix] is openair_zones), source)
+
+
+def _check_size(path: Path, source: str) -> None:
+    if not path.is_file():
+        raise ScenarioError(f"{source}: no such file", file=source)
+    if path.stat().st_size > MAX_BYTES:
+        raise ScenarioError(
+            f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MAX_BYTES:,}", file=source
+        )
+
+
+def _text(path: Path, source: str, *, openair: bool) -> str:
+    """The text of a file; older OpenAir files are in Latin letters of one byte each."""
     try:
-        if not path.is_file():
-            raise ScenarioError(f"{source}: no such file", file=source)
-        if path.stat().st_size > MAX_BYTES:
-            raise ScenarioError(
-                f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MAX_BYTES:,}", file=source
-            )
-        return path.read_text(encoding="utf-8-sig")
+        _check_size(path, source)
+        data = path.read_bytes()
+        try:
+            return data.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            if openair and b"\0" not in data:
+                return data.decode("latin-1")
+            raise ScenarioError(f"{source}: not a text file in UTF-8 (byte {error.start})", file=source) from error
     except OSError as error:
         raise ScenarioError(f"{source}: cannot be read: {error.strerror}", file=source) from error
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"{source}: not a text file in UTF-8 (byte {error.start})", file=source) from error
 
 
 def _table(entries: dict[str, Any], source: str) -> ZoneTable:

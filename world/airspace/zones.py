@@ -159,6 +159,39 @@ def is_hole(ring: Ring) -> bool:
     return not shapely.LinearRing(ring).is_ccw
 
 
+def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[tuple[float, float]]:
+    """The outline of a band of this width along a line, with half circles at its ends, m.
+
+    >>> outline = band_outline([(0.0, 0.0), (0.0, 90.0)], 20.0)
+    >>> min(north for _, north in outline), max(east for east, _ in outline)
+    (-10.0, 10.0)
+    """
+    band = shapely.LineString(corners).buffer(0.5 * width, cap_style="round", join_style="mitre")
+    return [(float(east), float(north)) for east, north in band.exterior.coords[:-1]]
+
+
+def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[float]]] | None:
+    """Rings of the area that an outline with its holes encloses, where they cross; none for an outline of no area.
+
+    rings: the outline first.  Returns None where nothing is to be mended.
+
+    >>> len(mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]]))  # a bow tie has two halves
+    2
+    >>> mended_rings([[[0, 0], [2, 0], [2, 2]]]) is None
+    True
+    """
+    if any(len(ring) < 3 for ring in rings) or not all(math.isfinite(x) for ring in rings for at in ring for x in at):
+        return None
+    shape = shapely.Polygon(rings[0], rings[1:])
+    if shape.is_valid:
+        return None
+    made = shapely.make_valid(shape, method="structure", keep_collapsed=False)
+    parts = [one for one in shapely.get_parts(made) if isinstance(one, shapely.Polygon) and not one.is_empty]
+    return [
+        [list(corner) for corner in ring.coords[:-1]] for part in parts for ring in (part.exterior, *part.interiors)
+    ]
+
+
 def holes_lie_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
     """Whether all rings but the first lie within it, or one of them is no ring, which `make_polygon` refuses.
 

@@ -80,6 +80,29 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
     return tuple(zones)
 
 
+# m.  No flight that stays in its area comes near a zone beyond this.
+FAR = 20_000.0
+
+
+def near_zones(tables: Sequence[ZoneTable], origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
+    """The zones of a file that a flight may meet: inclusions, and exclusions within `FAR` of the area.
+
+    bounds: ((2, 2)) m, west and east, south and north of the area.
+    """
+    return [table for table in tables if table.kind == "inclusion" or _is_near(table, origin, bounds)]
+
+
+def _is_near(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
+    reach, corners = FAR, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
+    if table.lat_deg is not None and table.lon_deg is not None:
+        reach, corners = FAR + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
+    places = np.array([corner for ring in corners or [] for corner in ring], dtype=np.float64)
+    if not len(places):
+        return True
+    spans = zip(to_map(origin, places[:, 0], places[:, 1]), bounds, strict=True)
+    return all(at.min() <= high + reach and at.max() >= low - reach for at, (low, high) in spans)
+
+
 def _shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
     if table.radius_m is not None:
         east, north = table.east_m, table.north_m

@@ -293,3 +293,30 @@ def test_too_few_descriptors_for_the_workers_are_one_line(monkeypatch: pytest.Mo
     with pytest.raises(OSError, match="take 64 file descriptors, and the limit is 63") as caught:
         allow_descriptors(2)
     assert caught.value.filename == "2 workers"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux alone")
+def test_the_process_that_others_are_forked_from_ends_with_its_parent() -> None:
+    """Also while it imports what they need, which takes it seconds in which it does not listen."""
+    program = (
+        "import sys\n"
+        "from planfly.campaigns.worker_pool import child_processes\n"
+        "child_processes()\n"
+        "print('running', flush=True)\n"
+        "sys.stdin.read()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as parent:
+        assert parent.stdout is not None
+        assert parent.stdout.readline() == "running\n"
+        children = psutil.Process(parent.pid).children()
+        (server,) = (one for one in children if "forkserver import main" in " ".join(one.cmdline()))
+        parent.kill()
+    worked = 0.0
+    with contextlib.suppress(psutil.NoSuchProcess):
+        while server.status() != psutil.STATUS_ZOMBIE:
+            worked = server.cpu_times().user
+            time.sleep(0.01)
+    # All that it imports and loads takes it 3 s.
+    assert worked < 1.5

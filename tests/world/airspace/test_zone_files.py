@@ -11,7 +11,8 @@ import pytest
 from tests.soak import at_most
 from tests.world.made.made_scenario import SMALL
 from world.airspace import zone_files
-from world.airspace.zone_files import FLIGHT_LEVEL_ERROR, MAX_BYTES, geojson_zones, kml_zones, zone_entries
+from world.airspace.zone_entries import FLIGHT_LEVEL_ERROR, zone_entries
+from world.airspace.zone_files import MAX_BYTES, geojson_zones, kml_zones
 from world.airspace.zones import Cylinder, Polygon
 from world.errors import PlanflyError, ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
@@ -331,12 +332,12 @@ def test_what_is_written_down_needs_no_file(tmp_path: Path) -> None:
 
 BAD_FILES = {
     "missing.geojson": (None, "no such file"),
-    "zones.kmz": (b"PK", "suffix '.kmz': a file of zones is .geojson, .json or .kml"),
+    "zones.kmz": (b"PK", "suffix '.kmz': a file of zones is .geojson, .json, .kml, .openair, .txt or .gpkg"),
     "empty.geojson": (b"", "not valid JSON"),
     "none.geojson": (b'{"type": "FeatureCollection", "features": []}', "there is no zone in it"),
     "none.kml": (b"<kml/>", "there is no zone in it"),
     "latin.geojson": (b'{"type": "\xe9"}', "not a text file in UTF-8 (byte 10)"),
-    "large.kml": (b" " * (MAX_BYTES + 1), "16,777,217 bytes: a file of zones has at most 16,777,216"),
+    "large.kml": (b" " * (MAX_BYTES + 1), "67,108,865 bytes: a file of zones has at most 67,108,864"),
     "pole.geojson": (
         json.dumps(LAKE).replace("46.02", "89.5").encode(),
         "feature (lake): rings_deg.0.2: latitude 89.5: allowed -89..89",
@@ -403,7 +404,7 @@ def test_a_million_of_each_is_a_line_at_once(tmp_path: Path) -> None:
             load_scenario(str(tmp_path / name))
     for name in ("z.geojson", "z.kml"):
         (tmp_path / name).write_text(" " * 10**8)
-        with pytest.raises(ScenarioError, match="bytes: a file of zones has at most 16,777,216"):
+        with pytest.raises(ScenarioError, match="bytes: a file of zones has at most 67,108,864"):
             zone_files.read_zone_file(tmp_path / name, name)
     assert time.process_time() - started < at_most(2.0)
 
@@ -451,28 +452,22 @@ def test_limits_as_they_are_published(case: str, tmp_path: Path) -> None:
     published, limits = PUBLISHED[case]
     path = tmp_path / "z.geojson"
     path.write_text(json.dumps({"type": "FeatureCollection", "features": [published]}), encoding="utf-8")
-    (zone,) = zone_files.read_zone_file(path, "z.geojson")
+    (zone,) = zone_files.read_zone_file(path, "z.geojson").zones
     found = {name: value for name, value in zone.model_dump().items() if "_m" in name and value is not None}
     assert found == pytest.approx(limits)
 
 
-ED_269 = {
-    "title": "zones",
-    "features": [
-        {
-            "identifier": "LAKE", "restriction": "PROHIBITED",
-            "geometry": [{"upperLimit": 120, "horizontalProjection": {"type": "Polygon", "coordinates": [RING]}}],
-        }
-    ],
-}  # fmt: skip
 OPENAIR = "AC R\nAN LAKE\nAH 2200ft AMSL\nAL GND\nV X=46:00:00 N 008:00:00 E\nDC 1.10\n"
 
 
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [
-        ("ed269.json", json.dumps(ED_269), "ed269.json: geometry (zone 1): geometry null: a Polygon"),
-        ("lake.txt", OPENAIR, "lake.txt: suffix '.txt': a file of zones is .geojson, .json or .kml"),
+        (
+            "lake.shp",
+            OPENAIR,
+            "lake.shp: suffix '.shp': a file of zones is .geojson, .json, .kml, .openair, .txt or .gpkg",
+        ),
         ("lake.geojson", OPENAIR, "lake.geojson: not valid JSON"),
         ("lake.kml", OPENAIR, "lake.kml: not valid XML"),
     ],

@@ -1,0 +1,175 @@
+"""OpenAir: each command by plain sums, files as they are published, and lines that are none."""
+
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from world.airspace.openair import ARC_BEND, NAUTICAL_MILE, openair_zones
+from world.airspace.zone_files import is_zone_file, read_zone_file
+from world.errors import ScenarioError
+from world.frames import GeoOrigin, to_map
+
+HEAD = "AC R\nAN LAKE\nAL GND\nAH 2500ft AMSL\n"
+CENTRE = GeoOrigin(46.0, 8.0)
+SQUARE = "DP 46:00:00 N 008:00:00 E\nDP 46:00:00N 008:06:00E\nDP 46:06.000N 008:06.000E\nDP 46:06:00N 008:00:00E\n"
+
+
+def entries_of(text: str) -> dict[str, Any]:
+    ((_, entries),) = openair_zones(text, "z.openair")
+    assert isinstance(entries, dict)
+    return entries
+
+
+def ring_of(text: str) -> list[tuple[float, float]]:
+    """The ring of the only zone, (east, north) m about 46 N, 8 E."""
+    (ring,) = entries_of(text)["rings_deg"]
+    east, north = to_map(CENTRE, [lat for lat, _ in ring], [lon for _, lon in ring])
+    return list(zip(east.tolist(), north.tolist(), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("46:30:36N 008:15:00E", [46.51, 8.25]),
+        ("46:30.600N 008:15.000E", [46.51, 8.25]),
+        ("46:30.6 s, 008:15 w", [-46.51, -8.25]),
+        # As some files have it: the next minute.
+        ("46:29:60 N 008:14:60 E", [46.5, 8.25]),
+    ],
+)
+def test_places(text: str, wanted: list[float]) -> None:
+    corners = entries_of(f"{HEAD}DP {text}\nDP 47:00:00N 008:00:00E\nDP 47:00:00N 009:00:00E")["rings_deg"][0]
+    assert corners[0] == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "wanted"),
+    [
+        ("GND", "2500ft AMSL", {"ceiling_amsl_m": 762.0}),
+        ("SFC", "3000 MSL", {"ceiling_amsl_m": 914.4}),
+        ("1000ft AGL", "300m AGL", {"floor_agl_m": 304.8, "ceiling_agl_m": 300.0}),
+        ("1500 GND", "UNL", {"floor_agl_m": 457.2}),
+        # 9,500 ft are 2,895.6 m, and 400 m are kept for the pressure of the day.
+        ("FL 95", "UNLIMITED", {"floor_amsl_m": 2495.6}),
+        ("100 F ASFC", "4000ft STD", {"floor_agl_m": 30.48, "ceiling_amsl_m": 1619.2}),
+        ("0", "1500M ALT", {"ceiling_amsl_m": 1500.0}),
+    ],
+)
+def test_limits(low: str, high: str, wanted: dict[str, float]) -> None:
+    entries = entries_of(f"AC R\nAN LAKE\nAL {low}\nAH {high}\n{SQUARE}")
+    assert {key: value for key, value in entries.items() if "_m" in key} == pytest.approx(wanted)
+
+
+def test_a_circle_is_a_cylinder() -> None:
+    entries = entries_of(f"{HEAD}V X=46:00:00N 008:00:00E\nDC 2.5")
+    assert (entries["lat_deg"], entries["lon_deg"], entries["radius_m"]) == (46.0, 8.0, 2.5 * 1852.0)
+
+
+@pytest.mark.parametrize(("turn", "quarter"), [("V D=+\n", (1, 1)), ("", (1, 1)), ("VD=-\n", (-1, -1))])
+def test_an_arc_by_bearings_runs_the_way_it_is_told(turn: str, quarter: tuple[int, int]) -> None:
+    """From north to east: a quarter clockwise, or three quarters through south and west."""
+    ring = ring_of(f"{HEAD}V X=46:00:00N 008:00:00E\n{turn}DA 5, 0, 90\nDP 46:00:00N 008:00:00E")
+    radius = 5 * NAUTICAL_MILE
+    arc = ring[:-1]
+    assert [math.hypot(*place) for place in arc] == pytest.approx([radius] * len(arc), rel=1e-4)
+    assert arc[0] == pytest.approx((0.0, radius), abs=2.0)
+    assert arc[-1] == pytest.approx((radius, 0.0), abs=2.0)
+    middle = arc[len(arc) // 2]
+    assert (math.copysign(1, middle[0]), math.copysign(1, middle[1])) == quarter
+    # No chord leaves the circle by more than it may.
+    for (x0, y0), (x1, y1) in itertools.pairwise(arc):
+        assert radius - math.hypot(0.5 * (x0 + x1), 0.5 * (y0 + y1)) < 1.05 * ARC_BEND
+
+
+def test_an_arc_by_points_keeps_its_ends_and_the_centre_it_was_told() -> None:
+    """The next airspace turns clockwise again; its centre is its own."""
+    text = (
+        f"{HEAD}V X=46:00:00N 008:00:00E\nV D=-\nDB 46:03:00N 008:00:00E,45:57:00N 008:00:00E\n"
+        f"{HEAD}V X=46:00:00N 008:00:00E\nDB 46:03:00N 008:00:00E, 45:57:00N 008:00:00E\n"
+    )
+    left, right = (
+        dict(entries)["rings_deg"][0] for _, entries in openair_zones(text, "z") if isinstance(entries, dict)
+    )
+    for ring, side in ((left, -1), (right, 1)):
+        assert (ring[0], ring[-1]) == ([46.05, 8.0], [45.95, 8.0])
+        assert all(side * (lon - 8.0) > 0.0 for _, lon in ring[1:-1])
+
+
+def test_an_airway_is_its_width_wide() -> None:
+    ring = ring_of(f"{HEAD}V W=2\nDY 46:00:00N 008:00:00E\nDY 46:30:00N 008:00:00E")
+    assert sorted(round(east, 0) for east, _ in ring)[0] == pytest.approx(-NAUTICAL_MILE, abs=1.0)
+    assert sorted(round(east, 0) for east, _ in ring)[-1] == pytest.approx(NAUTICAL_MILE, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("stated", "free"),
+    [
+        ("AC G", True), ("AC E", True), ("AC E\nAY RMZ", False), ("AC UNC\nAY NONE", True), ("AC UNC\nAY P", False),
+        ("AC D", False), ("AC CTR", False), ("AC G\nAY FIS", True), ("AC GP", False), ("AC W", True),
+    ],
+)  # fmt: skip
+def test_airspace_that_is_open_to_all_keeps_nobody_out(stated: str, free: bool) -> None:
+    ((_, entries),) = openair_zones(f"{stated}\nAN LAKE\n{SQUARE}", "z.openair")
+    assert isinstance(entries, str) == free
+
+
+def test_names_times_and_comments() -> None:
+    text = (
+        "* Lakes, 2026\nAC D * controlled\nAY CTR\nAN LAKE\nAF 118.480\nSP 0,3,255\nV Z=100\nAT 46:00:00N 008:00:00E\n"
+        f"AA 2026-05-01T12:00Z/2026-05-01T24:00Z\nAA NONE/2026-08-01T00:00Z\nAA NONE\n{SQUARE}*DP nothing\n"
+    )
+    entries = entries_of(text)
+    assert entries["name"] == "LAKE (D, CTR)"
+    assert entries["times"] == ["2026-05-01T12:00Z/2026-05-02T00:00Z", "../2026-08-01T00:00Z", "BY NOTAM"]
+    assert len(entries["rings_deg"][0]) == 4
+
+
+FAULTS = {
+    "AN LAKE": "line 1: AN: no AC before it begins an airspace",
+    HEAD + "AH FL95\n": "line 5: AH 'FL95': an airspace has one lower limit (AL) and one upper limit (AH)",
+    HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': a place is expected",
+    HEAD + "DP 91:00:00N 008:00:00E\n": "line 5: DP '91:00:00N 008:00:00E': allowed 0..90 degrees",
+    HEAD + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': degrees, minutes and seconds of 60 at most",
+    HEAD + "DC 5\n": "line 5: DC '5': no centre before it (V X=)",
+    HEAD + "V X=46:00:00N 008:00:00E\nDC five": "line 6: DC 'five': a number from 0 on is expected",
+    HEAD + "V D=left": "line 5: V 'D=left': allowed D=+ (clockwise) or D=-",
+    HEAD + "V X=46:00:00N 008:00:00E\nDA 5, 270": "line 6: DA '5, 270': radius, first and last bearing are expected",
+    HEAD + "DX 5": "line 5: 'DX': unknown; shapes are DP, DA, DB, DC, DY",
+    HEAD + "DY 46:00:00N 008:00:00E": "line 1 (LAKE): DY: an airway has at least two points, and a width before",
+    HEAD: "line 1 (LAKE): one shape is expected",
+    "AC R\nAL ask the tower\n": "line 2: AL 'ask the tower': a height is expected",
+    HEAD + "AA 2026-05-01/2026-04-01": "line 5: AA '2026-05-01/2026-04-01'",
+}
+
+
+@pytest.mark.parametrize("text", FAULTS)
+def test_a_line_that_is_none_is_named(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "z.openair"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ScenarioError) as caught:
+        read_zone_file(path, "z.openair")
+    assert str(caught.value).startswith(f"z.openair: {FAULTS[text]}")
+    assert str(caught.value).isprintable()
+
+
+def test_what_a_file_does_not_hold_as_it_stands_is_said(tmp_path: Path) -> None:
+    """Latin letters of one byte; a bow tie, of which both halves count; and a class that is open to all, twice."""
+    bow = "DP 46:00:00N 008:00:00E\nDP 46:06:00N 008:06:00E\nDP 46:06:00N 008:00:00E\nDP 46:00:00N 008:06:00E\n"
+    open_to_all = f"AC G\nAN FIELD\n{SQUARE}"
+    path = tmp_path / "zones.txt"
+    path.write_bytes(f"AC R\nAN ZÜRICH\n{bow}{open_to_all}{open_to_all}".encode("latin-1"))
+    assert is_zone_file(path)
+    found = read_zone_file(path, "zones.txt")
+    assert found.notes == [
+        "zones.txt: 2 zones keep nobody out: class G, open to all",
+        "zones.txt: outlines that cross themselves are taken as the area they enclose: ZÜRICH (R)",
+    ]
+    (zone,) = found.zones
+    halves = zone.rings_deg or []
+    assert sorted(len(ring) for ring in halves) == [3, 3]
+    assert all([46.05, 8.05] in [[round(x, 9) for x in corner] for corner in ring] for ring in halves)
+    (tmp_path / "mission.txt").write_text("QGC WPL 110\n", encoding="utf-8")
+    assert not is_zone_file(tmp_path / "mission.txt")

@@ -1,0 +1,301 @@
+"""Zones of an OpenAir file: one command a line, with classes, limits, polygons, arcs, circles and airways.
+
+The commands are those of WinPilot's original and of Naviter's version 2 (https://github.com/naviter/seeyou_file_formats):
+AC begins an airspace, AN names it, AY is its type, AL and AH are its limits, AA its times; DP, DA, DB, DC and DY draw
+it, with what V sets.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from world.airspace.zone_entries import PUBLISHED, zone_entries
+from world.airspace.zone_times import BY_NOTAM, OPEN, parse_period
+from world.airspace.zones import band_outline
+from world.errors import ScenarioError
+from world.frames import GeoOrigin, to_geo, to_map
+
+NAUTICAL_MILE = 1852.0
+# m.  A chord of an arc leaves it by this at most.
+ARC_BEND = 1.0
+# Airspace that anybody may fly in without a clearance: classes, and types that ask for nothing either.
+_FREE_CLASSES = ("E", "F", "G", "UNC", "W", "GSEC", "FIR", "UIR", "FIS")
+_FREE_TYPES = ("", "NONE", "FIR", "UIR", "FIS", "GSEC", "ACCSEC", "TRZ", "VFRSEC", "VFRR")
+
+_Place = tuple[float, float]
+_COORDINATE = re.compile(r"(?P<lat>[\d:.]+)\s*(?P<ns>[NS])[\s,]*(?P<lon>[\d:.]+)\s*(?P<ew>[EW])", re.IGNORECASE)
+_ALTITUDE = re.compile(r"(\d+(?:\.\d+)?)\s*(FT|FEET|F|M|)\s*(AMSL|MSL|ALT|AGL|AAGL|ASFC|GND|SFC|STD|)", re.IGNORECASE)
+_LEVEL = re.compile(r"FL\s*(\d+(?:\.\d+)?)", re.IGNORECASE)
+_ABOVE_GROUND = ("AGL", "AAGL", "ASFC", "GND", "SFC")
+
+
+@dataclass(slots=True)
+class _Block:
+    """An airspace as it is read: what its lines have said so far."""
+
+    line: int
+    airspace_class: str
+    name: str = ""
+    kind: str = ""
+    limits: dict[str, dict[str, Any]] = field(default_factory=dict)
+    times: list[str] = field(default_factory=list)
+    corners: list[_Place] = field(default_factory=list)
+    airway: list[_Place] = field(default_factory=list)
+    width: float = 0.0
+    circle: tuple[_Place, float] | None = None
+    centre: _Place | None = None
+    clockwise: bool = True
+
+
+def is_openair(text: str) -> bool:
+    r"""Whether a text's first command is the one that begins an airspace.
+
+    >>> is_openair("* Slovenia\nAC D\nAN CTR"), is_openair("QGC WPL 110")
+    (True, False)
+    """
+    lines = (line for line in map(_command, text.splitlines()) if line)
+    return next(lines, "").upper().startswith("AC ")
+
+
+def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] | str]]:
+    r"""Where each zone stands in a file, and its entries as a [[zones]] table has them, or why it keeps nobody out.
+
+    All airspace is kept out of but that of classes E, F, G and unclassified without a type that asks for more.  An arc
+    is drawn by chords that leave it by `ARC_BEND` at most.  Raises ScenarioError for a line that cannot be read.
+
+    >>> text = "AC D\nAN CTR\nAL GND\nAH 2500ft AMSL\nV X=46:00:00N 014:00:00E\nDC 5"
+    >>> [(where, entries["radius_m"], entries["ceiling_amsl_m"]) for where, entries in openair_zones(text, "a file")]
+    [('line 1 (CTR)', 9260.0, 762.0)]
+    """
+    block: _Block | None = None
+    for number, raw in enumerate(text.splitlines(), 1):
+        line = _command(raw)
+        word, _, rest = line.partition(" ")
+        word, rest = word.upper(), rest.strip()
+        if word == "AC":
+            if block is not None:
+                yield _finished(block, source)
+            block = _Block(number, rest.upper())
+        elif word in _COMMANDS:
+            if block is None:
+                raise ScenarioError(f"{source}: line {number}: {word}: no AC before it begins an airspace", file=source)
+            try:
+                _COMMANDS[word](block, rest)
+            except ValueError as error:
+                allowed = str(error)
+                message = f"{source}: line {number}: {word} {rest[:40]!r}: {allowed}"
+                raise ScenarioError(message, file=source, field=word, value=rest, allowed=allowed) from error
+        elif word.startswith("D"):
+            known = ", ".join(name for name in _COMMANDS if name.startswith("D"))
+            message = f"{source}: line {number}: {word[:10]!r}: unknown; shapes are {known}"
+            raise ScenarioError(message, file=source, field=word, allowed=known)
+    if block is not None:
+        yield _finished(block, source)
+
+
+def _command(line: str) -> str:
+    """A line without its comment.  V may stand before its variable without a space."""
+    return re.sub(r"^V(?=[DXWZ]\s*=)", "V ", line.partition("*")[0].strip(), flags=re.IGNORECASE)
+
+
+def _finished(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
+    name = "".join(character for character in block.name if character.isprintable())[:80]
+    where = f"line {block.line}" + (f" ({name})" if name else "")
+    label = ", ".join(part for part in (block.airspace_class, block.kind) if part)
+    if block.airspace_class in _FREE_CLASSES and block.kind in _FREE_TYPES:
+        return where, f"class {label}, open to all"
+    entries: dict[str, Any] = {"name": f"{name or f'line {block.line}'} ({label})"[:100]}
+    entries |= zone_entries(block.limits, f"{source}: {where}")
+    if block.times:
+        entries["times"] = block.times
+    shapes = [bool(block.corners), bool(block.airway), block.circle is not None]
+    if sum(shapes) != 1:
+        allowed = "one shape is expected: corners and arcs, a circle, or an airway"
+        raise ScenarioError(f"{source}: {where}: {allowed}", file=source, allowed=allowed)
+    if block.circle is not None:
+        (lat, lon), radius = block.circle
+        return where, entries | {"lat_deg": lat, "lon_deg": lon, "radius_m": radius}
+    rings = [block.corners] if block.corners else _airway_rings(block, f"{source}: {where}")
+    return where, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings], PUBLISHED: True}
+
+
+def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:
+    """The outline of an airway: its segments, half of its width to either side and beyond its ends."""
+    if len(block.airway) < 2 or not block.width > 0.0:
+        raise ScenarioError(f"{source}: DY: an airway has at least two points, and a width before (V W=)", file=source)
+    origin = GeoOrigin(*block.airway[0])
+    east, north = to_map(origin, [lat for lat, _ in block.airway], [lon for _, lon in block.airway])
+    outline = band_outline(list(zip(east.tolist(), north.tolist(), strict=True)), block.width)
+    lat, lon = to_geo(origin, [at[0] for at in outline], [at[1] for at in outline])
+    return [list(zip(lat.tolist(), lon.tolist(), strict=True))]
+
+
+# ----------------------------------------------------------------------
+# Commands: what each of them adds to its airspace.  Raise ValueError with what is allowed.
+
+
+def _times(block: _Block, text: str) -> None:
+    if text.upper() == "NONE":
+        block.times.append(BY_NOTAM)
+        return
+    period = "/".join(OPEN if end.strip().upper() == "NONE" else end.strip() for end in text.split("/"))
+    found = parse_period(period)
+    block.times.append(BY_NOTAM if found is None else found.text())
+
+
+def _limit(key: str) -> Callable[[_Block, str], None]:
+    def read(block: _Block, text: str) -> None:
+        if key in block.limits:
+            raise ValueError("an airspace has one lower limit (AL) and one upper limit (AH)")
+        if (found := _altitude(text, key)) is not None:
+            block.limits[key] = found
+
+    return read
+
+
+def _altitude(text: str, key: str) -> dict[str, Any] | None:
+    """A limit as openAIP states it; None for one that bounds nothing."""
+    if text.upper() in ("GND", "SFC", "SURFACE", "0") and key == "lowerLimit":
+        return None
+    if text.upper() in ("UNL", "UNLIM", "UNLIMITED") and key == "upperLimit":
+        return None
+    if (level := _LEVEL.fullmatch(text)) is not None:
+        return {"value": float(level[1]), "unit": "FL", "referenceDatum": "STD"}
+    found = _ALTITUDE.fullmatch(text)
+    if found is None:
+        raise ValueError("a height is expected: 2500ft AMSL, 300m AGL, FL95, GND, UNL")
+    value, unit, datum = float(found[1]), found[2].upper(), found[3].upper()
+    reference = "GND" if datum in _ABOVE_GROUND else "STD" if datum == "STD" else "MSL"
+    return {"value": value, "unit": "M" if unit == "M" else "FT", "referenceDatum": reference}
+
+
+def _variable(block: _Block, text: str) -> None:
+    name, _, value = (part.strip() for part in text.partition("="))
+    if name.upper() == "X":
+        block.centre = _place(value)
+    elif name.upper() == "D":
+        if value not in ("+", "-"):
+            raise ValueError("allowed D=+ (clockwise) or D=-")
+        block.clockwise = value == "+"
+    elif name.upper() == "W":
+        block.width = _number(value) * NAUTICAL_MILE
+
+
+def _corner(block: _Block, text: str) -> None:
+    block.corners.append(_place(text))
+
+
+def _circle(block: _Block, text: str) -> None:
+    if block.circle is not None:
+        raise ValueError("an airspace has one circle")
+    block.circle = _centre(block), _number(text) * NAUTICAL_MILE
+
+
+def _arc_by_bearings(block: _Block, text: str) -> None:
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise ValueError("radius, first and last bearing are expected: 5, 270, 290")
+    radius, first, last = (_number(part) for part in parts)
+    block.corners += _arc(_centre(block), (radius * NAUTICAL_MILE,) * 2, first, last, block.clockwise)
+
+
+def _arc_by_points(block: _Block, text: str) -> None:
+    found = [_place(match[0]) for match in _COORDINATE.finditer(text)]
+    if len(found) != 2:
+        raise ValueError("two points are expected: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
+    centre = _centre(block)
+    (first, near), (last, far) = (_polar(centre, place) for place in found)
+    # Ends as they are stated, whatever the centre.
+    arc = _arc(centre, (near, far), first, last, block.clockwise)
+    block.corners += [found[0], *arc[1:-1], found[1]]
+
+
+def _airway(block: _Block, text: str) -> None:
+    block.airway.append(_place(text))
+
+
+def _text(name: str) -> Callable[[_Block, str], None]:
+    def read(block: _Block, text: str) -> None:
+        setattr(block, name, text if name == "name" else text.upper())
+
+    return read
+
+
+_COMMANDS: dict[str, Callable[[_Block, str], None]] = {
+    "AN": _text("name"),
+    "AY": _text("kind"),
+    "AA": _times,
+    "AL": _limit("lowerLimit"),
+    "AH": _limit("upperLimit"),
+    "V": _variable,
+    "DP": _corner,
+    "DA": _arc_by_bearings,
+    "DB": _arc_by_points,
+    "DC": _circle,
+    "DY": _airway,
+}
+
+
+# ----------------------------------------------------------------------
+# Numbers, places and arcs.
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < math.inf:
+        raise ValueError("a number from 0 on is expected")
+    return value
+
+
+def _place(text: str) -> _Place:
+    """Latitude and longitude, degrees."""
+    found = _COORDINATE.fullmatch(text.strip())
+    if found is None:
+        raise ValueError("a place is expected: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
+    lat = _degrees(found["lat"], 90.0) * (-1.0 if found["ns"].upper() == "S" else 1.0)
+    lon = _degrees(found["lon"], 180.0) * (-1.0 if found["ew"].upper() == "W" else 1.0)
+    return lat, lon
+
+
+def _degrees(text: str, most: float) -> float:
+    parts = [_number(part) for part in text.split(":")]
+    if len(parts) > 3 or any(part > 60.0 for part in parts[1:]):
+        raise ValueError("degrees, minutes and seconds of 60 at most are expected")
+    angle = sum(part / 60.0**k for k, part in enumerate(parts))
+    if angle > most:
+        raise ValueError(f"allowed 0..{most:g} degrees")
+    return angle
+
+
+def _centre(block: _Block) -> _Place:
+    if block.centre is None:
+        raise ValueError("no centre before it (V X=)")
+    return block.centre
+
+
+def _polar(centre: _Place, place: _Place) -> tuple[float, float]:
+    """Bearing, degrees, and distance, m, of a place from a centre."""
+    east, north = to_map(GeoOrigin(*centre), *place)
+    return math.degrees(math.atan2(east, north)), math.hypot(east, north)
+
+
+def _arc(centre: _Place, radii: Sequence[float], first: float, last: float, clockwise: bool) -> list[_Place]:
+    """Places along an arc, its ends included; its radius goes from the first to the second, m."""
+    turn = (last - first) % 360.0 if clockwise else -((first - last) % 360.0)
+    turn = turn or (360.0 if clockwise else -360.0)
+    largest = max(*radii, ARC_BEND)
+    piece = math.degrees(2.0 * math.acos(1.0 - min(0.3, ARC_BEND / largest)))
+    count = max(1, math.ceil(abs(turn) / piece))
+    shares = [k / count for k in range(count + 1)]
+    # Distances and bearings from its centre are those of a map about it.
+    turned = [math.radians(first + share * turn) for share in shares]
+    away = [radii[0] + share * (radii[1] - radii[0]) for share in shares]
+    east = [far * math.sin(angle) for far, angle in zip(away, turned, strict=True)]
+    north = [far * math.cos(angle) for far, angle in zip(away, turned, strict=True)]
+    lat, lon = to_geo(GeoOrigin(*centre), east, north)
+    return list(zip(lat.tolist(), lon.tolist(), strict=True))

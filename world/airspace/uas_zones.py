@@ -1,0 +1,267 @@
+"""UAS geographical zones as Europe's authorities publish them: the JSON of EUROCAE ED-269, and ED-318's GeoJSON.
+
+ED-269: features with a list of volumes, each a polygon or a circle between two limits.  ED-318: GeoJSON features whose
+geometries have a `layer`, and points an `extent`; its schema is public (https://github.com/UASGeoZones/ED-318).  Of
+either, a zone without a restriction keeps nobody out.
+"""
+
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+from world.airspace.zone_entries import PUBLISHED, zone_entries
+from world.airspace.zone_times import WEEKDAYS, Period, parse_time
+from world.errors import ScenarioError
+
+# m, ft.  Swiss and other files write an upper limit that there is not so.
+_UNLIMITED = 99_999.0
+_UNITS = {"M": "M", "FT": "FT"}
+_DATUMS = ("AGL", "AMSL", "WGS84", "SFC")
+_FREE = "NO_RESTRICTION"
+# A date without an offset from UTC may be of any zone of time.
+_EARLIEST, _LATEST = timedelta(hours=-14), timedelta(hours=12)
+
+_Found = tuple[str, dict[str, Any] | str]
+
+
+def is_ed269(data: Mapping[str, Any]) -> bool:
+    """Whether JSON data is of ED-269: its features have a list of volumes.
+
+    >>> is_ed269({"features": [{"geometry": [{"horizontalProjection": {}}]}]}), is_ed269({"features": []})
+    (True, False)
+    """
+    features = _features(data)
+    first = features[0] if isinstance(features, list) and features else None
+    return isinstance(first, dict) and isinstance(first.get("geometry"), list)
+
+
+def is_ed318(feature: Any) -> bool:
+    """Whether a GeoJSON feature is of ED-318: it has a variant and a type of restriction.
+
+    >>> is_ed318({"properties": {"type": "PROHIBITED", "variant": "COMMON"}}), is_ed318({"properties": None})
+    (True, False)
+    """
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    return isinstance(properties, dict) and {"type", "variant"} <= properties.keys()
+
+
+def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_Found]:
+    """Where each volume stands in a file, and its entries as a [[zones]] table has them, or why it keeps nobody out.
+
+    Raises ScenarioError for a volume that is none.
+    """
+    key = "features" if "features" in data else "UASZoneList"
+    for k, feature in enumerate(_features(data)):
+        where = f"{key}[{k}]"
+        volumes = feature.get("geometry") if isinstance(feature, dict) else None
+        if not isinstance(volumes, list) or not volumes:
+            raise _refused(source, where, "geometry", "a list of volumes is expected")
+        name = _name(feature.get("name")) or _name(feature.get("identifier")) or f"zone {k + 1}"
+        where += f" ({name})"
+        if (restriction := _word(feature.get("restriction"))) == _FREE:
+            yield where, restriction
+            continue
+        stated = {"times": times} if (times := _times(feature.get("applicability"), f"{source}: {where}")) else {}
+        for number, volume in enumerate(volumes, 1):
+            label = f"{name} {number}/{len(volumes)}" if len(volumes) > 1 else name
+            yield where, {**_ed269_volume(volume, f"{source}: {where}"), "name": label, **stated}
+
+
+def _features(data: Mapping[str, Any]) -> Any:
+    return data.get("features") if "features" in data else data.get("UASZoneList")
+
+
+def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
+    shape = volume.get("horizontalProjection") if isinstance(volume, dict) else None
+    if not isinstance(shape, dict):
+        raise _refused(source, "", "horizontalProjection", "a polygon or a circle is expected")
+    unit = volume.get("uomDimensions")
+    limits = {
+        f"{side}Limit": _limit(volume.get(f"{side}Limit"), unit, volume.get(f"{side}VerticalReference"), side, source)
+        for side in ("lower", "upper")
+    }
+    entries = zone_entries(limits, source)
+    kind = _word(shape.get("type"))
+    if kind == "POLYGON":
+        return entries | {PUBLISHED: True, "rings_deg": _rings(shape.get("coordinates"), source)}
+    if kind == "CIRCLE":
+        return entries | _circle(shape.get("center"), shape.get("radius"), source)
+    raise _refused(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
+
+
+def ed318_zones(feature: Mapping[str, Any], where: str, number: int, source: str) -> Iterator[_Found]:
+    """Entries of each layer of an ED-318 feature, as `ed269_zones` gives those of volumes.
+
+    where: names the feature in the file.  number: counts it from 0.
+    """
+    properties = feature["properties"]
+    name = _name(properties.get("name")) or _name(properties.get("identifier")) or f"zone {number + 1}"
+    where = f"{where} ({name})"
+    if (restriction := _word(properties["type"])) == _FREE:
+        yield where, restriction
+        return
+    times = _times(properties.get("limitedApplicability"), f"{source}: {where}")
+    stated = {"times": times} if times else {}
+    geometries = list(_geometries(feature.get("geometry")))
+    for k, geometry in enumerate(geometries, 1):
+        label = f"{name} {k}/{len(geometries)}" if len(geometries) > 1 else name
+        for entries in _ed318_layer(geometry, f"{source}: {where}"):
+            yield where, {**entries, "name": label, **stated}
+
+
+def _geometries(geometry: Any) -> Iterator[Any]:
+    """A geometry, or those of a collection."""
+    inner = geometry.get("geometries") if isinstance(geometry, dict) else None
+    if isinstance(inner, list):
+        for one in inner:
+            yield from _geometries(one)
+    else:
+        yield geometry
+
+
+def _ed318_layer(geometry: Any, source: str) -> Iterator[dict[str, Any]]:
+    geometry = geometry if isinstance(geometry, dict) else {}
+    layer = geometry.get("layer")
+    layer = layer if isinstance(layer, dict) else {}
+    unit = layer.get("uom") or "m"
+    limits = {
+        f"{side}Limit": _limit(layer.get(side), unit, layer.get(f"{side}Reference"), side, source)
+        for side in ("lower", "upper")
+    }
+    entries = zone_entries(limits, source)
+    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    if kind == "Polygon":
+        yield entries | {PUBLISHED: True, "rings_deg": _rings(coordinates, source)}
+    elif kind == "MultiPolygon" and isinstance(coordinates, list):
+        for part in coordinates:
+            yield entries | {PUBLISHED: True, "rings_deg": _rings(part, source)}
+    elif kind == "Point":
+        extent = geometry.get("extent")
+        extent = extent if isinstance(extent, dict) else {}
+        if _word(extent.get("subType")) != "CIRCLE":
+            raise _refused(source, "", "geometry.extent", "a point is the centre of a Circle")
+        yield entries | _circle(coordinates, extent.get("radius"), source)
+    else:
+        raise _refused(source, "", "geometry.type", "allowed Polygon, MultiPolygon, Point, GeometryCollection")
+
+
+# ----------------------------------------------------------------------
+# What both have: limits, shapes, names and times of activity.
+
+
+def _limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[str, Any] | None:
+    """A limit as openAIP states it; None where there is none."""
+    if value is None or value == "":
+        return None
+    try:
+        height = float(value)
+    except (TypeError, ValueError) as error:
+        raise _refused(source, "", f"{side} limit", "a number is expected") from error
+    if side == "upper" and height >= _UNLIMITED:
+        return None
+    if _word(unit) not in _UNITS:
+        raise _refused(source, "", "unit of its limits", f"allowed {', '.join(_UNITS)}")
+    if _word(datum) not in _DATUMS:
+        raise _refused(source, "", f"vertical reference of its {side} limit", f"allowed {', '.join(_DATUMS)}")
+    return {"value": height, "unit": _UNITS[_word(unit)], "referenceDatum": _word(datum)}
+
+
+def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
+    """Rings of [latitude, longitude] of a polygon's coordinates."""
+    try:
+        rings = [[[float(corner[1]), float(corner[0])] for corner in ring] for ring in coordinates]
+    except (TypeError, ValueError, IndexError, KeyError) as error:
+        raise _refused(source, "", "coordinates", "lists of [longitude, latitude] are expected") from error
+    if not rings:
+        raise _refused(source, "", "coordinates", "at least one ring is expected")
+    return rings
+
+
+def _circle(centre: Any, radius: Any, source: str) -> dict[str, float]:
+    try:
+        return {"lat_deg": float(centre[1]), "lon_deg": float(centre[0]), "radius_m": float(radius)}
+    except (TypeError, ValueError, IndexError, KeyError) as error:
+        raise _refused(source, "", "circle", "a centre [longitude, latitude] and a radius, m, are expected") from error
+
+
+def _name(value: Any) -> str:
+    """A name in one line: a text, or the first of several in English, or the first of all."""
+    if isinstance(value, list):
+        texts = [one for one in value if isinstance(one, dict) and isinstance(one.get("text"), str)]
+        english = [one for one in texts if str(one.get("lang")).startswith("en")]
+        value = (english or texts or [{"text": ""}])[0]["text"]
+    if not isinstance(value, str):
+        return ""
+    return "".join(character for character in value if character.isprintable()).strip()[:80]
+
+
+def _word(value: Any) -> str:
+    return value.strip().upper() if isinstance(value, str) else ""
+
+
+def _times(applicability: Any, source: str) -> list[str]:
+    """The periods in which a zone applies, as a [[zones]] table has them; none for one that always does."""
+    if applicability is None:
+        return []
+    if not isinstance(applicability, list) or not all(isinstance(one, dict) for one in applicability):
+        raise _refused(source, "", "applicability", "a list of periods is expected")
+    periods: list[Period] = []
+    for one in applicability:
+        try:
+            start = _moment(one.get("startDateTime"), _EARLIEST)
+            end = _moment(one.get("endDateTime"), _LATEST)
+            if _word(one.get("permanent")) == "YES":
+                start = end = None
+            schedule = one.get("schedule") or one.get("dailyPeriod") or [{}]
+            periods += [_daily(start, end, daily) for daily in schedule]
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            allowed = "dates and times by ISO 8601, and days MON to SUN or ANY, are expected"
+            raise _refused(source, "", "applicability", allowed) from error
+    if any(period == Period() for period in periods):
+        return []
+    return [period.text() for period in periods]
+
+
+def _moment(value: Any, unknown: timedelta) -> datetime | None:
+    """A date and time, UTC; one without an offset moved by what its offset can be at most."""
+    if value is None or value == "":
+        return None
+    found = datetime.fromisoformat(value)
+    return found.replace(tzinfo=UTC) + unknown if found.tzinfo is None else parse_time(value)
+
+
+def _daily(start: datetime | None, end: datetime | None, daily: Mapping[str, Any]) -> Period:
+    """A part of a schedule.  Hours by the sun, and those without an offset from UTC, are the whole day."""
+    named = [_word(day) for day in daily.get("day") or []]
+    days = frozenset() if "ANY" in named else frozenset(WEEKDAYS.index(day) for day in named)
+    stated = [daily.get(key) for key in ("startTime", "endTime")]
+    first, last = _minutes(stated[0]), _minutes(stated[1], up=True)
+    if first is None or last is None:
+        # A day of another zone of time reaches into the days beside it.
+        steps = (-1, 0, 1) if any(stated) else (0,)
+        return Period(start, end, frozenset((day + step) % 7 for day in days for step in steps))
+    shift, first = divmod(first, 24 * 60)
+    last -= shift * 24 * 60
+    if not 0 <= last <= 24 * 60:
+        last %= 24 * 60
+    return Period(start, end, frozenset((day + shift) % 7 for day in days), first, last)
+
+
+def _minutes(value: Any, *, up: bool = False) -> int | None:
+    """Minutes of the day in UTC, of the day that the time names: below 0 on the day before it; None if not known.
+
+    up: count a part of a minute as one.
+    """
+    if value is None or value == "":
+        return None
+    found = datetime.fromisoformat(f"2000-01-01T{value}")
+    offset = found.utcoffset()
+    if offset is None:
+        return None
+    begun = up and (found.second or found.microsecond)
+    return found.hour * 60 + found.minute + bool(begun) - int(offset.total_seconds() // 60)
+
+
+def _refused(source: str, where: str, field: str, allowed: str) -> ScenarioError:
+    label = f"{source}: {where}" if where else source
+    return ScenarioError(f"{label}: {field}: {allowed}", file=source, field=field, allowed=allowed)

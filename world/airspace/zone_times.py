@@ -1,0 +1,148 @@
+"""When a zone is active: periods of time as a scenario file states them, and whether a flight may meet one.
+
+A period is one line of text, in universal time (UTC): ``START/END``, then days of the week and hours of the day where
+it does not last throughout.  ``..`` is an end that is not known, and BY NOTAM a zone that a notice activates.
+
+    2026-05-01T00:00Z/2026-10-01T00:00Z
+    2026-05-01T00:00Z/.. SAT,SUN 07:00/20:00
+    BY NOTAM
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, time, timedelta
+
+# As datetime.weekday() counts them, from 0.
+WEEKDAYS = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
+# A zone that is activated by a notice, which no file holds: it counts as active.
+BY_NOTAM = "BY NOTAM"
+OPEN = ".."
+# A flight of which only the start is given may last so long; one of which both are given at most so long.
+DEFAULT_SPAN, LONGEST_SPAN = timedelta(hours=1), timedelta(days=7)
+_HOURS = re.compile(r"([01]\d|2[0-4]):([0-5]\d)/([01]\d|2[0-4]):([0-5]\d)")
+_DAY = timedelta(days=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Period:
+    """One period, in UTC.
+
+    start, end: None where they are not known.  days: of the week, 0 for Monday; empty for all.
+    first, last: minutes of the day, None for the whole day; a last that is not after the first is on the next day.
+    """
+
+    start: datetime | None = None
+    end: datetime | None = None
+    days: frozenset[int] = frozenset()
+    first: int | None = None
+    last: int | None = None
+
+    def text(self) -> str:
+        """The line that `parse_period` reads.
+
+        >>> Period(days=frozenset({5, 6}), first=420, last=1200).text()
+        '../.. SAT,SUN 07:00/20:00'
+        """
+        parts = ["/".join(OPEN if one is None else f"{one:%Y-%m-%dT%H:%M}Z" for one in (self.start, self.end))]
+        if self.days:
+            parts.append(",".join(WEEKDAYS[day] for day in sorted(self.days)))
+        if self.first is not None and self.last is not None:
+            parts.append("/".join(f"{minutes // 60:02d}:{minutes % 60:02d}" for minutes in (self.first, self.last)))
+        return " ".join(parts)
+
+
+def parse_period(text: str) -> Period | None:
+    """The period that a line of text states; None for `BY_NOTAM`.  Raises ValueError for what is none.
+
+    >>> parse_period("2026-05-01T00:00Z/.. SAT,SUN 07:00/20:00").days == {5, 6}
+    True
+    """
+    if text.upper() == BY_NOTAM:
+        return None
+    allowed = 'allowed "START/END [DAYS] [HH:MM/HH:MM]" in UTC, .. for an open end, or "BY NOTAM"'
+    span, *rest = text.split()
+    ends = span.split("/")
+    if len(ends) != 2 or len(rest) > 2:
+        raise ValueError(f"{text[:60]!r}: {allowed}")
+    try:
+        start, end = (None if one == OPEN else parse_time(one) for one in ends)
+        days: frozenset[int] = frozenset()
+        if rest and ":" not in rest[0]:
+            days = frozenset(WEEKDAYS.index(day) for day in rest.pop(0).upper().split(","))
+        first = last = None
+        if rest:
+            hours = _HOURS.fullmatch(rest.pop(0))
+            if hours is None:
+                raise ValueError
+            first, last = (int(hours[k]) * 60 + int(hours[k + 1]) for k in (1, 3))
+        if rest or max(first or 0, last or 0) > 24 * 60:
+            raise ValueError
+    except ValueError:
+        raise ValueError(f"{text[:60]!r}: {allowed}") from None
+    if start is not None and end is not None and end < start:
+        raise ValueError(f"{text[:60]!r}: ends before it starts")
+    return Period(start, end, days, first, last)
+
+
+def parse_time(text: str) -> datetime:
+    """A time by ISO 8601 with its offset from UTC, in UTC; 24:00 is the next day's 00:00.  Raises ValueError.
+
+    >>> parse_time("2026-05-01T24:00+02:00").isoformat()
+    '2026-05-01T22:00:00+00:00'
+    """
+    whole = re.sub(r"T24:00(:00(\.0+)?)?", "T00:00", text)
+    found = datetime.fromisoformat(whole)
+    if found.tzinfo is None:
+        raise ValueError(f"{text[:40]!r}: no offset from UTC: write Z, or +02:00")
+    try:
+        return (found + (_DAY if whole != text else timedelta())).astimezone(UTC)
+    except OverflowError as error:
+        raise ValueError(f"{text[:40]!r}: out of range") from error
+
+
+def parse_span(text: str) -> tuple[datetime, datetime]:
+    """From when to when a flight lasts: ``START`` or ``START/END``, with offsets from UTC.
+
+    One of which only the start is given lasts `DEFAULT_SPAN`.  Raises ValueError for what is no such text, for an end
+    before the start, and for more than `LONGEST_SPAN`.
+
+    >>> [f"{one:%H:%M}" for one in parse_span("2026-05-01T10:00+02:00")]
+    ['08:00', '09:00']
+    """
+    start, slash, end = text.partition("/")
+    begin = parse_time(start)
+    finish = parse_time(end) if slash else begin + DEFAULT_SPAN
+    if not begin <= finish <= begin + LONGEST_SPAN:
+        raise ValueError(f"{text[:60]!r}: allowed an end from the start on, at most {LONGEST_SPAN.days} days later")
+    return begin, finish
+
+
+def is_active(times: Sequence[str], begin: datetime, finish: datetime) -> bool:
+    """Whether a zone may be active at any time from `begin` to `finish`, both included.
+
+    times: as `parse_period` reads them; without any, and by a notice, a zone is always active.
+
+    >>> begin, finish = parse_span("2026-05-02T06:30Z")  # a Saturday
+    >>> is_active(["../.. SAT 07:00/20:00"], begin, finish), is_active(["../.. SUN"], begin, finish)
+    (True, False)
+    """
+    periods = [parse_period(text) for text in times]
+    return not periods or any(period is None or _meets(period, begin, finish) for period in periods)
+
+
+def _meets(period: Period, begin: datetime, finish: datetime) -> bool:
+    begin = begin if period.start is None else max(begin, period.start)
+    finish = finish if period.end is None else min(finish, period.end)
+    if begin > finish:
+        return False
+    first, last = (0, 24 * 60) if period.first is None or period.last is None else (period.first, period.last)
+    last += 24 * 60 if last <= first else 0
+    # From two days before: hours of that day's evening may go on into this one.
+    day = datetime.combine(begin.date(), time(), UTC) - 2 * _DAY
+    while day <= finish:
+        meets = day + timedelta(minutes=first) <= finish and day + timedelta(minutes=last) >= begin
+        if meets and (not period.days or day.weekday() in period.days):
+            return True
+        day += _DAY
+    return False
