@@ -25,6 +25,8 @@ GUIDANCE_MEMORY = record_dtype(
     ("done", np.bool_),  # past the end of the path
     ("returning", np.bool_),  # on a way back that the autopilot finds by itself: it cannot miss the path's end
     "circled",  # s since it came to the circle at the end of that way, and to its height
+    "turned",  # rad around it since then, positive to the right
+    "bearing",  # rad, from its middle, a tick ago
     # Across: the cross-track law.
     "cross_track_sum",  # m s
     "last_velocity_east",  # m/s over the ground, a tick ago

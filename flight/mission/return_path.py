@@ -52,6 +52,36 @@ class ReturnCircle(NamedTuple):
     slope_base: float = 0.0
 
 
+class LandingStart(NamedTuple):
+    """Where a landing sequence of a mission begins: what follows a DO_LAND_START.
+
+    item: the mission item's number that is flown to first.
+    place: its east, north, up, m AMSL.
+    mark: east, north, up that its distance is counted to: of DO_LAND_START, where that states a place.
+    circles: whether it is a loiter.  radius: of the loiter, m, negative to the left, 0 where none is stated.
+    lands: whether it is the landing itself.
+    """
+
+    item: int
+    place: Place
+    mark: Place
+    circles: bool = False
+    radius: float = 0.0
+    lands: bool = False
+
+
+def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingStart | None:
+    """The landing sequence that ArduPlane goes to from a place (east, north, up): the nearest, height counted too.
+
+    As `AP_Mission::get_landing_sequence_start` chooses (libraries/AP_Mission/AP_Mission.cpp); None of none.
+
+    >>> far, near = (LandingStart(k, (x, 0.0, 50.0), (x, 0.0, 50.0)) for k, x in ((8, 900.0), (12, -500.0)))
+    >>> nearest_landing((0.0, 0.0, 50.0), [far, near]).item, nearest_landing((0.0, 0.0, 50.0), [])
+    (12, None)
+    """
+    return min(landings, key=lambda one: math.dist(here, one.mark), default=None)
+
+
 # A turn whose tangent is shorter than this (m) is none.
 _NO_TURN = 1.0
 # A turn by more than this (rad) to one side is one of less to the other.
@@ -106,6 +136,8 @@ class ReturnTarget(NamedTuple):
     reason: why there, a clause for people; "" where there is nothing to choose.
     distance: m, across the ground.
     slope_base: as of `ReturnCircle`.
+    landing: the landing sequence that it goes on to, None for none.
+    straight: whether it goes there at once, and ``position`` is where that begins.
     """
 
     position: Place
@@ -113,6 +145,8 @@ class ReturnTarget(NamedTuple):
     reason: str
     distance: float
     slope_base: float = 0.0
+    landing: LandingStart | None = None
+    straight: bool = False
 
 
 class ReturnAbility(NamedTuple):

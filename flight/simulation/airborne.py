@@ -17,11 +17,10 @@ from flight.dynamics.trim import Trim
 from flight.guidance.gains import Gains
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.guidance.path import waypoint_records
-from flight.mission.itinerary import UNLIMITED
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.start import Start, find_start, start_trimmed
-from flight.simulation.tick import BLOCK_TICKS, ENDS, MOST_CIRCLES, Workspace
+from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, longest_circling
 from flight.simulation.track import Rows, join_rows, quantised
 from flight.simulation.turbulence import start_gusts
 from world.geometry import leg_courses
@@ -85,7 +84,7 @@ class Airborne(ABC):
         patience = PATIENCE * self.path.length / _slowest_leg(setup, self._airspeeds) + PATIENCE_SECONDS
         if setup.route.return_to is not None:
             # An autopilot that returns by a law of its own may circle longer than its path does.
-            patience += MOST_CIRCLES * UNLIMITED
+            patience += longest_circling(setup.route.return_to.radius)
         self.max_ticks = int(patience / self.dt)
 
     @abstractmethod

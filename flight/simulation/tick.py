@@ -13,6 +13,7 @@ from numba import literal_unroll
 from numpy.typing import NDArray
 
 from flight.dynamics.state import COMMANDS, STATE
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.gains import GAINS, Gains
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import WAYPOINT
@@ -178,11 +179,13 @@ STEEPEST_BANK = math.radians(75.0)
 COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY = 1, 2, 3, 4, 5, 6, 7
 # A flight that passes the end of its route further than this from it, m, has missed it.
 FAR = 100.0
-# A return to launch has come to its circle within this distance of the middle or two radii, m, and to its height, m.  A
-# circle of 60 m cannot be flown at 26 m/s and 30 degrees of bank: ArduPlane gets up to 260 m from its middle.
-NEAR, AT_HEIGHT = 300.0, 20.0
-# However its circles are flown, it is over after so many times the time that it is to circle.
-MOST_CIRCLES = 5.0
+# A return to launch has come to its circle within this distance of the middle, m, or `WIDER` of its radii, and to its
+# height, m.  A circle of 60 m cannot be flown at 26 m/s and 30 degrees of bank: ArduPlane gets up to 260 m from its
+# middle.
+NEAR, WIDER, AT_HEIGHT = 300.0, 1.3, 20.0
+# However its circles are flown, it is over after so many times the time that it is to circle, and that once around
+# takes, at this ground speed, m/s.
+MOST_CIRCLES, _SLOW = 5.0, 10.0
 ENDS = {
     COMPLETED: "completed",
     NOT_A_NUMBER: "departure: the state is not a number",
@@ -266,17 +269,33 @@ def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  #
     """Note how long a return to launch has circled at its end; it ends the flight as an end of the path does.
 
     For an autopilot that returns by a law of its own, and need not follow the path: it ends where the path does once it
-    has come to its circle, and after `MOST_CIRCLES` of its time at the latest.
+    has come to its circle and was all around it at its height, and after `longest_circling` at the latest.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     b: any waypoint of the way back, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     memory.returning = True
-    there = math.hypot(motion.east - b.centre_east, motion.north - b.centre_north) < max(NEAR, 2.0 * abs(b.circle))
+    off_e, off_n = motion.east - b.centre_east, motion.north - b.centre_north
+    factor = true_by_equivalent(motion.up)
+    radius = abs(b.circle) * factor * factor
+    there = math.hypot(off_e, off_n) < max(NEAR, WIDER * radius)
+    bearing = math.atan2(off_e, off_n)
+    if memory.circled > 0.0:
+        memory.turned += wrap(bearing - memory.bearing)
+    memory.bearing = bearing
     if memory.circled > 0.0 or (there and abs(motion.up - b.up) < AT_HEIGHT):
         memory.circled += dt
-    memory.done = (memory.done and memory.circled > UNLIMITED) or memory.circled > MOST_CIRCLES * UNLIMITED
+    around = abs(memory.turned) >= 2.0 * math.pi
+    memory.done = memory.done or memory.circled > MOST_CIRCLES * UNLIMITED
+    memory.done = (memory.done and around and memory.circled > UNLIMITED) or memory.circled > longest_circling(radius)
+
+
+@inner
+def longest_circling(radius: float) -> float:  # pragma: no cover - compiled
+    """After how long in its circle (m) a return is over, however that was flown, s."""
+    longest: float = MOST_CIRCLES * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _SLOW)
+    return longest
 
 
 @inner

@@ -245,6 +245,12 @@ class ArduPilotParameters:
         size = next((abs(radius) for radius in (self.rtl_radius, self.wp_loiter_rad) if abs(radius) > 1.0), None)
         return math.copysign(size or _USUAL_LOITER_RADIUS, self.rtl_radius or self.wp_loiter_rad)
 
+    @property
+    def loiter_radius(self) -> float:
+        """Radius of a loiter that states none, m at sea level, negative to the left: WP_LOITER_RAD, or 60 m."""
+        size = abs(self.wp_loiter_rad)
+        return math.copysign(size if size > 1.0 else _USUAL_LOITER_RADIUS, self.wp_loiter_rad)
+
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """The values (in ArduPlane's units) that one source states, by name."""
         return {name: value for name, value, stated in self.values if stated == origin}

@@ -38,9 +38,10 @@ from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION
 from flight.mission.itinerary import UNLIMITED
-from flight.mission.return_path import ReturnCircle
-from flight.simulation.tick import AT_HEIGHT, NEAR
+from flight.mission.return_path import LandingStart, ReturnCircle
+from flight.simulation.tick import AT_HEIGHT, NEAR, WIDER
 from world.frames import POLYMAP, PolyMapRecord
+from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.scenario import Scenario
 from world.terrain import Heights, ground_height
@@ -48,19 +49,27 @@ from world.wind import Wind, mean_wind_speed
 
 Floats = NDArray[np.float64]
 
+# How far round its circle a return is, since it came there and to its height.
+_CIRCLING = record_dtype(
+    "seconds",
+    "turned",  # rad, positive to the right
+    "bearing",  # rad, from its middle, at the last tick
+)
+
 # Where a return begins: places and velocities in map axes, m and m/s over the ground; bank, rad.
 RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up", "roll")
 
-# How a return ended: in its circle for `flight.mission.itinerary.UNLIMITED` s, in the ground, off the elevation data,
-# neither in three times the time that its way takes, or below the least that was asked of it.
+# How a return ended: at its landing sequence, or in its circle for `flight.mission.itinerary.UNLIMITED` s and once all
+# around it at its height; in the ground; off the elevation data; neither in three times the time that its way takes; or
+# below the least that was asked of it.
 CIRCLED, HIT, OFF_GROUND, NEVER, CUT = 1, 2, 3, 4, 5
 # What is told of a return.  Heights above ground and distances outside kill spheres, m; -1 for no threat.
 RETURN_FLOWN = record_dtype(
     ("ended", np.int64),
     "seconds",  # to its end
     "to_circle",  # s, when it is first within `AT_CIRCLE` of its target; NaN for never
-    "clearance",  # least, over all of it
-    "clearance_time",
+    "clearance",  # least, over all of it; of one that hits, `DEEPEST` below the ground at the most
+    "clearance_time",  # of one that hits, where it does so first
     "clearance_east",
     "clearance_north",
     "clearance_up",
@@ -72,8 +81,14 @@ RETURN_FLOWN = record_dtype(
     "energy",  # Wh, NaN where the envelope knows no power
     ("rows", np.int64),  # of the way that was kept
 )
-# Nearer to its target than this (m) a return is at its circle: as far as flights of ArduPlane were compared.
+# Nearer to its target than this (m), or than `flight.simulation.tick.WIDER` of its radii, a return is at its circle: as
+# far as flights of ArduPlane were compared.
 AT_CIRCLE = 200.0
+# A return that hits the ground is flown on until it is so deep in it (m): by how much it hit is known then, and what a
+# return that barely does so would meet after that.
+DEEPEST = 10.0
+# A landing sequence is joined from a return's circle within so much of the height there, m (`ModeRTL::navigate`).
+_JOINS_WITHIN = 10.0
 # Every so many ticks a place of the way is kept, 1 s.
 KEPT_EVERY = 10
 # The flight path follows the pitch so late, s: the time in which lift turns the velocity of a small aircraft.
@@ -231,17 +246,20 @@ def _induced_drag(speeds: Floats, excess: Floats) -> float:
 
 def fly_returns(
     starts: Records,
-    targets: Sequence[ReturnCircle],
+    targets: Sequence[ReturnCircle | None],
     parameters: ArduPilotParameters,
     aircraft: PointMass,
     around: Surroundings,
     *,
+    landings: Sequence[LandingStart | None] = (),
     keep: bool = False,
     least: tuple[Floats, Floats] | None = None,
 ) -> SwiftReturns:
     """Fly a return from each of n starts.
 
-    starts: (n,) of `RETURN_START`.  targets: n circles, where each of them goes.
+    starts: (n,) of `RETURN_START`.
+    targets: n circles, where each of them goes; None for one that goes straight to its landing sequence.
+    landings: n landing sequences that they go on to, None for those that end in their circle; or none at all.
     keep: whether their ways are kept.
     least: (n,) heights above ground and (n,) distances outside spheres, m, below which a return need not be flown on.
 
@@ -262,22 +280,19 @@ def fly_returns(
     >>> int(flown["ended"]) == CIRCLED, bool(140.0 < flown["to_circle"] < 160.0)
     (True, True)
     """
-    ends = np.zeros(len(starts), WAYPOINT)
-    if len(starts):
-        columns = np.array([tuple(target) for target in targets]).T
-        for name, column in zip(("centre_east", "centre_north", "up", "circle", "slope_base"), columns, strict=True):
-            ends[name] = column
-    ends["returns"], ends["airspeed"] = True, aircraft.record.airspeed
+    stages = [
+        _stages(target, landing, parameters, aircraft)
+        for target, landing in zip(targets, landings or [None] * len(targets), strict=True)
+    ]
     flown = np.zeros(len(starts), RETURN_FLOWN)
-    longest = int(max((_most_seconds(s, e, aircraft) for s, e in zip(starts, ends, strict=True)), default=0.0)) + 2
-    way = np.zeros((longest if keep else 0, 3))
+    times = [_most_seconds(start, ends, aircraft) for start, ends in zip(starts, stages, strict=True)]
+    way = np.zeros((int(max(times, default=0.0)) + 2 if keep else 0, 3))
     ways, law = [], parameters.record()
     floor, apart = (np.full(len(starts), -math.inf),) * 2 if least is None else least
-    for k in range(len(starts)):
-        most = _most_seconds(starts[k], ends[k], aircraft)
+    for k, ends in enumerate(stages):
         _fly_return(
-            starts[k], ends[k], law, aircraft.record, aircraft.excess, aircraft.power, around.heights,
-            around.to_pixel, around.spheres, around.radii, around.known, most,
+            starts[k], ends, law, aircraft.record, aircraft.excess, aircraft.power, around.heights,
+            around.to_pixel, around.spheres, around.radii, around.known, times[k],
             float(floor[k]), float(apart[k]), way, flown[k],
         )  # fmt: skip
         if keep:
@@ -285,25 +300,54 @@ def fly_returns(
     return SwiftReturns(flown, tuple(ways))
 
 
-def _most_seconds(start: Record, end: Record, aircraft: PointMass) -> float:
+def _stages(
+    target: ReturnCircle | None, landing: LandingStart | None, parameters: ArduPilotParameters, aircraft: PointMass
+) -> Records:
+    """(1,) or (2,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: what a return flies to, one after the other.
+
+    The first place of a landing sequence is a waypoint, or the middle of a loiter that the mission asks for.
+    """
+    stages: Records = np.zeros((target is not None) + (landing is not None), WAYPOINT)
+    stages["airspeed"] = aircraft.record.airspeed
+    if target is not None:
+        first = stages[0]
+        first.centre_east, first.centre_north, first.up, first.circle, first.slope_base = target
+        first.east, first.north, first.returns = target.east, target.north, True
+    if landing is not None:
+        last = stages[-1]
+        last.east, last.north, last.up = last.centre_east, last.centre_north, last.up = landing.place
+        # Nothing says how its next leg turns: as at a mission's end, it is a right angle.
+        last.turn = 0.5 * math.pi
+        last.circle = (landing.radius or parameters.loiter_radius) if landing.circles else 0.0
+    return stages
+
+
+def _most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
     """After how long a return is given up, s."""
-    distance = math.hypot(end["centre_east"] - start["east"], end["centre_north"] - start["north"])
     slowest = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
-    return float(_SPARE + _TOO_LONG * (distance / slowest + abs(end["up"] - start["up"]) / 2.0))
+    east, north, up, seconds = start["east"], start["north"], start["up"], 0.0
+    for end in stages:
+        distance = math.hypot(end["east"] - east, end["north"] - north)
+        around = 2.0 * math.pi * WIDER * abs(end["circle"])
+        seconds += (distance + around) / slowest + abs(end["up"] - up) / 2.0
+        east, north, up = end["east"], end["north"], end["up"]
+    return float(_SPARE + _TOO_LONG * seconds)
 
 
 @compiled
 def _fly_return(
-    start: Record, end: Record, parameters: Record, aircraft: Record, excess: Floats, power: Floats, heights: Heights,
-    to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float, floor: float,
+    start: Record, stages: Records, parameters: Record, aircraft: Record, excess: Floats, power: Floats,
+    heights: Heights, to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float, floor: float,
     apart: float, way: Floats, out: Record,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Fly one return for ``most`` s at the longest, and fill in what is told of it."""
-    waypoints = np.zeros(2, WAYPOINT)
+    # A circle is flown until the return is over: no leg comes after it.  A waypoint is left for one like it.
+    waypoints = np.zeros(3, WAYPOINT)
     b = waypoints[1]
     estimated, state = np.zeros(1, MOTION)[0], np.zeros(1, STATE)[0]
     own = np.zeros(1, ARDUPILOT_MEMORY)[0]
-    _begin(start, end, b, estimated, out)
+    _begin(start, estimated, out)
+    _fly_to(stages[0], waypoints, estimated, own)
     _take_over(start, parameters, aircraft, excess, state, own)
     pitch = state.pitch
     angle = pitch - state.alpha
@@ -311,15 +355,18 @@ def _fly_return(
     roll_share = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
     pitch_share = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
     path_share = 1.0 - math.exp(-dt / _PATH_LAG)
-    near = max(NEAR, 2.0 * abs(b.circle))
-    circled, used = 0.0, 0.0
+    circling = np.zeros(1, _CIRCLING)[0]
+    stage, used = 0, 0.0
     for tick in range(int(most / dt)):
         time = tick * dt
         if tick % KEPT_EVERY == 0 and out.rows < way.shape[0]:
             way[out.rows, 0], way[out.rows, 1], way[out.rows, 2] = estimated.east, estimated.north, estimated.up
             out.rows += 1
+        factor = true_by_equivalent(estimated.up)
+        is_last = stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - b.centre_east, estimated.north - b.centre_north)
-        if distance < AT_CIRCLE and math.isnan(out.to_circle):
+        wide = WIDER * abs(b.circle) * factor * factor
+        if is_last and distance < max(AT_CIRCLE, wide) and math.isnan(out.to_circle):
             out.to_circle = time
         out.seconds = time
         _look(estimated, time, heights, to_pixel, spheres, radii, known, out)
@@ -327,13 +374,16 @@ def _fly_return(
             out.ended = CUT
         if out.ended != NEVER:
             break
-        if circled > 0.0 or (distance < near and abs(estimated.up - b.up) < AT_HEIGHT):
-            circled += dt
-        if circled > UNLIMITED:
-            out.ended = CIRCLED
-            break
-        factor = true_by_equivalent(estimated.up)
-        navigate_legs(estimated, waypoints, parameters, own, factor, dt)
+        if _is_through(estimated, b, own, circling, is_last, wide, dt):
+            if is_last:
+                out.ended = CIRCLED
+                break
+            stage += 1
+            _fly_to(stages[stage], waypoints, estimated, own)
+        navigate_legs(estimated, waypoints[: 2 if b.circle != 0.0 else 3], parameters, own, factor, dt)
+        if own.on_circle and not b.returns:
+            # On a loiter the height of its item is flown at once (`Plane::update_loiter`).
+            own.from_up = b.up
         demand_height(estimated, b, parameters, own, dt)
         wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, b.airspeed))
         state.pitch = pitch
@@ -343,22 +393,60 @@ def _fly_return(
         pitch += pitch_share * (own.pitch_demand + parameters.pitch_trim - pitch)
         angle += path_share * (pitch - _attack(state, aircraft) - angle)
         used += dt * _move(estimated, state, angle, own.throttle_demand, aircraft, excess, power, dt)
+    if out.clearance <= 0.0:
+        out.ended = HIT
     if not known:
         out.clearance = out.clearance_before = math.nan
     out.energy = used / 3600.0 if aircraft.has_power else math.nan
 
 
 @inner
-def _begin(start: Record, end: Record, b: Record, estimated: Record, out: Record) -> None:  # pragma: no cover
-    """Fill in the waypoint to return to, where it begins, and what is told before anything was flown."""
-    b.centre_east, b.centre_north, b.up = end.centre_east, end.centre_north, end.up
-    b.circle, b.slope_base, b.returns, b.airspeed = end.circle, end.slope_base, True, end.airspeed
+def _is_through(
+    here: Record, b: Record, own: Record, circling: Record, is_last: bool, wide: float, dt: float
+) -> bool:  # pragma: no cover - compiled
+    """Whether a stage of a return is over: its waypoint is reached, its last circle flown, or left for what follows.
+
+    b: its waypoint.  wide: m from its middle within which it is at its circle.  dt: s since it was asked last.
+    """
+    if b.circle == 0.0:
+        reached: bool = own.leg > 0
+        return reached
+    high = abs(here.up - b.up)
+    if not is_last:
+        joins: bool = own.on_circle and high < _JOINS_WITHIN
+        return joins
+    off_e, off_n = here.east - b.centre_east, here.north - b.centre_north
+    bearing = math.atan2(off_e, off_n)
+    if circling.seconds > 0.0:
+        circling.turned += wrap(bearing - circling.bearing)
+    circling.bearing = bearing
+    if circling.seconds > 0.0 or (math.hypot(off_e, off_n) < max(NEAR, wide) and high < AT_HEIGHT):
+        circling.seconds += dt
+    around: bool = circling.seconds > UNLIMITED and abs(circling.turned) >= 2.0 * math.pi
+    return around
+
+
+@inner
+def _begin(start: Record, estimated: Record, out: Record) -> None:  # pragma: no cover
+    """Fill in where it begins, and what is told before anything was flown."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
     out.clearance, out.clearance_before, out.threat = math.inf, math.inf, -1
     out.outside, out.outside_before = math.inf, math.inf
     out.to_circle, out.energy, out.ended, out.rows = math.nan, 0.0, NEVER, 0
+
+
+@inner
+def _fly_to(stage: Record, waypoints: Records, estimated: Record, own: Record) -> None:  # pragma: no cover - compiled
+    """Make a stage the next two waypoints, on a leg from here."""
+    for k in range(1, 3):
+        b = waypoints[k]
+        b.east, b.north, b.turn, b.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
+        b.centre_east, b.centre_north, b.up, b.circle = stage.centre_east, stage.centre_north, stage.up, stage.circle
+        b.returns, b.slope_base = stage.returns, stage.slope_base
+    own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
+    own.leg, own.on_circle, own.cross_track_sum = 0, False, 0.0
 
 
 @inner
@@ -428,13 +516,15 @@ def _look(
     if math.isnan(clearance):
         out.ended = OFF_GROUND
         return
-    if math.isnan(out.to_circle):
-        out.clearance_before = min(out.clearance_before, clearance)
     if clearance < out.clearance:
-        out.clearance, out.clearance_time = clearance, time
-        out.clearance_east, out.clearance_north, out.clearance_up = here.east, here.north, here.up
-    if clearance <= 0.0:
-        out.ended = HIT
+        if out.clearance > 0.0:
+            if math.isnan(out.to_circle):
+                out.clearance_before = clearance
+            out.clearance_time = time
+            out.clearance_east, out.clearance_north, out.clearance_up = here.east, here.north, here.up
+        out.clearance = clearance
+    if clearance <= -DEEPEST:
+        out.ended, out.seconds = HIT, out.clearance_time
 
 
 @inner

@@ -215,37 +215,51 @@ def test_the_last_row_shows_how_the_flight_ended() -> None:
     assert space.rows[0].clearance == pytest.approx(-3.0)
 
 
-def ended(memory: Record, north: float, up: float, ticks: int = 1, **target: float) -> bool:
-    """Whether a return is over after some seconds at a place; its target is at the origin, 400 m up."""
+def ended(memory: Record, away: float, up: float, ticks: int = 1, turning: float = 10.0, **target: float) -> bool:
+    """Whether a return is over after some seconds in a circle about the origin, which is its target, 400 m up.
+
+    away: m from it.  turning: degrees a second.
+    """
     motion, b = np.zeros(1, MOTION)[0], np.zeros(1, WAYPOINT)[0]
-    motion.north, motion.up, b.up = north, up, 400.0
+    motion.up, b.up = up, 400.0
     for name, value in target.items():
         setattr(b, name, value)
     path_over = bool(memory.done)
-    for _ in range(ticks):
+    for k in range(ticks):
+        motion.east = away * math.sin(math.radians(turning * k))
+        motion.north = away * math.cos(math.radians(turning * k))
         memory.done = path_over
         end_return(motion, b, memory, 1.0)
     return bool(memory.done)
 
 
-def test_a_return_ends_with_its_path_a_minute_after_it_came_to_its_circle_and_height() -> None:
-    def fresh(*, done: bool) -> Record:
-        memory = np.zeros(1, GUIDANCE_MEMORY)[0]
-        memory.done = done
-        return memory
+def fresh(*, done: bool) -> Record:
+    """The memory of a flight whose path is over, or not yet."""
+    memory = np.zeros(1, GUIDANCE_MEMORY)[0]
+    memory.done = done
+    return memory
 
+
+def test_a_return_ends_with_its_path_a_minute_after_it_came_to_its_circle_and_height() -> None:
     assert not ended(fresh(done=True), 299.0, 400.0, 60)
     assert ended(fresh(done=True), 299.0, 400.0, 61)
     # With its path not yet over, after five of them.
     assert not ended(fresh(done=False), 299.0, 400.0, 300)
     assert ended(fresh(done=False), 299.0, 400.0, 301)
-    # Too far away, too high, too low: it has not begun.  Two radii of a wide circle are near enough.
-    for north, up in ((301.0, 400.0), (0.0, 420.5), (0.0, 379.5)):
-        assert not ended(fresh(done=True), north, up, 400)
-    assert ended(fresh(done=True), 799.0, 400.0, 61, circle=-400.0)
-    memory = fresh(done=True)
-    ended(memory, 0.0, 400.0)
-    assert memory.returning
+    # Too far away, too high, too low: it has not begun.  1.3 radii of a wide circle are near enough.
+    for away, up in ((301.0, 400.0), (0.0, 420.5), (0.0, 379.5)):
+        assert not ended(fresh(done=True), away, up, 400)
+    assert ended(fresh(done=True), 519.0, 400.0, 61, circle=-400.0)
+
+
+def test_a_return_ends_no_sooner_than_it_was_all_around_its_circle() -> None:
+    # 2 degrees a second: once around after 180 s, the first of which is the one in which it comes there.
+    assert not ended(fresh(done=True), 500.0, 400.0, 180, 2.0, circle=500.0)
+    assert ended(fresh(done=True), 500.0, 400.0, 182, 2.0, circle=500.0)
+    assert ended(fresh(done=True), 500.0, 400.0, 182, -2.0, circle=-500.0)
+    # It never gets around: given up after five times 2 pi 500 m at 10 m/s, 1,571 s; 400 m up it is 4 % wider.
+    assert not ended(fresh(done=True), 500.0, 400.0, 1571, 0.0, circle=500.0)
+    assert ended(fresh(done=True), 500.0, 400.0, 1660, 0.0, circle=500.0)
 
 
 def test_a_return_does_not_miss_the_end_of_a_path_that_it_need_not_follow() -> None:

@@ -182,6 +182,33 @@ def test_what_cannot_end_is_told() -> None:
     assert told["threat"] == -1
 
 
+@pytest.mark.parametrize("radius", [300.0, 500.0, -600.0, 1000.0])
+def test_its_circle_is_flown_all_around(radius: float) -> None:
+    """A post on the circle, wherever it stands, is passed within a few metres and the width of the sphere."""
+    begin, away = start(up=900.0, velocity_north=26.0), abs(radius)
+    for bearing in range(0, 360, 60):
+        at = away * math.sin(math.radians(bearing)), 5000.0 + away * math.cos(math.radians(bearing))
+        flown = returned(begin, ReturnCircle(0.0, 5000.0, 900.0, radius), flat(100.0, ((*at, 900.0, 1.0),)))
+        # True radii grow with height: 900 m are 9 % of it.
+        assert flown["outside"] < 0.12 * away + 60.0
+        assert flown["ended"] == CIRCLED
+    assert flown["to_circle"] == pytest.approx((5000.0 - max(200.0, 1.3 * 1.09 * abs(radius))) / 26.1, abs=4.0)
+
+
+def test_one_that_grazes_the_ground_is_flown_on_and_its_depth_is_known() -> None:
+    circle, begin = ReturnCircle(0.0, 6000.0, 900.0, 120.0), start(up=900.0, velocity_north=26.0)
+    safe = returned(begin, circle, flat(895.0))
+    grazed = returned(begin, circle, flat(905.0))
+    assert (int(safe["ended"]), int(grazed["ended"])) == (CIRCLED, HIT)
+    assert grazed["clearance"] == pytest.approx(safe["clearance"] - 10.0, abs=0.1)
+    # The whole way: its energy is that of the one that was not hit.  Where it hits is where it does so first.
+    assert grazed["energy"] == pytest.approx(safe["energy"], rel=1e-6)
+    assert grazed["clearance_time"] == 0.0
+    deep = returned(begin, circle, flat(920.0))
+    assert (int(deep["ended"]), float(deep["seconds"])) == (HIT, 0.0)
+    assert deep["clearance"] == pytest.approx(-20.0, abs=0.1)
+
+
 def test_energy_is_power_over_time() -> None:
     # Level for 20 km: the envelope's level power at 26.2 m/s true (25 equivalent at 1,000 m) over the time.
     flown = returned(start(up=1000.0, velocity_north=26.2), ReturnCircle(0.0, 20_000.0, 1000.0, 120.0), flat(100.0))
