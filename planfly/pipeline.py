@@ -153,11 +153,11 @@ def make_setup(
     # A fence that makes no zones is bad input, and the verdict could not judge it.
     fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
-    rules = airframe.autopilot.return_rules
+    rules, loiters = airframe.autopilot.return_rules, airframe.autopilot.loiter_rules
     if placed is None:
-        route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits, rules)
+        route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits, rules, loiters)
     else:
-        route = lay_route(placed, airspeed, fly_over, limits, rules)
+        route = lay_route(placed, airspeed, fly_over, limits, rules, loiters)
     route = with_end_courses(route, scenario, limits)
     return FlightSetup(
         scenario=scenario,

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
+from flight.mission.loiter_circles import USUAL_LOITERS, LoiterRules
 from flight.mission.return_path import USUAL_RULES, ReturnRules
 from world.errors import ScenarioError
 from world.kernels import Record
@@ -291,6 +292,11 @@ class Autopilot(ABC):
     def return_rules(self) -> ReturnRules:
         """How it returns to launch: where to, how high, how it turns and circles."""
         return USUAL_RULES
+
+    @property
+    def loiter_rules(self) -> LoiterRules:
+        """How it flies loiters: how wide where the mission does not say, how it joins and leaves them."""
+        return USUAL_LOITERS
 
     @property
     def stated_airspeed(self) -> tuple[float, str] | None:

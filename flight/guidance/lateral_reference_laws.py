@@ -24,6 +24,11 @@ WAYPOINT = record_dtype(
     "circle",  # m, radius of the loiter that it is a corner of, positive to the right; 0 for none
     "centre_east",  # m, of that circle
     "centre_north",
+    ("item", np.int64),  # seq of the mission item that it belongs to, -1 for none
+    "stays",  # s, of a loiter once it is reached: inf without end, NaN for one of so many turns
+    ("to_height", np.bool_),  # whether the loiter is one to a height
+    ("leaves_on_course", np.bool_),  # whether its item asks to leave it on the course to what follows
+    ("leaves_on_tangent", np.bool_),  # whether the line to what follows is to begin on its rim, not in its middle
     ("returns", np.bool_),  # whether the leg to it stands for a return; circle, centre and up are then of its target
     "slope_base",  # m, as of `flight.mission.return_path.ReturnCircle`
 )

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.mission.items import Mission, MissionItem
+from flight.mission.itinerary import loiter_of
 from flight.mission.route import Route
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
 from world.kernels import Record, compiled, inner, record_dtype
@@ -256,8 +258,11 @@ def _profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -
     return nodes
 
 
-def waypoint_records(route: Route) -> Records:
-    """(w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last one has its leg's airspeed before it."""
+def waypoint_records(route: Route, mission: Mission | None = None) -> Records:
+    """(w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last one has its leg's airspeed before it.
+
+    mission: that the route is of, which states how its loiters end; None counts them all by their turns.
+    """
     waypoints: Records = np.zeros(len(route.waypoints), WAYPOINT)
     waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
     waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))
@@ -265,7 +270,9 @@ def waypoint_records(route: Route) -> Records:
     waypoints["fly_over"], waypoints["acceptance"] = route.fly_over & (route.acceptance == 0.0), route.acceptance
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
     waypoints["up"] = route.waypoints[:, 2]
+    waypoints["item"] = route.items
     _set_circles(waypoints[1:-1], route)
+    _set_loiters(waypoints, {} if mission is None else {item.seq: item for item in mission.items})
     if route.return_to is not None:
         back = waypoints[route.return_from + 1 :]
         back["returns"] = True
@@ -291,6 +298,19 @@ def _set_circles(corners: Records, route: Route) -> None:
     for i in range(len(corners) - 2, -1, -1):
         if corners[i].circle != 0.0 and corners[i + 1].circle != 0.0 and items[i] == items[i + 1]:
             corners[i].up = corners[i + 1].up
+
+
+def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
+    """How each corner's loiter ends, by its item."""
+    waypoints["stays"] = math.nan
+    for k in np.flatnonzero(waypoints["circle"]).tolist():
+        item = items.get(int(waypoints["item"][k]))
+        loiter = None if item is None else loiter_of(item)
+        if loiter is not None and not loiter.turns:
+            waypoints["stays"][k] = math.inf if loiter.endless else loiter.seconds
+            waypoints["to_height"][k] = loiter.to_height
+            waypoints["leaves_on_course"][k] = loiter.on_course
+            waypoints["leaves_on_tangent"][k] = loiter.on_tangent
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:

@@ -36,12 +36,18 @@ class Loiter:
     turns, seconds: how long, 0 for what does not count; neither is shortened, and the circle is left on the first
         tangent to the next position after them.
     to_height: until the item's height is reached.
+    endless: whether the item asks for a circle without end, of which ``seconds`` are flown.
+    on_course, on_tangent: whether the item asks to leave it on the course to what follows, and for a line there that
+        begins on its rim: both as PX4 reads them.
     """
 
     radius: float
     turns: float = 0.0
     seconds: float = 0.0
     to_height: bool = False
+    endless: bool = False
+    on_course: bool = False
+    on_tangent: bool = False
 
     def sweep(self, airspeed: float, radius: float) -> float:
         """Angle to fly around at least, rad.  In wind a circle over the ground takes longer than the air distance."""
@@ -50,16 +56,16 @@ class Loiter:
 
 def loiter_of(item: MissionItem) -> Loiter | None:
     """Circle that an item asks for; None for any other command."""
-    p1, p2, p3, _ = (0.0 if math.isnan(value) else value for value in item.params)
+    p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
     if item.command == Command.NAV_LOITER_UNLIM:
-        return Loiter(p3, seconds=UNLIMITED)
+        return Loiter(p3, seconds=UNLIMITED, endless=True)
     if item.command == Command.NAV_LOITER_TURNS:
         return Loiter(p3, turns=p1)
     if item.command == Command.NAV_LOITER_TIME:
-        return Loiter(p3, seconds=p1)
+        return Loiter(p3, seconds=p1, on_course=p2 > 0.0, on_tangent=p4 > 0.0)
     if item.command == Command.NAV_LOITER_TO_ALT:
-        # Its radius is the second parameter; the first asks to leave on the next leg's course, as all do here.
-        return Loiter(p2, to_height=True)
+        # Its radius is the second parameter.
+        return Loiter(p2, to_height=True, on_course=p1 > 0.0, on_tangent=p4 > 0.0)
     return None
 
 

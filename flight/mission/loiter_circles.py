@@ -35,6 +35,35 @@ SpiralSlopes = Callable[[float, float], tuple[float, float]]
 OwnRadius = Callable[[float, float], float]
 
 
+@dataclass(frozen=True, slots=True)
+class LoiterRules:
+    """How an autopilot flies loiters.
+
+    radius: of a loiter that states none, m, negative to the left; 0 for a radius of the aircraft's own.
+    radius_name: the parameter that sets it, "" for none.
+    at_middle: whether it flies at the circle's middle until it comes to the rim, and leaves as soon as the loiter is
+        over for the line that begins in the middle; else it joins and leaves the circle on tangents.
+    holds_height: whether on the way to a loiter to a height it holds the height at which it set out.
+    climb, sink: its fastest in circles, m/s.
+    short: by how much a height may be missed, m.
+
+    >>> LoiterRules().radius, LoiterRules().at_middle
+    (0.0, False)
+    """
+
+    radius: float = 0.0
+    radius_name: str = ""
+    at_middle: bool = False
+    holds_height: bool = False
+    climb: float = math.inf
+    sink: float = math.inf
+    short: float = 0.0
+
+
+# Of an autopilot that has none of its own.
+USUAL_LOITERS = LoiterRules()
+
+
 class PlacedStop(NamedTuple):
     """A stop of the itinerary on the map; position: (3,) east, north, up, m."""
 
@@ -75,15 +104,20 @@ class Node:
 
 
 def lay_circles(
-    source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius, slopes: SpiralSlopes
+    source: str,
+    stops: list[PlacedStop],
+    notes: Notes,
+    own_radius: OwnRadius,
+    slopes: SpiralSlopes,
+    rules: LoiterRules = USUAL_LOITERS,
 ) -> list[RoutePoint]:
     """Waypoints of a route through points and around circles.
 
-    source: names the mission in errors.  own_radius, slopes: of the aircraft.  Stops inside a circle before or after
-    them are left out, with a note: no straight leg joins them.  Raises MissionError for a loiter too wide or too long
-    to lay out.
+    source: names the mission in errors.  own_radius, slopes: of the aircraft.  rules: of whoever flies.  Stops inside a
+    circle before or after them are left out, with a note: no straight leg joins them.  Raises MissionError for a loiter
+    too wide or too long to lay out.
     """
-    nodes = _nodes(source, stops, notes, own_radius)
+    nodes = _nodes(source, stops, notes, own_radius, rules)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
     up = float(stops[0].position[2])
@@ -95,7 +129,7 @@ def lay_circles(
         into = courses[k - 1] if k else (courses[k] if k < len(courses) else 0.0)
         onward = courses[k] if k < len(courses) else None
         run = math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
-        laid = _around(source, node, into, onward, up, run, slopes)
+        laid = _around(source, node, into, onward, up, run, slopes, rules)
         if not k:
             laid.insert(0, RoutePoint(node.stop, (*on_rim(node, into), laid[0].position[2])))
         up = laid[-1].position[2]
@@ -107,13 +141,13 @@ def lay_circles(
     return points
 
 
-def _nodes(source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius) -> list[Node]:
+def _nodes(source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius, rules: LoiterRules) -> list[Node]:
     """Points and circles in flying order, each with a tangent to the next."""
     nodes: list[Node] = []
     for stop, (east, north, up) in stops:
         node = Node(stop, float(east), float(north), float(up))
         if stop.loiter is not None:
-            node = replace(node, turn=_turn(source, stop, stop.loiter, float(up), notes, own_radius))
+            node = replace(node, turn=_turn(source, stop, stop.loiter, float(up), notes, own_radius, rules))
             while nodes and nodes[-1].turn == 0.0 and nodes[-1].away(node) < abs(node.turn) + _CLEAR:
                 _left_out(nodes.pop().stop, node.stop, notes)
         before = nodes[-1] if nodes else None
@@ -134,13 +168,19 @@ def _left_out(stop: ItineraryStop, circle: ItineraryStop, notes: Notes) -> None:
     notes.add(name if stop.item >= 0 else f"home {name}", stop.item if stop.item >= 0 else None)
 
 
-def _turn(source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius) -> float:
+def _turn(
+    source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius, rules: LoiterRules
+) -> float:
     """Signed radius of a loiter, m."""
     radius = abs(loiter.radius)
     if radius > WIDEST:
         allowed = f"allowed up to {WIDEST:,.0f}"
         message = f"{source}: item {stop.item}: loiter radius {radius:g} m: {allowed}"
         raise MissionError(message, file=source, field="loiter radius", value=radius, allowed=allowed)
+    if radius == 0.0 and rules.radius != 0.0:
+        side = " to the left" if rules.radius < 0.0 else ""
+        notes.add(f"loiter without a radius: flown with {rules.radius_name}, {abs(rules.radius):g} m{side}", stop.item)
+        return math.copysign(max(TIGHTEST, abs(rules.radius)), rules.radius)
     if radius == 0.0:
         radius = own_radius(stop.airspeed, up)
         notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
@@ -187,19 +227,23 @@ def circle_corners(node: Node, into: float, sweep: float) -> list[tuple[float, f
 
 
 def _around(
-    source: str, node: Node, into: float, onward: float | None, up: float, run: float, slopes: SpiralSlopes
-) -> list[RoutePoint]:
+    source: str, node: Node, into: float, onward: float | None, up: float, run: float, slopes: SpiralSlopes,
+    rules: LoiterRules,
+) -> list[RoutePoint]:  # fmt: skip
     """Corners around a circle, joined on one course and left on another (None: the mission ends there).
 
     up: height where the leg before started, m.  run: its length, m.
+
+    For whoever leaves as soon as its time is over, the circle is drawn to the last tangent before that.
     """
     radius, side = abs(node.turn), math.copysign(1.0, node.turn)
     first, wanted = node.up, 0.0
     loiter = node.stop.loiter
     if loiter is not None and loiter.to_height:
         climb, dive = slopes(node.stop.airspeed, max(up, node.up))
-        first = min(max(node.up, up - dive * run), up + climb * run)
-        missing = abs(node.up - first)
+        climb, dive = min(climb, rules.climb / node.stop.airspeed), min(dive, rules.sink / node.stop.airspeed)
+        first = up if rules.holds_height else min(max(node.up, up - dive * run), up + climb * run)
+        missing = max(0.0, abs(node.up - first) - rules.short)
         if missing > 0.0:
             # Heights are counted between the corners, of which there is one more than spaces between them.
             wanted = missing / (climb if node.up > first else dive) / radius + CORNER
@@ -208,7 +252,10 @@ def _around(
     sweep = wanted
     if onward is not None:
         part = (side * (onward - into)) % (2.0 * math.pi)
-        sweep = part + 2.0 * math.pi * max(0, math.ceil((wanted - part) / (2.0 * math.pi) - 1e-9))
+        more = (wanted - part) / (2.0 * math.pi)
+        timed = loiter is not None and not loiter.to_height
+        more = math.floor(more) if rules.at_middle and timed else math.ceil(more - 1e-9)
+        sweep = part + 2.0 * math.pi * max(0, more)
     if sweep > MAX_STOPS * CORNER:
         turns, allowed = sweep / (2.0 * math.pi), f"at most {MAX_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
         item = f"item {node.stop.item}"

@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import Mission, Notes, command_name
 from flight.mission.itinerary import Itinerary, ItineraryStop
-from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, PlacedStop, RoutePoint, SpiralSlopes, lay_circles
+from flight.mission.loiter_circles import (
+    PLAIN_SLOPE,
+    USUAL_LOITERS,
+    LoiterRules,
+    OwnRadius,
+    PlacedStop,
+    RoutePoint,
+    SpiralSlopes,
+    lay_circles,
+)
 from flight.mission.placing import HIGHEST, LOWEST, PlacedMission, place_stops
 from flight.mission.return_path import (
     USUAL_RULES,
@@ -208,6 +217,7 @@ def make_route(
     fly_over: bool,
     limits: Limits | None = None,
     rules: ReturnRules = USUAL_RULES,
+    loiters: LoiterRules = USUAL_LOITERS,
 ) -> Route:
     """Route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
 
@@ -216,7 +226,7 @@ def make_route(
     fly_over: whether waypoints are flown through instead of by; one whose arc would miss its acceptance always is.
     limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
         a spiral (5 %).
-    rules: how whoever flies returns to launch.
+    rules, loiters: how whoever flies returns to launch, and flies loiters.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
     has a horizontal length of at least `flight.mission.placing.SAME_PLACE`.  Raises MissionError, naming the item, for
@@ -233,7 +243,7 @@ def make_route(
     >>> route.started
     'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
     """
-    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
+    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules, loiters)
 
 
 def lay_route(
@@ -242,6 +252,7 @@ def lay_route(
     fly_over: bool,
     limits: Limits | None = None,
     rules: ReturnRules = USUAL_RULES,
+    loiters: LoiterRules = USUAL_LOITERS,
 ) -> Route:
     """Route through the places of a mission; arguments as of `make_route`.
 
@@ -256,7 +267,7 @@ def lay_route(
     mission, notes = placed.mission, Notes()
     kept = [_with_airspeed(place, default_airspeed) for place in placed.stops]
     returning = kept.pop() if placed.itinerary.returns else None
-    points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits))
+    points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
     back: dict[str, Any] = {}
     if returning is not None:
         back = _lay_return(placed, returning.stop, points, rules, limits, notes)

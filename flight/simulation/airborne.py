@@ -67,7 +67,7 @@ class Airborne(ABC):
         self.map = local_map or LocalMap.around(setup)
         self._steps = setup.fdm_hz // setup.guidance_hz
         self.dt = self._steps / setup.fdm_hz
-        waypoints = waypoint_records(setup.route)
+        waypoints = waypoint_records(setup.route, setup.mission)
         self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         self._workspace = Workspace(gains, self.path, waypoints, setup.autopilot.own)

@@ -21,6 +21,7 @@ from flight.autopilots.px4.parameters import (
 )
 from flight.autopilots.px4.tracking_error import tracking_error
 from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
 from world.kernels import Record
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation
@@ -126,6 +127,24 @@ class Px4(Autopilot):
             rally_limit=0.0,
             includes_home=True,
             holds_height=True,
+        )
+
+    @property
+    def loiter_rules(self) -> LoiterRules:
+        """By NAV_LOITER_RAD, and the rates of its reference height, until it is within NAV_FW_ALT_RAD.
+
+        >>> Px4(default_parameters()).loiter_rules.radius
+        80.0
+        """
+        made = self.parameters
+        return LoiterRules(
+            radius=made["NAV_LOITER_RAD"],
+            radius_name="NAV_LOITER_RAD",
+            at_middle=True,
+            holds_height=True,
+            climb=min(made["FW_T_CLMB_R_SP"], made["FW_T_CLMB_MAX"]),
+            sink=min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
+            short=made["NAV_FW_ALT_RAD"],
         )
 
     @property

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.px4.lateral import wanted_bank
-from flight.autopilots.px4.navigator import navigate
+from flight.autopilots.px4.navigator import is_last, navigate
 from flight.autopilots.px4.parameters import PX4_PARAMETERS
 from flight.autopilots.px4.tecs import update_tecs
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -41,6 +41,8 @@ PX4_MEMORY = record_dtype(
     "from_up",  # m, where its slope begins
     "nearest",  # m, the smallest distance to the leg's end so far
     "reached_for",  # s since its end was reached
+    "begun_up",  # m, where the aircraft was when the leg began
+    ("at_rim", np.bool_),  # whether the rim of a loiter to a height was reached
     ("circling", np.bool_),  # whether a circle is followed now
     ("returning", np.bool_),  # whether it returns to launch; from_east, from_north and from_up are then where it began
     ("climbed", np.bool_),  # whether it is at the height that it returns at
@@ -128,6 +130,10 @@ def fly_as_px4(
     commanded = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
     # Guidance is told the equivalent airspeed as if it were a true one.
     navigate(estimated, waypoints, wind_east, wind_north, commanded, parameters, own, dt)
+    # Where PX4 left a circle sooner than the path does, the rest of it is not flown; nor is it over before its time.
+    while pieces[memory.piece].leg < own.leg - 1 and memory.piece + 1 < pieces.shape[0]:
+        memory.piece += 1
+    memory.done = memory.done and is_last(waypoints, own)
     wanted = max(commanded, own.airspeed_for_ground)
     memory.speed_command = min(parameters.airspeed_max, wanted) * factor
     if own.returning:
@@ -163,6 +169,7 @@ def _begin(
     own.begun = True
     own.from_east, own.from_north, own.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
     own.nearest = math.inf
+    own.begun_up = estimated.up
     own.height_asked = estimated.up
     own.height_reference = estimated.up
     own.airspeed = state.airspeed

@@ -2,9 +2,15 @@
 
 Facts of PX4's `src/modules/navigator/mission_block.cpp` (`is_mission_item_reached_or_completed`) and of
 `src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`): a waypoint is reached within a radius of it or past the plane
-across the leg at it, and only within NAV_FW_ALT_RAD of its height; an aircraft that is there too high or too low
+across the leg at it, and only within NAV_FW_ALT_RAD of its height; an aircraft that came there too high or too low
 circles at the waypoint until it is.  The radius is NAV_ACC_RAD, and up to 1.16 guidance's own switch distance where
 that is more; an item's own radius (its second parameter) is not read for fixed wing.
+
+A loiter is flown around its middle from the beginning of its leg (`control_auto_loiter`), which from afar is straight
+at the middle.  It is reached, once, within that radius of its rim and near its height; then its time counts, and it is
+left at once for the line from its middle to the next waypoint: on the course there, or for a line that begins at the
+tangent's place on the rim, only where its item asks for that.  LOITER_TIME asks for its height all along; LOITER_TO_ALT
+for the height at which its leg began until its rim is reached, and for its own from then on.
 """
 
 import math
@@ -16,6 +22,10 @@ from world.kernels import Record, Records, inner
 # From a waypoint reached to the turn, s: the navigator's loop, its message to the position controller and that one's
 # turn.  In 36 waypoints of the kept flights it was 0.1 s on average (0 to 0.3), at 1.16 as at 1.17.
 SWITCH_DELAY = 0.1
+# A loiter that is left on the course to what follows is left within this of it, rad (MIS_YAW_ERR), but not where that
+# lies within so many radii of its middle.
+COURSE_ACCEPTANCE = math.radians(12.0)
+_TOO_NEAR_FOR_COURSE = 1.05
 
 
 @inner
@@ -60,41 +70,98 @@ def navigate(
         # A return goes on until the flight ends, in one leg.
         _return(estimated, b, wind_east, wind_north, airspeed_demand, parameters, own)
         return
+    if b.circle != 0.0:
+        _loiter(estimated, waypoints, b, wind_east, wind_north, airspeed_demand, parameters, own, dt)
+    else:
+        _follow_plain_leg(estimated, waypoints, b, wind_east, wind_north, airspeed_demand, parameters, own, dt)
+
+
+@inner
+def _follow_plain_leg(
+    estimated: Record, waypoints: Records, b: Record, wind_east: float, wind_north: float, airspeed_demand: float,
+    parameters: Record, own: Record, dt: float,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Follow the leg to a waypoint b, and circle at it where the aircraft came there too high or too low."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    early = switch_distance(speed, parameters)
-    circle = b.circle
-    middle_east, middle_north = b.east, b.north
-    if circle != 0.0:
-        middle_east, middle_north = b.centre_east, b.centre_north
-    radius = circle if circle != 0.0 else parameters.loiter_radius
-    distance = math.hypot(middle_east - estimated.east, middle_north - estimated.north)
+    early, radius = switch_distance(speed, parameters), parameters.loiter_radius
+    distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
     own.nearest = min(own.nearest, distance)
     high_or_low = abs(estimated.up - b.up) > parameters.height_acceptance
-    last = own.leg + 2 >= waypoints.shape[0]
-    if circle != 0.0:
-        # To the circle along the line to its middle, then around it.
-        own.circling = own.circling or distance < abs(circle) + early
-    else:
-        # At the waypoint, and too high or too low for it.
-        own.circling = distance < early and high_or_low
+    # Once begun, the circle is not left for being wide.
+    own.circling = high_or_low and (own.circling or distance < early)
     if own.circling:
-        follow_circle(
-            estimated, middle_east, middle_north, radius, wind_east, wind_north, airspeed_demand, parameters, own
-        )
+        follow_circle(estimated, b.east, b.north, radius, wind_east, wind_north, airspeed_demand, parameters, own)
         own.height_asked = b.up
     else:
-        follow_leg(estimated, middle_east, middle_north, wind_east, wind_north, airspeed_demand, parameters, own)
-        own.height_asked = leg_height(middle_east, middle_north, b.up, max(early, abs(radius)), own)
-    if last:
+        follow_leg(estimated, b.east, b.north, wind_east, wind_north, airspeed_demand, parameters, own)
+        own.height_asked = leg_height(b.east, b.north, b.up, max(early, abs(radius)), own)
+    if own.leg + 2 >= waypoints.shape[0]:
         return
-    if circle != 0.0:
-        reached = own.circling and distance < abs(circle) + parameters.acceptance and past_corner(estimated, b)
-    else:
-        near = distance <= reach_radius(speed, parameters) or past_waypoint(estimated, b, own)
-        reached = near and not high_or_low
-    own.reached_for = own.reached_for + dt if reached or own.reached_for > 0.0 else 0.0
-    if own.reached_for > SWITCH_DELAY or (reached and circle != 0.0):
-        begin_leg(estimated, waypoints, own)
+    near = distance <= reach_radius(speed, parameters) or past_waypoint(estimated, b, own)
+    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (near and not high_or_low) else 0.0
+    if own.reached_for > SWITCH_DELAY:
+        begin_leg(estimated, waypoints, own.leg + 1, own)
+
+
+@inner
+def _loiter(
+    estimated: Record, waypoints: Records, b: Record, wind_east: float, wind_north: float, airspeed_demand: float,
+    parameters: Record, own: Record, dt: float,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Fly to a loiter's circle and around it until it is over.  b: a corner of the route that stands for it."""
+    speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+    distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
+    own.circling = True
+    follow_circle(
+        estimated, b.centre_east, b.centre_north, b.circle, wind_east, wind_north, airspeed_demand, parameters, own
+    )
+    on_rim = distance <= abs(b.circle) + reach_radius(speed, parameters)
+    if b.to_height and not own.at_rim:
+        own.height_asked = own.begun_up
+        own.at_rim = on_rim and abs(estimated.up - own.begun_up) <= parameters.height_acceptance
+        return
+    own.height_asked = b.up
+    at_height = abs(estimated.up - b.up) <= parameters.height_acceptance
+    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (on_rim and at_height) else 0.0
+    after = own.leg + 2
+    if math.isnan(b.stays):
+        # So many turns, which PX4 does not fly: as far around as the route is drawn.
+        if after < waypoints.shape[0] and on_rim and past_corner(estimated, b):
+            begin_leg(estimated, waypoints, own.leg + 1, own)
+        return
+    while after < waypoints.shape[0] and waypoints[after].item == b.item:
+        after += 1
+    if after >= waypoints.shape[0] or own.reached_for <= b.stays + SWITCH_DELAY:
+        return
+    if not b.leaves_on_course or _heads_for(estimated, waypoints[after], b):
+        begin_leg(estimated, waypoints, after - 1, own)
+
+
+@inner
+def is_last(waypoints: Records, own: Record) -> bool:  # pragma: no cover - compiled
+    """Whether nothing comes after what is flown to now, a loiter's own corners left aside."""
+    b = waypoints[own.leg + 1]
+    last: bool = own.leg + 2 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].item == b.item)
+    return last
+
+
+@inner
+def _target(b: Record) -> tuple[float, float]:  # pragma: no cover - compiled
+    """East and north (m) of the setpoint that a waypoint of the route belongs to: a loiter's is its middle."""
+    return (b.centre_east, b.centre_north) if b.circle != 0.0 else (b.east, b.north)
+
+
+@inner
+def _heads_for(estimated: Record, onward: Record, b: Record) -> bool:  # pragma: no cover - compiled
+    """Whether the course leads to the setpoint after a loiter b; so close to its middle none does, and none is asked.
+
+    onward: the waypoint after it.
+    """
+    east, north = _target(onward)
+    if math.hypot(east - b.centre_east, north - b.centre_north) <= _TOO_NEAR_FOR_COURSE * abs(b.circle):
+        return True
+    bearing = math.atan2(east - estimated.east, north - estimated.north)
+    return abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north))) < COURSE_ACCEPTANCE
 
 
 @inner
@@ -134,16 +201,27 @@ def _return(
 
 
 @inner
-def begin_leg(estimated: Record, waypoints: Records, own: Record) -> None:  # pragma: no cover - compiled
-    """Turn to the next leg: its line goes through both waypoints; after a loiter it begins where that is left."""
-    own.leg += 1
-    a, b = waypoints[own.leg], waypoints[own.leg + 1]
-    own.from_east, own.from_north, own.from_up = a.east, a.north, a.up
-    same_circle = a.circle != 0.0 and b.circle != 0.0 and a.centre_east == b.centre_east
-    if a.circle != 0.0:
+def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:  # pragma: no cover - compiled
+    """Turn to a leg: its line goes through both waypoints, and after a loiter it begins in the loiter's middle.
+
+    After one of so many turns, which PX4 does not fly, it begins where that is left.
+    """
+    a, b = waypoints[leg], waypoints[leg + 1]
+    own.leg = leg
+    own.from_east, own.from_north = _target(a)
+    own.from_up = a.up
+    if a.circle != 0.0 and math.isnan(a.stays):
         own.from_east, own.from_north = estimated.east, estimated.north
-    own.circling = own.circling and same_circle
-    own.reached_for = 0.0
+    if a.circle != 0.0 and a.leaves_on_tangent:
+        east, north = _target(b)
+        bearing = math.atan2(east - a.centre_east, north - a.centre_north)
+        share = abs(a.circle) / max(1e-3, math.hypot(east - a.centre_east, north - a.centre_north))
+        out = bearing - math.copysign(math.acos(min(1.0, share)), a.circle)
+        own.from_east += abs(a.circle) * math.sin(out)
+        own.from_north += abs(a.circle) * math.cos(out)
+    if not (a.circle != 0.0 and a.item == b.item):
+        own.circling, own.at_rim, own.begun_up = False, False, estimated.up
+        own.reached_for = 0.0
     own.nearest = math.inf
 
 

@@ -73,12 +73,18 @@ def corner_depths(requirements: RouteRequirements) -> Floats:
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
     """Half width of the corridor along a leg, m, and whose it is.
 
-    A corridor that the scenario does not state is wide enough for the turns at the leg's ends, as they are planned.
+    A corridor that the scenario does not state is wide enough for the turns at the leg's ends, as they are planned; and
+    at a loiter for all of its circle, where whoever flies joins and leaves that about its middle.
     """
     half = requirements.setup.corridor
     if requirements.setup.scenario.limits.corridor_m is not None:
         return half, "scenario"
-    turning = float(corner_depths(requirements)[leg : leg + 2].max()) + PASS
+    ends = slice(leg, leg + 2)
+    turning = float(corner_depths(requirements)[ends].max()) + PASS
+    if requirements.setup.autopilot.loiter_rules.at_middle:
+        across = 2.0 * float(requirements.setup.route.arcs[ends].max()) + PASS
+        if across > max(turning, half):
+            return across, "circle"
     if turning > half:
         return turning, "fly-by path"
     return half, "default" if requirements.setup.autopilot.follows_path else "autopilot"

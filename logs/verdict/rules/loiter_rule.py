@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.measures.track_alignment import AlignedTrack, approaches
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Margin, Rule, located
-from logs.verdict.tolerances import RADIUS_TOLERANCE
+from logs.verdict.tolerances import PASS, RADIUS_TOLERANCE
 from logs.verdict.wording import place_text
 from world.geometry import tangent_length
 
@@ -99,6 +99,8 @@ def _loiter(
     known = bool(np.isfinite(requirements.turn_limit[inner]).all())
     tightest = float(requirements.tightest[inner].max()) if known else math.nan
     bad = [item for item in at if item.ok is False]
+    if requirements.setup.autopilot.loiter_rules.at_middle:
+        bad = bad if aligned is None or not _came_to(requirements, aligned, circle) else []
     faults = _too_small(requirements, circle, tightest) if known else []
     if aligned is not None and bad:
         faults.append(_not_held(circle, bad))
@@ -133,6 +135,13 @@ def _loiter(
         unit="m",
         method="radius over the ground against the bank limit's in this wind; each corner as a turn",
     )
+
+
+def _came_to(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
+    """Whether the flight came to a circle: whoever leaves it when its time is over may come to none of its corners."""
+    away, _ = approaches(aligned.track.position, circle.middle)
+    early = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
+    return bool(away.min() <= circle.radius + early + PASS)
 
 
 def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float) -> list[Message]:
@@ -171,7 +180,7 @@ RULE = Rule(
     title="loiters",
     asks="Can each circle be held at the bank limit in this wind, and was it flown to its end?",
     margin=Margin("radius", "m", 10.0),
-    tolerances=("RADIUS_TOLERANCE",),
+    tolerances=("RADIUS_TOLERANCE", "PASS"),
     merge=fold_loiters,
     log=LogNeeds(aircraft=True),
     phrase=_numbers,

@@ -21,13 +21,10 @@ from flight.simulation.simulate import simulate
 from tests.setups import MakeSetup
 from world.kernels import Record
 
-A, B = np.array(
-    [
-        (0.0, 0.0, 0.0, False, 0.0, 25.0, 500.0, 0.0, 0.0, 0.0, False, 0.0),
-        (0.0, 1000.0, math.pi / 4, False, 0.0, 25.0, 500.0, 0.0, 0.0, 0.0, False, 0.0),
-    ],
-    WAYPOINT,
-)
+A, B = np.zeros(2, WAYPOINT)
+for waypoint in (A, B):
+    waypoint.airspeed, waypoint.up = 25.0, 500.0
+B.north, B.turn = 1000.0, math.pi / 4
 LEG = (A.east, A.north, B.east, B.north)
 
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from aircraft.catalog import load_aircraft
 from flight.guidance.path import fly_by_path
 from flight.mission.itinerary import UNLIMITED
-from flight.mission.route import Route
+from flight.mission.loiter_circles import LoiterRules
+from flight.mission.route import Route, make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
@@ -210,3 +211,36 @@ def test_a_replay_tells_a_loiter_in_one_line(flight: tuple[FlightSetup, Any], tm
     assert len(texts) < 14
     lowest = [entry.text for entry in timeline(log) if entry.kind == "ground"]
     assert len(lowest) == len(texts)
+
+
+def laid_for(rules: LoiterRules, *lines: str) -> Route:
+    made = setup_of(*lines)
+    return make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, loiters=rules)
+
+
+def test_a_loiter_without_a_radius_has_that_of_the_autopilots_parameter() -> None:
+    lines = wp(0, -1500), wp(0, 0, 100, 19, p="60 0 0 0"), wp(1500, 1500)
+    left = laid_for(LoiterRules(radius=-130.0, radius_name="NAV_LOITER_RAD"), *lines)
+    turns, radius = circled(left, 2)
+    assert turns < -1.0
+    assert radius == 130.0
+    assert "item 2: loiter without a radius: flown with NAV_LOITER_RAD, 130 m to the left" in left.notes
+    stated = laid_for(LoiterRules(radius=-130.0), wp(0, -1500), wp(0, 0, 100, 19, p="60 0 200 0"), wp(1500, 1500))
+    assert circled(stated, 2)[1] == 200.0
+
+
+def test_the_way_to_a_loiter_to_a_height_is_level_where_the_height_is_held() -> None:
+    lines = wp(0, -1500), wp(0, 0, 250, 31, p="0 200 0 0"), wp(1500, 1500, 250)
+    held = laid_for(LoiterRules(holds_height=True, climb=2.5, short=10.0), *lines)
+    corners = held.waypoints[held.items == 2, 2]
+    assert (corners[0], corners[-1]) == (400.0, 550.0)
+    # 140 m at 2.5 m/s and 25 m/s are 1,400 m, 1.11 of its circles.
+    assert 1.11 < circled(held, 2)[0] < 2.25
+    assert laid_for(LoiterRules(), *lines).waypoints[1, 2] > 480.0
+
+
+def test_a_circle_left_when_its_time_is_over_is_drawn_no_longer() -> None:
+    lines = wp(0, -1500), wp(0, 0, 100, 19, p="60 0 150 0"), wp(1500, 1500)
+    # 60 s at 25 m/s are 1.59 circles of 150 m.
+    assert 0.59 < circled(laid_for(LoiterRules(at_middle=True), *lines), 2)[0] < 1.59
+    assert 1.59 < circled(laid_for(LoiterRules(), *lines), 2)[0] < 2.59

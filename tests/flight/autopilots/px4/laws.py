@@ -38,6 +38,7 @@ def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
     made = np.zeros(len(points), WAYPOINT)
     made["east"], made["north"], made["up"] = np.array(points).T
     made["airspeed"] = 25.0
+    made["item"], made["stays"] = np.arange(len(points)), math.nan
     for name, value in fields.items():
         made[name] = value
     return made
@@ -53,6 +54,7 @@ def memory(**values: Any) -> Record:
     usual: dict[str, Any] = {
         "begun": True,
         "from_up": 500.0,
+        "begun_up": 500.0,
         "nearest": math.inf,
         "height_asked": 500.0,
         "height_reference": 500.0,

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from flight.autopilots.px4.navigator import SWITCH_DELAY, leg_height, navigate, past_corner, reach_radius
@@ -106,21 +107,115 @@ def test_the_slope_never_goes_back() -> None:
     assert own.height_asked == pytest.approx(550.0)
 
 
-def test_a_loiters_circle_is_flown_until_its_corner_is_passed() -> None:
+def test_a_circle_at_the_gate_is_not_left_for_being_wider_than_the_switch_distance() -> None:
+    own = after(flying(0.0, 945.0, 520.0), NAV_LOITER_RAD=150.0)
+    assert own.circling
+    # 150 m off, which is more than 56 m; further away none is begun.
+    assert after(flying(0.0, 850.0, 520.0), own, NAV_LOITER_RAD=150.0).circling
+    assert not after(flying(0.0, 850.0, 520.0), NAV_LOITER_RAD=150.0).circling
+    assert not after(flying(0.0, 850.0, 505.0), own, NAV_LOITER_RAD=150.0).circling
+    # Nor is it kept for the next waypoint.
+    next_one = after(flying(0.0, 960.0, 505.0), after(flying(0.0, 945.0, 520.0)))
+    assert (next_one.leg, bool(next_one.circling)) == (1, False)
+
+
+CIRCLE = {"circle": 100.0, "centre_east": 0.0, "centre_north": 1000.0, "item": 1}
+
+
+def to_a_loiter(**fields: Any) -> np.ndarray:
+    """A leg of 1 km to a circle of 100 m at 600 m, drawn with two corners, and one of 1 km to the east after it."""
+    made = waypoints((0.0, 0.0, 500.0), (-100.0, 1000.0, 600.0), (0.0, 1100.0, 600.0), (1000.0, 1000.0, 600.0))
+    for name, value in (CIRCLE | fields).items():
+        made[name][1:3] = value
+    return made
+
+
+def fly_on(at: Record, route: np.ndarray, own: Record, seconds: float, **values: float) -> None:
+    """Have the navigator of 1.17 see the aircraft at a place for so long."""
+    made = parameters("1.17", **values)
+    for _ in range(round(seconds / DT)):
+        navigate(at, route, 0.0, 0.0, 25.0, made, own, DT)
+
+
+def test_a_loiter_of_turns_is_flown_until_its_corner_is_passed() -> None:
     route = waypoints((0.0, 0.0, 500.0), (100.0, 1000.0, 500.0), (1000.0, 1000.0, 500.0))
     route["circle"][1], route["centre_east"][1], route["centre_north"][1] = 100.0, 0.0, 1000.0
     own, made = memory(), parameters()
-    # The circle is joined 100 + 56 m from its middle; before that the line to the middle is flown.
-    navigate(flying(0.0, 840.0), route, 0.0, 0.0, 25.0, made, own, DT)
-    assert not own.circling
-    navigate(flying(0.0, 850.0), route, 0.0, 0.0, 25.0, made, own, DT)
-    assert own.circling
     # The corner is east of the middle; a circle to the right comes to it from the north.
     assert not past_corner(flying(70.0, 1070.0), route[1])
     navigate(flying(70.0, 1070.0), route, 0.0, 0.0, 25.0, made, own, DT)
     assert own.leg == 0
     navigate(flying(70.0, 930.0), route, 0.0, 0.0, 25.0, made, own, DT)
     assert (own.leg, bool(own.circling), own.from_east) == (1, False, 70.0)
+
+
+def test_a_loiter_is_flown_to_at_its_own_height_straight_at_its_middle() -> None:
+    own = memory()
+    fly_on(flying(300.0, 0.0), to_a_loiter(stays=60.0), own, DT)
+    assert own.height_asked == 600.0
+    # The middle lies to the left of a course north from 300 m east of the leg.
+    assert own.side_acceleration < -1.0
+    own = memory()
+    fly_on(flying(300.0, 0.0, course=math.atan2(-300.0, 1000.0)), to_a_loiter(stays=60.0), own, DT)
+    assert own.side_acceleration == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_loiter_to_a_height_holds_that_of_its_legs_begin_until_its_rim() -> None:
+    own, route = memory(), to_a_loiter(to_height=True, stays=0.0)
+    fly_on(flying(0.0, 889.0), route, own, 1.0)
+    assert own.height_asked == 500.0
+    # Within 10 m of a circle of 100 m, but not at the height that it holds.
+    fly_on(flying(0.0, 891.0, 511.0), route, own, 1.0)
+    assert own.height_asked == 500.0
+    fly_on(flying(0.0, 891.0, 509.0), route, own, 2.5 * DT)
+    assert own.height_asked == 600.0
+    fly_on(flying(0.0, 891.0, 589.0), route, own, 1.0)
+    assert own.leg == 0
+    fly_on(flying(0.0, 891.0, 591.0), route, own, 1.0)
+    assert (own.leg, bool(own.circling), own.at_rim, own.begun_up) == (2, False, False, 591.0)
+
+
+def test_a_loiter_once_reached_counts_its_time_wherever_the_aircraft_is() -> None:
+    own, route = memory(), to_a_loiter(stays=60.0)
+    fly_on(flying(0.0, 891.0, 589.0), route, own, 100.0)
+    fly_on(flying(0.0, 885.0, 600.0), route, own, 100.0)
+    assert (own.leg, own.reached_for) == (0, 0.0)
+    fly_on(flying(0.0, 891.0, 600.0), route, own, 1.0)
+    # What banks to 30 degrees flies a circle of 119 m: it never comes to the rim again.
+    fly_on(flying(0.0, 881.0, 620.0), route, own, 58.5)
+    assert own.leg == 0
+    fly_on(flying(0.0, 881.0, 620.0), route, own, 1.0)
+    # For the line from the middle, on the leg that leads to what comes after all of its corners.
+    assert (own.leg, own.from_east, own.from_north, own.from_up) == (2, 0.0, 1000.0, 600.0)
+
+
+def test_a_loiter_without_end_is_not_left() -> None:
+    own = memory()
+    fly_on(flying(0.0, 900.0, 600.0), to_a_loiter(stays=math.inf), own, 200.0)
+    assert own.leg == 0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_line_after_a_loiter_begins_on_its_rim_where_the_item_asks_for_it(side: float) -> None:
+    own, route = memory(), to_a_loiter(stays=0.0, leaves_on_tangent=True, circle=100.0 * side)
+    fly_on(flying(0.0, 900.0, 600.0), route, own, 1.0)
+    # 1 km from the middle the tangent touches at cos^-1(0.1) from the way there: 10 m on it and 99.5 m beside it.
+    assert (own.leg, own.from_east) == (2, pytest.approx(10.0))
+    assert own.from_north == pytest.approx(1000.0 + side * 99.4987, abs=1e-3)
+
+
+def test_a_loiter_is_left_on_the_course_to_what_follows_where_the_item_asks_for_it() -> None:
+    route = to_a_loiter(stays=0.0, leaves_on_course=True)
+    own = memory()
+    # From above the middle the next waypoint lies 95.7 degrees east of north.
+    fly_on(flying(0.0, 1100.0, 600.0, course=math.radians(83.0)), route, own, 5.0)
+    assert own.leg == 0
+    fly_on(flying(0.0, 1100.0, 600.0, course=math.radians(84.5)), route, own, 5.0)
+    assert own.leg == 2
+    # Within 1.05 radii of the middle no course leads there.
+    route["east"][3], own = 104.0, memory()
+    fly_on(flying(0.0, 900.0, 600.0, course=math.pi), route, own, 1.0)
+    assert own.leg == 2
 
 
 def test_a_return_climbs_on_the_spot_flies_straight_and_comes_down_at_its_target() -> None:

@@ -1,0 +1,76 @@
+"""Circles that PX4's law flies in JSBSim: at a waypoint too high or too low, and loiters that a mission orders."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import load_parameters
+from flight.mission.route import make_route
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import SimulatedFlight, simulate
+from logs.verdict.judge_flight import judge_flight
+from tests.mission_lines import ORIGIN, setup_of, wp
+from tests.setups import MakeSetup
+
+
+def flown(aerosonde: Aircraft, *lines: str, **values: float) -> tuple[FlightSetup, SimulatedFlight]:
+    """A mission by the law of 1.17, its route drawn for it."""
+    law = Px4(load_parameters(aerosonde, None, "1.17").changed(**values))
+    made = setup_of(*lines)
+    route = make_route(
+        made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, law.return_rules, law.loiter_rules
+    )
+    setup = replace(made, route=route, autopilot=law)
+    return setup, simulate(setup, aerosonde)
+
+
+def test_the_circle_at_the_gate_has_the_radius_of_loiters(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    # 250 m down in 1 km takes 125 s at 2 m/s, of which 85 s are circled.
+    setup = make_setup([[0, 0, 650.0], [0, 1000, 400.0], [0, 3000, 400.0]])
+    law = Px4(load_parameters(aerosonde).changed(NAV_LOITER_RAD=150.0))
+    track = simulate(replace(setup, autopilot=law), aerosonde).track
+    circles = (track.time > 65.0) & (track.position[:, 2] > 415.0)
+    assert np.ptp(track.time[circles]) > 50.0
+    away = np.hypot(track.position[circles, 0], track.position[circles, 1] - 1000.0)
+    assert np.median(away) == pytest.approx(150.0, abs=3.0)
+    assert np.ptp(away) < 8.0
+
+
+@pytest.mark.parametrize("radius", [100, 200])
+def test_a_loiter_to_a_height_is_flown_to_level_and_left_at_that_height(aerosonde: Aircraft, radius: int) -> None:
+    setup, result = flown(
+        aerosonde, wp(0, -1500, 300), wp(0, 0, 450, 31, p=f"0 {radius} 0 0"), wp(2500, 0, 450)
+    )  # fmt: skip
+    assert result.ended == "completed"
+    position, time = result.track.position, result.track.time
+    away = np.hypot(position[:, 0], position[:, 1])
+    rim = int(np.argmax(away < radius + 10.0))
+    assert np.abs(position[:rim, 2] - 600.0).max() < 3.0
+    high = int(np.argmax(position[:, 2] > 740.0))
+    # 140 m at 3 m/s, and a little late.
+    assert time[high] - time[rim] == pytest.approx(140.0 / 3.0 + 3.5, abs=3.0)
+    # Then straight to the line from the middle.
+    assert away[high:].max() == pytest.approx(2500.0, abs=15.0)
+    late = (time > time[high] + 20.0) & (position[:, 0] > 700.0)
+    assert np.abs(position[late, 1]).max() < 15.0
+    # The drawn leg to the circle is level.
+    assert setup.route.waypoints[:2, 2] == pytest.approx([600.0, 600.0])
+
+
+@pytest.mark.parametrize(("radius", "flyable"), [(100, False), (150, True)])
+def test_a_loiter_for_a_time_ends(aerosonde: Aircraft, radius: int, flyable: bool) -> None:
+    setup, result = flown(
+        aerosonde, wp(0, -1500, 300), wp(0, 0, 300, 19, p=f"60 0 {radius} 0"), wp(1500, 1500, 300)
+    )  # fmt: skip
+    assert result.ended == "completed"
+    track = result.track
+    # 1,340 to 1,390 m to the rim, 60 s, 2,121 m on from the middle; and from wherever that finds it, around to there.
+    least = (1340.0 + 2121.0 - radius) / 25.7 + 60.0
+    assert least < track.time[-1] < least + 35.0
+    verdict = judge_flight(setup, track, result.ended)
+    assert verdict.flyable is flyable
+    # The bank of 30 degrees flies 119 m at the least.
+    assert {item.rule for item in verdict.failed} == (set() if flyable else {"loiter"})
