@@ -388,7 +388,8 @@ PX4_PARAMETERS: Mapping[str, float] = {
 def px4_topics(log: MotionLog) -> dict[str, tuple[Floats, dict[str, Floats]]]:
     """The topics of a motion as PX4 would have logged it: stamps (s), and fields.
 
-    Surfaces are shares of 30 degrees, up and right positive: two ailerons, elevator, rudder.
+    Surfaces are shares of 30 degrees, up and right positive: two ailerons, elevator, rudder.  A motor told to give less
+    than 2 % of its thrust is stopped, for which PX4 has no number.
     """
     roll, pitch, yaw = 0.5 * log.attitude.values.T
     cr, sr, cp, sp, cy, sy = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
@@ -401,7 +402,8 @@ def px4_topics(log: MotionLog) -> dict[str, tuple[Floats, dict[str, Floats]]]:
     unused = np.full((len(one), 8), np.nan)
     servos, motors = unused.copy(), unused.copy()
     servos[:, :4] = np.column_stack([-aileron, aileron, elevator - 0.05, rudder])
-    motors[:, 0] = (three - 1000.0) / 1000.0
+    throttle = (three - 1000.0) / 1000.0
+    motors[:, 0] = np.where(throttle < 0.02, np.nan, throttle)
     height, status = log.height, log.attitude.time[::25]
     place = np.column_stack([np.full(len(height.time), HOME[0]), np.full(len(height.time), HOME[1]), height.values])
     ratio = np.interp(log.airspeed.time, log.ratio.time, log.ratio.values[:, 0])[:, np.newaxis]
@@ -424,7 +426,7 @@ def px4_topics(log: MotionLog) -> dict[str, tuple[Floats, dict[str, Floats]]]:
             "voltage_v": log.battery.values[:, 0], "current_a": log.battery.values[:, 1]}),
         "vehicle_status": (status, {
             "vehicle_type": np.full(len(status), 2.0), "nav_state": np.full(len(status), 3.0),
-            "in_transition_mode": np.zeros(len(status))}),
+            "in_transition_mode": np.zeros(len(status)), "arming_state": np.full(len(status), 2.0)}),
         "home_position": (status[:1], {
             name: np.full(1, value) for name, value in zip(("lat", "lon", "alt"), HOME, strict=True)}),
     }  # fmt: skip
@@ -432,9 +434,15 @@ def px4_topics(log: MotionLog) -> dict[str, tuple[Floats, dict[str, Floats]]]:
 
 
 def write_px4(
-    path: Path, topics: Mapping[str, tuple[Floats, Mapping[str, Floats]]], parameters: Mapping[str, float]
+    path: Path,
+    topics: Mapping[str, tuple[Floats, Mapping[str, Floats]]],
+    parameters: Mapping[str, float],
+    changes: Mapping[str, float] = {},
 ) -> Path:
-    """Write topics as a `.ulg` (PX4, "ULog File Format"), all numbers as doubles."""
+    """Write topics as a `.ulg` (PX4, "ULog File Format"), all numbers as doubles.
+
+    topics: by name; "battery_status 1" is its second instance.  changes: of parameters, in flight.
+    """
 
     def message(letter: bytes, body: bytes) -> bytes:
         return struct.pack("<H", len(body)) + letter + body
@@ -446,21 +454,28 @@ def write_px4(
         kinds = "".join(
             f"double{f'[{table.shape[1]}]' if table.shape[1] > 1 else ''} {key};" for key, table in tables.items()
         )
-        head += message(b"F", f"{name}:uint64_t timestamp;{kinds}".encode())
+        if name == name.split()[0]:
+            head += message(b"F", f"{name}:uint64_t timestamp;{kinds}".encode())
         rows = np.hstack(list(tables.values())).astype("<f8")
         for when, row in zip(np.rint(time * 1e6).astype(np.int64).tolist(), rows, strict=True):
             stamps.append(when)
             pieces.append(message(b"D", struct.pack("<HQ", number, when) + row.tobytes()))
     key = b"char[3] sys_name"
     head += message(b"I", bytes([len(key)]) + key + b"PX4")
-    for name, value in parameters.items():
+
+    def stated(name: str, value: float) -> bytes:
         whole = isinstance(value, int)
         text = f"{'int32_t' if whole else 'float'} {name}".encode()
-        head += message(b"P", bytes([len(text)]) + text + struct.pack("<i" if whole else "<f", value))
+        return message(b"P", bytes([len(text)]) + text + struct.pack("<i" if whole else "<f", value))
+
+    for name, value in parameters.items():
+        head += stated(name, value)
     for number, name in enumerate(topics):
-        head += message(b"A", struct.pack("<BH", 0, number) + name.encode())
+        topic, *instance = name.split()
+        head += message(b"A", struct.pack("<BH", int(instance[0]) if instance else 0, number) + topic.encode())
     order = np.argsort(np.array(stamps), kind="stable").tolist()
-    path.write_bytes(bytes(head) + b"".join(pieces[k] for k in order))
+    later = b"".join(stated(name, value) for name, value in changes.items())
+    path.write_bytes(bytes(head) + b"".join(pieces[k] for k in order) + later)
     return path
 
 

@@ -154,15 +154,25 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())[:120] or type(error).__name__
 
 
+def _table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
+    """The first choice of fields that one instance of a topic has."""
+    for columns in choices:
+        if data and all(column in data for column in columns):
+            values = np.stack([np.asarray(data[column], dtype=np.float64) for column in columns], axis=1)
+            return LogSeries(topic, np.asarray(data["timestamp"], dtype=np.float64) * 1e-6, values)
+    return None
+
+
 class Topics:
-    """The topics of one log, the first instance of each."""
+    """The topics of one log: the first instance of each, but for batteries, which are added up."""
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
         self._log, self._source, self._damage = log, source, damage
-        self._data: dict[str, dict[str, Any]] = {}
-        for one in sorted(log.data_list, key=lambda data: -int(data.multi_id)):
+        self._instances: dict[str, list[dict[str, Any]]] = {}
+        for one in sorted(log.data_list, key=lambda data: int(data.multi_id)):
             if "timestamp" in one.data and len(one.data["timestamp"]):
-                self._data[one.name] = one.data
+                self._instances.setdefault(one.name, []).append(one.data)
+        self._data = {name: instances[0] for name, instances in self._instances.items()}
 
     def log(self) -> RawLog:
         """All that a verdict needs.  Raises LogError for a log that does not say where it flew."""
@@ -192,12 +202,7 @@ class Topics:
 
     def table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
         """The first choice of fields that a topic has."""
-        data = self._data.get(topic, {})
-        for columns in choices:
-            if data and all(column in data for column in columns):
-                values = np.stack([np.asarray(data[column], dtype=np.float64) for column in columns], axis=1)
-                return LogSeries(topic, np.asarray(data["timestamp"], dtype=np.float64) * 1e-6, values)
-        return None
+        return _table(topic, self._data.get(topic, {}), choices)
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
         place = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
@@ -250,13 +255,36 @@ class Topics:
                     return LogSeries(topic, found.time[good], found.values[good])
         return None
 
+    def battery(self) -> LogSeries | None:
+        """Voltage, V, the mean of all connected batteries, and their currents together, A; (n, 2).
+
+        None of a log without, and of one in which a connected battery's current was not measured.  What is measured of
+        another kind than the first battery (`source`), as by the motors' controllers, is the same current again.
+        """
+        chosen = []
+        for data in self._instances.get("battery_status", []):
+            found = _table("battery_status", data, (("voltage_v", "current_a"),))
+            if found is None or ("connected" in data and not np.any(data["connected"])):
+                continue
+            kind = float(data["source"][0]) if "source" in data else 0.0
+            good = np.isfinite(found.time) & np.isfinite(found.values).all(axis=1)
+            chosen.append((kind, LogSeries(found.source, found.time[good], found.values[good])))
+        batteries = [series for kind, series in chosen if kind == chosen[0][0]]
+        if not batteries or not all((one.values[:, 1] > 0.0).any() for one in batteries):
+            return None
+        first = batteries[0]
+        volts, amps = (
+            np.array([np.interp(first.time, one.time, one.values[:, k]) for one in batteries]) for k in range(2)
+        )
+        return LogSeries(first.source, first.time, np.stack([volts.mean(axis=0), amps.sum(axis=0)], axis=1))
+
     def _battery(self) -> LogSeries | None:
-        found = self.table("battery_status", ("current_a", "voltage_v"))
-        if found is None or not (found.values[:, 0] > 0.0).any():
+        found = self.battery()
+        if found is None:
             return None
         step = np.clip(np.diff(found.time, prepend=found.time[0]), 0.0, 10.0)
-        current = np.maximum(found.values[:, 0], 0.0)
-        energy = np.cumsum(current * found.values[:, 1] * step) / 3600.0
+        current = np.maximum(found.values[:, 1], 0.0)
+        energy = np.cumsum(current * found.values[:, 0] * step) / 3600.0
         return LogSeries(found.source, found.time, np.stack([current, energy], axis=1))
 
     def _heights(self) -> Iterable[HeightSource]:
@@ -346,10 +374,12 @@ class Topics:
         return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
 
     def parameters(self) -> dict[str, float]:
-        """As they were when the log began, by name."""
-        known = self._log.initial_parameters.items()
+        """By name; those that changed in flight keep the last, and those that are no numbers are left out."""
+        known = dict(self._log.initial_parameters)
+        known |= {name: value for _, name, value in self._log.changed_parameters}
         # A damaged one may be a text.
-        return {str(name): float(value) for name, value in known if isinstance(value, int | float)}
+        numbers = {str(name): float(value) for name, value in known.items() if isinstance(value, int | float)}
+        return {name: value for name, value in numbers.items() if math.isfinite(value)}
 
     def program(self) -> str:
         """Name and release of what flew."""

@@ -15,11 +15,12 @@ from logs.importers.px4_log import Topics, open_topics
 from world.errors import LogError
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _TOPICS = [
     "sensor_combined", "vehicle_angular_velocity", "vehicle_acceleration", "vehicle_attitude", "vehicle_local_position",
     "vehicle_global_position", "airspeed_validated", "wind", "wind_estimate", "actuator_servos", "actuator_motors",
-    "actuator_controls_0", "battery_status", "vehicle_status", "home_position",
+    "actuator_controls_0", "battery_status", "vehicle_status", "home_position", "flaps_setpoint", "spoilers_setpoint",
 ]  # fmt: skip
 NONE = Samples(np.zeros(0), np.zeros((0, 1)))
 # CA_AIRFRAME: a fixed wing, and one with lifting motors beside it, whose first rotors they are.
@@ -33,11 +34,15 @@ _MODELLED = frozenset({1, 2, 3, 4, 5, 6, 15})
 _ELEVONS = frozenset({5, 6})
 _MIXED = {7: "a V-tail", 8: "a V-tail", 12: "a custom surface", 13: "an A-tail", 14: "an A-tail"}
 _FLAPS = {9: "flap", 10: "flap", 11: "airbrake", 17: "spoiler", 18: "spoiler"}
+# CA_SV_CSn_...: what else moves a surface, and the topic that says by how much.
+_ALSO_MOVE = {"FLAP": ("flaps", "flaps_setpoint"), "SPOIL": ("spoilers", "spoilers_setpoint")}
 _AXES = ("P", "R", "Y")
 # A flap moves that leaves its place by more, of its travel of 2.
 _MOVES = 0.05
-# vehicle_status.vehicle_type of a fixed wing.
-_FIXED_WING = 2
+# vehicle_status: vehicle_type of a fixed wing, and arming_state of a vehicle that is armed.
+_FIXED_WING, _ARMED = 2, 2
+# The most that the topics hold.
+_SERVOS, _MOTORS = 8, 12
 # ArduPlane's parameters by PX4's, with what they are multiplied with.
 _PARAMETERS: Mapping[str, tuple[str, float]] = {
     "FW_AIRSPD_MIN": ("AIRSPEED_MIN", 1.0), "FW_AIRSPD_TRIM": ("AIRSPEED_CRUISE", 1.0),
@@ -61,7 +66,7 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
         attitude = topics.attitude()
         controls, elevons = _controls(topics, parameters)
         airspeed, ratio = _airspeed(topics)
-        home = topics.home()
+        home, battery = topics.home(), topics.battery()
         height = NONE if not len(place.time) else Samples(place.time, place.values[:, 2:])
         return MotionLog(
             source=str(path),
@@ -76,7 +81,7 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
             airspeed=airspeed,
             ratio=ratio,
             height=height,
-            battery=_samples(topics, "battery_status", ("voltage_v", "current_a")),
+            battery=NONE if battery is None else rising(battery.time, battery.values),
             parameters={
                 name: parameters[own] * factor for own, (name, factor) in _PARAMETERS.items() if own in parameters
             },
@@ -119,13 +124,15 @@ def _wind(topics: Topics) -> Samples:
 
 def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
     """Calibrated airspeed where a sensor measured it, and true by calibrated."""
-    columns = ("calibrated_airspeed_m_s", "true_airspeed_m_s")
-    found = topics.table("airspeed_validated", columns)
+    true = "true_airspeed_m_s"
+    # Calibrated since 1.12, equivalent until then: at these speeds the same.
+    choices = [(speed, true) for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
+    found = topics.table("airspeed_validated", *choices)
     if found is None:
         return NONE, NONE
     # From 1 on sensors; 0 and below, and 4 (synthetic), are no measurements.
     for name in ("airspeed_source", "selected_airspeed_index"):
-        chosen = topics.table("airspeed_validated", (*columns, name))
+        chosen = topics.table("airspeed_validated", *((*columns, name) for columns in choices))
         if chosen is not None:
             number = chosen.values[:, 2]
             measured = (number >= 1.0) & (number <= 3.0)
@@ -158,9 +165,10 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     A surface's positive is up, or right; its torque scales (CA_SV_CSn_TRQ_*) say which axes it moves, and an axis is
     the mean of its surfaces by these.  Raises LogError for surfaces that no model of is estimated.
     """
-    servos, motors = (
-        _actuators(topics, name, size) for name, size in (("actuator_servos", 8), ("actuator_motors", 12))
-    )
+    servos, motors = _actuators(topics, "actuator_servos", _SERVOS), _actuators(topics, "actuator_motors", _MOTORS)
+    # What is not used has no number.
+    known = np.isfinite(servos.values).any(axis=1) & _armed(topics, servos.time)
+    servos = Samples(servos.time[known], servos.values[known])
     if len(servos.time) < 2 or len(motors.time) < 2:
         # Roll, pitch, yaw and throttle as they were before the mixer.
         old = _samples(topics, "actuator_controls_0", tuple(f"control[{k}]" for k in range(4)))
@@ -168,13 +176,14 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     airframe = int(parameters.get("CA_AIRFRAME", _WING))
     if airframe not in (_WING, _STANDARD_VTOL):
         raise _refusal(topics, "CA_AIRFRAME", airframe, f"{_AIRFRAMES.get(airframe, 'unknown')}: a plane is expected")
-    scales = np.zeros((3, 8))
+    scales = np.zeros((3, _SERVOS))
     elevons = False
-    for k in range(int(np.clip(parameters.get("CA_SV_CS_COUNT", 0.0), 0.0, 8.0))):
+    for k in range(int(np.clip(parameters.get("CA_SV_CS_COUNT", 0.0), 0.0, _SERVOS))):
         kind = int(parameters.get(f"CA_SV_CS{k}_TYPE", 0.0))
         used = servos.values[np.isfinite(servos.values[:, k]), k]
         moves = len(used) > 0 and float(np.ptp(used)) > _MOVES
         if kind in _MODELLED:
+            _refuse_flaperon(topics, parameters, k)
             scales[:, k] = [parameters.get(f"CA_SV_CS{k}_TRQ_{axis}", 0.0) for axis in _AXES]
             elevons = elevons or kind in _ELEVONS
             servos.values[:, k] -= parameters.get(f"CA_SV_CS{k}_TRIM", 0.0)
@@ -189,24 +198,55 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
             raise LogError(f"{topics.source}: no surface is the {axis}'s: {allowed}", file=topics.source)
     sums = np.abs(scales).sum(axis=1, keepdims=True)
     shares = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
-    first = int(parameters.get("CA_ROTOR_COUNT", 0.0)) if airframe == _STANDARD_VTOL else 0
-    pushing = motors.values[:, first:]
-    running = np.isfinite(pushing)
-    throttle = np.where(running, pushing, 0.0).sum(axis=1) / np.maximum(1, running.sum(axis=1))
+    # A motor below 2 % of its thrust is stopped, and stopped is no number (PX4's control allocator).
+    pushing = np.nan_to_num(motors.values[:, _pushers(topics, airframe, parameters, motors)])
+    throttle = np.clip(pushing.mean(axis=1), 0.0, 1.0) if pushing.size else np.zeros(len(motors.time))
     rows = np.clip(np.searchsorted(motors.time, servos.time, side="right") - 1, 0, len(motors.time) - 1)
-    return Samples(servos.time, np.column_stack([shares, np.clip(throttle[rows], 0.0, 1.0)])), elevons
+    return Samples(servos.time, np.column_stack([shares, throttle[rows]])), elevons
+
+
+def _pushers(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
+    """Which motors push ahead.  Raises LogError for a VTOL none of whose rotors does."""
+    count = int(np.clip(parameters.get("CA_ROTOR_COUNT", 0.0), 0.0, _MOTORS))
+    if airframe == _STANDARD_VTOL:
+        # Of a rotor that no parameter turns the axis is up.
+        axes = [[abs(parameters.get(f"CA_ROTOR{k}_A{axis}", up)) for axis, up in (("X", 0.0), ("Z", 1.0))]
+                for k in range(count)]  # fmt: skip
+        ahead = [k for k, (x, z) in enumerate(axes) if x > z]
+        if not ahead:
+            allowed = "one with |CA_ROTORn_AX| over |CA_ROTORn_AZ| is expected"
+            raise _refusal(topics, "CA_ROTOR_COUNT", count, f"of rotors none of which pushes ahead: {allowed}")
+        return ahead
+    return list(range(count)) or np.flatnonzero(np.isfinite(motors.values).any(axis=0)).tolist()
+
+
+def _refuse_flaperon(topics: Topics, parameters: Mapping[str, float], surface: int) -> None:
+    """Refuse a surface that flaps or spoilers move as well, where they move.  Raises LogError."""
+    for name, (title, topic) in _ALSO_MOVE.items():
+        share = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
+        told = _samples(topics, topic, ("normalized_setpoint",)).values
+        if len(told) and abs(share) * float(np.ptp(told)) > _MOVES:
+            message = f"of a surface that {title} move in flight, and no model of it is estimated"
+            raise _refusal(topics, f"CA_SV_CS{surface}_{name}", share, message)
 
 
 def _actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """(n, size) of one topic; what is not used has no number."""
+    """(n, size) of one topic, in the order of its times; what is not used, or stopped, has no number."""
     found = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
     if found is None:
-        return NONE
-    # Rows without any number are those of a vehicle that is not armed.
-    kept = np.isfinite(found.values).any(axis=1)
-    steps = rising(found.time[kept], np.flatnonzero(kept)[:, np.newaxis].astype(np.float64))
+        return Samples(np.zeros(0), np.zeros((0, size)))
+    steps = rising(found.time, np.arange(len(found.time), dtype=np.float64)[:, np.newaxis])
     return Samples(steps.time, found.values[steps.values[:, 0].astype(np.intp)])
 
 
-def _refusal(topics: Topics, field: str, value: int, message: str) -> LogError:
-    return LogError(f"{topics.source}: {field} {value} is {message}", file=topics.source, field=field, value=value)
+def _armed(topics: Topics, time: Floats) -> Flags:
+    """Whether the vehicle was armed, (n,); of a log that does not say it was."""
+    states = _samples(topics, "vehicle_status", ("arming_state",))
+    if not len(states.time):
+        return np.ones(len(time), np.bool_)
+    rows = np.clip(np.searchsorted(states.time, time, side="right") - 1, 0, None)
+    return np.asarray(states.values[rows, 0] == _ARMED)
+
+
+def _refusal(topics: Topics, field: str, value: float, message: str) -> LogError:
+    return LogError(f"{topics.source}: {field} {value:g} is {message}", file=topics.source, field=field, value=value)

@@ -18,7 +18,15 @@ from planfly.identification.base_numbers import base_model, scaled
 from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
-from planfly.identification.records import LEAST_HZ, LEFT, flight_records, log_outputs
+from planfly.identification.records import (
+    LEAST_HZ,
+    LEFT,
+    PLENTY_HZ,
+    flight_records,
+    log_outputs,
+    recording_setting,
+    slowest_rows,
+)
 from planfly.identification.replay import QUANTITIES, UNITS, Replay, replay_log
 from planfly.identification.servos import ServoOutput, read_servos
 from planfly.stages import stage
@@ -35,6 +43,18 @@ _RANGES = {"mass": (0.3, 50.0, "kg"), "span": (0.4, 10.0, "m"), "area": (0.03, 1
 
 
 @dataclass(frozen=True, slots=True)
+class SlowLog:
+    """A log with few rows of inertial sensors or outputs.
+
+    source: the file.  hertz: rows a second.  setting: the autopilot's parameter with the value that records more.
+    """
+
+    source: str
+    hertz: float
+    setting: str
+
+
+@dataclass(frozen=True, slots=True)
 class IdentifiedAircraft:
     """What `planfly.identify_aircraft` returns.
 
@@ -44,6 +64,7 @@ class IdentifiedAircraft:
     power: of level flight at cruise, W, likewise.
     replays: of the check log, by the base and by the identified model; none without one.
     without_current: logs without the battery's current where others have it: it is used of none then.
+    slow: logs with few rows a second.
     """
 
     aircraft: Aircraft
@@ -53,6 +74,7 @@ class IdentifiedAircraft:
     power: tuple[float, float, float]
     replays: tuple[Replay, ...] = ()
     without_current: tuple[str, ...] = ()
+    slow: tuple[SlowLog, ...] = ()
 
 
 @with_warm_up()
@@ -103,7 +125,7 @@ def identify_aircraft(
     records = [record for _, stretches, _ in read for record in stretches]
     log, _, outputs = read[-1]
     with stage("estimating"):
-        fast = all(min(one.inertial.rate, one.moved.rate) >= LEAST_HZ for one, _, _ in read)
+        fast = all(slowest_rows(one) >= LEAST_HZ for one, _, _ in read)
         estimate = estimate_model(records, numbers, dynamics=fast)
         check_estimate(estimate, numbers, _own_outputs(log, prior), log.source)
         found = make_identified(prior, numbers, estimate, [one for one, _, _ in read], outputs)
@@ -112,7 +134,11 @@ def identify_aircraft(
     with stage("drawing"):
         files["identify.html"] = _page(found, replays, None if check is None else Path(check).name, target.name)
     write_folder(target, {name: text.encode() for name, text in files.items()})
-    return _answer(read_aircraft(target), found, replays, without_current(records))
+    climb, sink, power = _intervals(found)
+    return IdentifiedAircraft(
+        read_aircraft(target), estimate, climb, sink, power, replays, without_current(records),
+        slow_logs([one for one, _, _ in read]),
+    )  # fmt: skip
 
 
 def _base(base: str | Path) -> Aircraft:
@@ -234,8 +260,7 @@ def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
     return tuple(lacking) if any(record.has_current for record in records) else ()
 
 
-def _answer(
-    aircraft: Aircraft, found: Identified, replays: tuple[Replay, ...], lacking: tuple[str, ...]
-) -> IdentifiedAircraft:
-    climb, sink, power = _intervals(found)
-    return IdentifiedAircraft(aircraft, found.estimate, climb, sink, power, replays, lacking)
+def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
+    """Those with few rows a second."""
+    rates = [(log, slowest_rows(log)) for log in logs]
+    return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < PLENTY_HZ)

@@ -183,12 +183,7 @@ def _identify(args: argparse.Namespace) -> int:
         ("climb", "deg", found.climb), ("sink", "deg", found.sink), ("power", "W", found.power),
     ):  # fmt: skip
         print(f"  {name:<8} {value:.{0 if unit == 'W' else 1}f} {unit} at cruise, {low:.1f} to {high:.1f} (95 %)")
-    if not estimate.dynamics:
-        print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
-    for line in estimate.silent():
-        print(f"  not seen {line}")
-    for log in found.without_current:
-        print(f"  current  not used, as {log} has none (BAT): identify from the other logs alone to use theirs")
+    _print_unknown(found)
     if "identify.waypoints" not in files_made:
         print("  no mission identify.waypoints: the logs have neither home (ORGN) nor a position on the ground (POS)")
     for replay in found.replays:
@@ -197,6 +192,18 @@ def _identify(args: argparse.Namespace) -> int:
     give_answer(args, lambda: _answer([made]))
     print(f"next      planfly aircraft {shlex.quote(args.out)}; {args.out}/identify.html says how sure each number is")
     return FLYABLE
+
+
+def _print_unknown(found: "planfly.IdentifiedAircraft") -> None:
+    """What the logs do not tell, and what would."""
+    if not found.estimate.dynamics:
+        print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
+    for log in found.slow:
+        print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs: {log.setting} records more")
+    for line in found.estimate.silent():
+        print(f"  not seen {line}")
+    for lacking in found.without_current:
+        print(f"  current  not used, as {lacking} has none (BAT): identify from the other logs alone to use theirs")
 
 
 def _print_sheet(made: "Aircraft") -> None:

@@ -15,8 +15,9 @@ from world.errors import LogError
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Rows a second that inertial sensors and outputs need for an estimate of the moments.
-LEAST_HZ = 10.0
+# Rows a second that inertial sensors and outputs need for an estimate of the moments: 10 Hz are a little more or less
+# in a log.  With fewer than `PLENTY_HZ` the setting that records more is named.
+LEAST_HZ, PLENTY_HZ = 9.5, 20.0
 # Flight that a log must have after what cannot be used is cut, s; and a stretch, s.
 LEAST_SECONDS, LEAST_STRETCH = 180.0, 30.0
 # A pause between rows that parts two stretches, s; of airspeed and wind, which come more slowly: PX4's wind once a
@@ -69,6 +70,9 @@ def flight_records(
         controls = _shares_as_angles(_held(log.controls, grid), aircraft)
     else:
         controls = _controls(servos or log_outputs(log, aircraft), pulses)
+    # A surface is told to move beyond its stop, and stays there.
+    stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
+    controls = np.clip(controls, -stops, stops)
     ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
     height = _at(log.height, grid)[:, 0]
     velocity, wind = _at(log.velocity, grid), _at(log.wind, grid)
@@ -163,12 +167,22 @@ def _refuse(log: MotionLog) -> None:
                 raise LogError(f"{log.source}: {message}, and no model of it is estimated", file=log.source)
 
 
+def slowest_rows(log: MotionLog) -> float:
+    """Rows a second of inertial sensors or of what was told to the surfaces, whichever are fewer."""
+    return min(log.inertial.rate, log.moved.rate)
+
+
+def recording_setting(log: MotionLog) -> str:
+    """The parameter with its value that records both at a high rate."""
+    return f"SDLOG_PROFILE {_PROFILE}" if log.program_kind == "px4" else f"LOG_BITMASK {_BITMASK}"
+
+
 def _recording(log: MotionLog) -> str:
     """What would record it."""
     if log.program_kind == "px4":
-        return f"SDLOG_PROFILE {_PROFILE}, the default set at a high rate, records them (PX4 1.14 or later)"
+        return f"{recording_setting(log)}, the default set at a high rate, records them (PX4 1.14 or later)"
     mask = log.parameters.get("LOG_BITMASK")
-    return f"LOG_BITMASK {_BITMASK} records them{'' if mask is None else f' (it is {mask:.0f})'}"
+    return f"{recording_setting(log)} records them{'' if mask is None else f' (it is {mask:.0f})'}"
 
 
 def _range(log: MotionLog, number: int) -> tuple[float, float]:

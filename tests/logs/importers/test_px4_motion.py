@@ -49,7 +49,140 @@ def test_surfaces_are_mixed_by_the_airframes_torques(tmp_path: Path) -> None:
     assert shares[:, 1] == pytest.approx((pulses[:, 0] - 1500.0) / 400.0)
     assert shares[:, 0] == pytest.approx((pulses[:, 1] - 1500.0) / 400.0 + 8.4 / 30.0, abs=1e-6)
     assert shares[:, 2] == pytest.approx((pulses[:, 3] - 1500.0) / 400.0)
-    assert shares[:, 3] == pytest.approx((pulses[:, 2] - 1000.0) / 1000.0)
+    throttle = (pulses[:, 2] - 1000.0) / 1000.0
+    assert shares[:, 3] == pytest.approx(np.where(throttle < 0.02, 0.0, throttle))
+
+
+def changed(
+    tmp_path: Path,
+    topics: Mapping[str, tuple[np.ndarray, dict[str, np.ndarray]]],
+    parameters: Mapping[str, float] = {},
+    changes: Mapping[str, float] = {},
+) -> MotionLog:
+    return read_motion(write_px4(tmp_path / "a.ulg", topics, {**PX4_PARAMETERS, **parameters}, changes))
+
+
+def with_motors(*columns: tuple[int, float]) -> dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]:
+    """Topics in which these motors run at these shares, and no other has a number."""
+    topics = px4_topics(short_motion())
+    motors = topics["actuator_motors"][1]["control"]
+    motors[:] = np.nan
+    for number, share in columns:
+        motors[:, number] = share
+    return topics
+
+
+def test_a_stopped_motor_has_no_throttle(tmp_path: Path) -> None:
+    """PX4 has no number for a motor that it stops: an idle glide is not flown with the throttle before it."""
+    topics = with_motors((0, 0.6))
+    motors = topics["actuator_motors"][1]["control"]
+    half = len(motors) // 2
+    motors[half:] = np.nan
+    throttle = changed(tmp_path, topics).controls.values[:, 3]
+    assert throttle[:half] == pytest.approx(np.full(half, 0.6))
+    assert throttle[half:] == pytest.approx(np.zeros(len(motors) - half))
+    # One of two stopped: half of both.
+    topics = with_motors((0, 0.6))
+    assert changed(tmp_path, topics, {"CA_ROTOR_COUNT": 2}).controls.values[:, 3] == pytest.approx(0.3)
+
+
+def test_what_is_told_to_surfaces_before_arming_is_not_used(tmp_path: Path) -> None:
+    topics = px4_topics(short_motion())
+    times, fields = topics["vehicle_status"]
+    fields["arming_state"][:2] = 1.0
+    read = changed(tmp_path, topics)
+    assert read.controls.time[0] == pytest.approx(times[2])
+    assert len(read.controls.time) == len(short_motion().outputs.time) - 50
+
+
+def test_a_vtols_throttle_is_that_of_the_rotors_that_push(tmp_path: Path) -> None:
+    """PX4's example: four rotors up, and a fifth ahead; all count."""
+    vtol = {"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": 5, "CA_ROTOR4_AX": 1.0, "CA_ROTOR4_AZ": 0.0}
+    topics = with_motors((0, 0.2), (1, 0.2), (2, 0.2), (3, 0.2), (4, 0.7))
+    assert changed(tmp_path, topics, vtol).controls.values[:, 3] == pytest.approx(0.7)
+    with pytest.raises(LogError, match="CA_ROTOR_COUNT 5 is of rotors none of which pushes ahead") as refused:
+        changed(tmp_path, topics, vtol | {"CA_ROTOR4_AX": 0.0, "CA_ROTOR4_AZ": -1.0})
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "topic", "title"), [("FLAP", "flaps_setpoint", "flaps"), ("SPOIL", "spoilers_setpoint", "spoilers")]
+)
+def test_ailerons_that_flaps_move_as_well_are_refused_where_they_do(
+    tmp_path: Path, name: str, topic: str, title: str
+) -> None:
+    topics = px4_topics(short_motion())
+    time = topics["vehicle_status"][0]
+    topics[topic] = (time, {"normalized_setpoint": np.linspace(0.0, 1.0, len(time))})
+    with pytest.raises(LogError) as refused:
+        changed(tmp_path, topics, {f"CA_SV_CS1_{name}": 0.5})
+    said = f"CA_SV_CS1_{name} 0.5 is of a surface that {title} move in flight, and no model of it is estimated"
+    assert str(refused.value).endswith(said)
+    # Neither where they stay in, nor where nothing of them reaches a surface.
+    changed(tmp_path, topics, {f"CA_SV_CS1_{name}": 0.0})
+    topics[topic][1]["normalized_setpoint"][:] = 0.3
+    changed(tmp_path, topics, {f"CA_SV_CS1_{name}": 0.5})
+
+
+def test_airspeed_of_releases_before_1_12_is_read(tmp_path: Path) -> None:
+    topics = px4_topics(short_motion())
+    fields = topics["airspeed_validated"][1]
+    fields["equivalent_airspeed_m_s"] = fields.pop("calibrated_airspeed_m_s")
+    read, written = changed(tmp_path, topics), short_motion().airspeed
+    assert read.airspeed.time == pytest.approx(written.time)
+    assert read.airspeed.values == pytest.approx(written.values)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+@pytest.mark.parametrize("name", ["CA_SV_CS0_TYPE", "CA_AIRFRAME", "CA_ROTOR_COUNT", "CA_SV_CS2_TRIM"])
+def test_parameters_that_are_no_numbers_are_not_there(tmp_path: Path, name: str, value: float) -> None:
+    read = changed(tmp_path, px4_topics(short_motion()), {name: value})
+    assert np.isfinite(read.controls.values).all()
+
+
+def test_a_count_of_surfaces_that_is_no_number_is_none(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="no surface is the elevator's"):
+        changed(tmp_path, px4_topics(short_motion()), {"CA_SV_CS_COUNT": float("nan")})
+
+
+def test_parameters_that_change_in_flight_keep_the_last(tmp_path: Path) -> None:
+    read = changed(tmp_path, px4_topics(short_motion()), changes={"FW_AIRSPD_MIN": 16.0, "FW_AIRSPD_MAX": float("nan")})
+    assert read.parameters["AIRSPEED_MIN"] == 16.0
+    assert "AIRSPEED_MAX" not in read.parameters
+
+
+def with_second_battery(**fields: float) -> dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]:
+    """The first battery at 22 V and 10 A; the second at 21 V and 4 A, twice as often, and what is said of both."""
+    topics = px4_topics(short_motion())
+    time = topics["battery_status"][0]
+    for name, when, volts, amps in (("", time, 22.0, 10.0), (" 1", np.linspace(time[0], time[-1], 79), 21.0, 4.0)):
+        one = np.ones(len(when))
+        table = {"voltage_v": volts * one, "current_a": amps * one, "connected": one, "source": 0.0 * one}
+        topics["battery_status" + name] = (
+            when, table | ({key: value * one for key, value in fields.items()} if name else {})
+        )  # fmt: skip
+    return topics
+
+
+@pytest.mark.parametrize(
+    ("second", "volts", "amps"),
+    [
+        ({}, 21.5, 14.0),
+        ({"connected": 0.0}, 22.0, 10.0),
+        # Of the motors' controllers: the same current, measured again.
+        ({"source": 2.0}, 22.0, 10.0),
+    ],
+)
+def test_currents_of_several_batteries_are_added(
+    tmp_path: Path, second: dict[str, float], volts: float, amps: float
+) -> None:
+    battery = changed(tmp_path, with_second_battery(**second)).battery
+    assert len(battery.time) == len(short_motion().battery.time)
+    assert battery.values == pytest.approx(np.tile([volts, amps], (len(battery.time), 1)))
+
+
+def test_a_battery_whose_current_is_not_measured_leaves_the_current_unknown(tmp_path: Path) -> None:
+    assert len(changed(tmp_path, with_second_battery(current_a=-1.0)).battery.time) == 0
 
 
 def test_elevons_are_half_their_sum_and_difference(tmp_path: Path) -> None:
@@ -102,6 +235,7 @@ def test_controls_of_releases_before_1_14_are_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("parameters", "said"),
     [
+        ({"CA_AIRFRAME": 2, "CA_ROTOR_COUNT": -1}, "CA_ROTOR_COUNT 0 is of rotors none of which pushes ahead"),
         ({"CA_SV_CS2_TYPE": 7}, "CA_SV_CS2_TYPE 7 is a V-tail: its mix is not modelled"),
         ({"CA_SV_CS3_TYPE": 10}, "CA_SV_CS3_TYPE 10 is flap moves in flight"),
         ({"CA_AIRFRAME": 3}, "CA_AIRFRAME 3 is a tiltrotor: a plane is expected"),

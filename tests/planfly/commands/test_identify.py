@@ -12,8 +12,10 @@ from aircraft.catalog import load_aircraft, read_aircraft
 from aircraft.identification.flight_record import FlightRecord
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.dynamics.fdm import Fdm
-from planfly.api.identifying import without_current
+from logs.importers.motion_log import Samples
+from planfly.api.identifying import slow_logs, without_current
 from planfly.cli import main
+from planfly.identification.records import LEAST_HZ, slowest_rows
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 from tests.instrumented_flights import short_motion, write_motion
 
@@ -138,3 +140,21 @@ def test_logs_without_current_among_others_are_named() -> None:
     known, unknown = record("a.BIN", 3.0), record("b.BIN", np.nan)
     assert without_current([known, unknown, unknown]) == ("b.BIN",)
     assert without_current([known, known]) == without_current([unknown, unknown]) == ()
+
+
+def test_logs_with_few_rows_are_named_with_what_records_more() -> None:
+    """PX4's default set has what is told to the surfaces ten times a second, more or less: still enough for moments."""
+    log = short_motion()
+    time = np.arange(0.0, 4.0, 0.1003)
+    few = Samples(time, np.zeros((len(time), 4)))
+    px4 = replace(log, source="b.ulg", program_kind="px4", controls=few)
+    assert slow_logs([log]) == ()
+    (slow,) = slow_logs([log, px4])
+    assert (slow.source, slow.setting) == ("b.ulg", "SDLOG_PROFILE 17")
+    assert slow.hertz == pytest.approx(9.97, abs=0.01)
+    assert slow.hertz >= LEAST_HZ
+    thin = replace(log, outputs=Samples(log.outputs.time[::4], log.outputs.values[::4]))
+    (slow,) = slow_logs([thin])
+    assert slow.setting == "LOG_BITMASK 65535"
+    assert slow.hertz == pytest.approx(6.25)
+    assert slowest_rows(thin) < LEAST_HZ

@@ -12,6 +12,7 @@ import planfly
 from aircraft.catalog import load_aircraft
 from logs.importers.motion_log import MotionLog, Samples
 from planfly.identification.records import flight_records, log_outputs
+from planfly.identification.servos import read_servos
 from tests.aircraft.identification.flown_truth import flown_truth
 from tests.instrumented_flights import PARAMETERS
 from world.errors import LogError
@@ -83,6 +84,19 @@ def test_outputs_are_read_off_the_logs_parameters() -> None:
     assert np.degrees(found["aileron"].control(pulses)[[0, 3]]) == pytest.approx([30.0, -30.0])
     assert np.degrees(found["elevator"].control(pulses)[[0, 1, 3]]) == pytest.approx([30.0, 0.0, -30.0])
     assert found["throttle"].control(np.array([1000.0, 1770.0])) == pytest.approx([0.0, 0.77])
+
+
+def test_a_surface_that_is_told_to_go_beyond_its_stop_stays_there() -> None:
+    """As the Aerosonde is rigged, 1900 us are 38.4 degrees of elevator, trailing edge up; its stop is at 30."""
+    log = changed()
+    pulses = log.outputs.values.copy()
+    pulses[:, :2] = [1900.0, 1900.0]
+    told = replace(log, outputs=Samples(log.outputs.time, pulses))
+    (record,) = flight_records(told, PRIOR, read_servos(PRIOR.folder / "ardupilot.toml"))
+    assert np.degrees(record.controls[100, :2]) == pytest.approx([-30.0, 30.0])
+    pulses[:, 1] = 1700.0
+    (record,) = flight_records(told, PRIOR, read_servos(PRIOR.folder / "ardupilot.toml"))
+    assert np.degrees(record.controls[100, 0]) == pytest.approx(-23.4)
 
 
 def test_elevons_are_half_their_sum_and_difference(tmp_path: Path) -> None:
