@@ -213,6 +213,7 @@ def _setup(
             limits,
             autopilot.return_rules,
             autopilot.loiter_rules,
+            autopilot.speeds_by_value,
         ),
         limits=limits,
         aircraft=aircraft.name,

@@ -153,11 +153,12 @@ def make_setup(
     # A fence that makes no zones is bad input, and the verdict could not judge it.
     fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
-    rules, loiters = airframe.autopilot.return_rules, airframe.autopilot.loiter_rules
+    autopilot = airframe.autopilot
+    laws = autopilot.return_rules, autopilot.loiter_rules, autopilot.speeds_by_value
     if placed is None:
-        route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits, rules, loiters)
+        route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits, *laws)
     else:
-        route = lay_route(placed, airspeed, fly_over, limits, rules, loiters)
+        route = lay_route(placed, airspeed, fly_over, limits, *laws)
     route = with_end_courses(route, scenario, limits)
     return FlightSetup(
         scenario=scenario,
@@ -169,7 +170,7 @@ def make_setup(
         battery=airframe.battery,
         seed=seed,
         plan=plan,
-        autopilot=airframe.autopilot,
+        autopilot=autopilot,
         nav=scenario.flight.steering.nav,
         guidance_hz=scenario.flight.guidance_hz,
         fdm_hz=fdm_hz,

@@ -160,6 +160,8 @@ class Autopilot(ABC):
     equivalent_airspeeds: whether commanded airspeeds count as equivalent ones, which are less than true ones at height;
     it then takes over in level flight.
     refuses: whether it takes no mission that PX4's feasibility checks refuse.
+    speeds_by_value: whether it reads nothing but the value of a mission's change of speed, and goes back to its own
+        airspeed for any that is not positive.
     height_candidates, side_candidates: parameters that may decide a flight which fails by its height or its track.
     """
 
@@ -169,6 +171,7 @@ class Autopilot(ABC):
     own: ClassVar[np.dtype[np.record] | None] = None
     equivalent_airspeeds: ClassVar[bool] = False
     refuses: ClassVar[bool] = False
+    speeds_by_value: ClassVar[bool] = False
     height_candidates: ClassVar[tuple[Candidate, ...]] = ()
     side_candidates: ClassVar[tuple[Candidate, ...]] = ()
     parameters: Parameters | None = None

@@ -80,6 +80,7 @@ class ItineraryStop:
     airspeed: m/s on the leg that ends here, NaN for the aircraft's own.
     acceptance: radius, m, 0 where none is stated.
     loiter: the circle flown about it, None for none.
+    airspeed_by_value: as ``airspeed`` by an autopilot that reads nothing but the value of a change of speed.
     """
 
     item: int
@@ -91,6 +92,7 @@ class ItineraryStop:
     airspeed: float
     acceptance: float = 0.0
     loiter: Loiter | None = None
+    airspeed_by_value: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +105,7 @@ class Itinerary:
     notes: what is not flown as written, with item numbers.
     endless: seq of a jump without end, -1 for none.
     landing: the place to land at, None for none; the flight ends above it.
+    notes_by_value: as ``notes`` by an autopilot that reads nothing but the value of a change of speed.
     """
 
     stops: tuple[ItineraryStop, ...]
@@ -112,6 +115,7 @@ class Itinerary:
     notes: tuple[str, ...]
     endless: int = -1
     landing: ItineraryStop | None = None
+    notes_by_value: tuple[str, ...] = ()
 
     @property
     def returns(self) -> bool:
@@ -143,8 +147,16 @@ def make_itinerary(mission: Mission) -> Itinerary:
             walk.notes.add("never reached", item.seq)
     if not walk.stops:
         raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)
-    stops, notes = tuple(walk.stops), walk.notes.lines()
-    return Itinerary(stops, walk.home, walk.has_home, walk.takeoff, notes, walk.endless, walk.landing)
+    return Itinerary(
+        stops=tuple(walk.stops),
+        home=walk.home,
+        has_home=walk.has_home,
+        takeoff=walk.takeoff,
+        notes=walk.notes.usual.lines(),
+        endless=walk.endless,
+        landing=walk.landing,
+        notes_by_value=walk.notes.by_value.lines(),
+    )
 
 
 def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
@@ -178,13 +190,25 @@ def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
             k = index[target]
 
 
+class _BothNotes:
+    """Notes for both ways to read a change of speed, which differ by what they say of that."""
+
+    def __init__(self) -> None:
+        self.usual, self.by_value = Notes(), Notes()
+
+    def add(self, text: str, seq: int | None = None) -> None:
+        """Note something that holds either way."""
+        self.usual.add(text, seq)
+        self.by_value.add(text, seq)
+
+
 class _Walk:
     """Stops, speed and notes after the items so far."""
 
     def __init__(self, mission: Mission) -> None:
         self.source = mission.source
-        self.airspeed = math.nan
-        self.notes = Notes()
+        self.airspeed = self.airspeed_by_value = math.nan
+        self.notes = _BothNotes()
         self.stops: list[ItineraryStop] = []
         self.takeoff: MissionItem | None = None
         self.ended, self.endless = False, -1
@@ -213,7 +237,10 @@ class _Walk:
 
     def _stop(self, item: MissionItem, acceptance: float = 0.0) -> ItineraryStop:
         lat, lon, loiter = item.lat_deg, item.lon_deg, loiter_of(item)
-        return ItineraryStop(item.seq, item.command, lat, lon, item.alt, item.frame, self.airspeed, acceptance, loiter)
+        speeds = self.airspeed, self.airspeed_by_value
+        return ItineraryStop(
+            item.seq, item.command, lat, lon, item.alt, item.frame, speeds[0], acceptance, loiter, speeds[1]
+        )
 
     def _take_off(self, item: MissionItem) -> None:
         name = command_name(item.command)
@@ -276,7 +303,7 @@ class _Walk:
         else:
             # Where to and how high is for who flies: `flight.mission.return_path`.  No speed that was set counts there.
             home = replace(item, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
-            self.stops.append(replace(self._stop(home), airspeed=math.nan))
+            self.stops.append(replace(self._stop(home), airspeed=math.nan, airspeed_by_value=math.nan))
             self.ended = True
 
     def _land(self, item: MissionItem) -> None:
@@ -293,20 +320,36 @@ class _Walk:
             self.notes.add(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
 
     def _change_speed(self, item: MissionItem) -> None:
+        self._change_by_value(item)
         kind, speed, throttle = item.params[:3]
+        notes = self.notes.usual
         if kind not in (0.0, 1.0):
-            self.notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
+            notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
             return
         if speed == -2.0:
             self.airspeed = math.nan
         elif speed > 0.0:
             self.airspeed = speed
             if kind == 1.0:
-                self.notes.add("DO_CHANGE_SPEED of ground speed: flown as airspeed", item.seq)
+                notes.add("DO_CHANGE_SPEED of ground speed: flown as airspeed", item.seq)
         elif speed != -1.0:
-            self.notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: ignored", item.seq)
+            notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: ignored", item.seq)
         if throttle > 0.0:
-            self.notes.add("DO_CHANGE_SPEED's throttle: ignored", item.seq)
+            notes.add("DO_CHANGE_SPEED's throttle: ignored", item.seq)
+
+    def _change_by_value(self, item: MissionItem) -> None:
+        """Read a change of speed as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""
+        kind, speed, throttle = item.params[:3]
+        notes = self.notes.by_value
+        if speed > 0.0:
+            self.airspeed_by_value = speed
+            if kind != 0.0:
+                notes.add(f"DO_CHANGE_SPEED of type {kind:g}: flown as airspeed, for no type is read", item.seq)
+            return
+        self.airspeed_by_value = math.nan
+        notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: back to the autopilot's own airspeed", item.seq)
+        if throttle > 0.0:
+            notes.add("DO_CHANGE_SPEED's throttle: not flown", item.seq)
 
 
 def _first_position(mission: Mission) -> Home:

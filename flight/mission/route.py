@@ -218,6 +218,7 @@ def make_route(
     limits: Limits | None = None,
     rules: ReturnRules = USUAL_RULES,
     loiters: LoiterRules = USUAL_LOITERS,
+    speeds_by_value: bool = False,
 ) -> Route:
     """Route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
 
@@ -227,6 +228,7 @@ def make_route(
     limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
         a spiral (5 %).
     rules, loiters: how whoever flies returns to launch, and flies loiters.
+    speeds_by_value: whether nothing but the value of a change of speed is read, as PX4 does.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
     has a horizontal length of at least `flight.mission.placing.SAME_PLACE`.  Raises MissionError, naming the item, for
@@ -243,7 +245,9 @@ def make_route(
     >>> route.started
     'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
     """
-    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules, loiters)
+    return lay_route(
+        place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules, loiters, speeds_by_value
+    )
 
 
 def lay_route(
@@ -253,6 +257,7 @@ def lay_route(
     limits: Limits | None = None,
     rules: ReturnRules = USUAL_RULES,
     loiters: LoiterRules = USUAL_LOITERS,
+    speeds_by_value: bool = False,
 ) -> Route:
     """Route through the places of a mission; arguments as of `make_route`.
 
@@ -265,7 +270,7 @@ def lay_route(
     [25.0]
     """
     mission, notes = placed.mission, Notes()
-    kept = [_with_airspeed(place, default_airspeed) for place in placed.stops]
+    kept = [_with_airspeed(place, default_airspeed, speeds_by_value) for place in placed.stops]
     returning = kept.pop() if placed.itinerary.returns else None
     points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
     back: dict[str, Any] = {}
@@ -289,7 +294,9 @@ def lay_route(
         fly_over=np.where(arcs > 0.0, False, fly_over | arc_misses(waypoints, airspeed, acceptance, limits)),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_started(placed.itinerary, stops[0], placed.origin, waypoints),
-        notes=placed.itinerary.notes + placed.notes + notes.lines(),
+        notes=(placed.itinerary.notes_by_value if speeds_by_value else placed.itinerary.notes)
+        + placed.notes
+        + notes.lines(),
         arcs=arcs,
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
@@ -336,11 +343,10 @@ def _lay_return(
     return {"return_from": first, "return_to": circle}
 
 
-def _with_airspeed(place: PlacedStop, default: float) -> PlacedStop:
-    """A place with the default airspeed (m/s) where the mission sets none."""
-    if not math.isnan(place.stop.airspeed):
-        return place
-    return PlacedStop(replace(place.stop, airspeed=default), place.position)
+def _with_airspeed(place: PlacedStop, default: float, by_value: bool) -> PlacedStop:
+    """A place with the airspeed that whoever flies reads of the mission; the default (m/s) where that sets none."""
+    stated = place.stop.airspeed_by_value if by_value else place.stop.airspeed
+    return PlacedStop(replace(place.stop, airspeed=default if math.isnan(stated) else stated), place.position)
 
 
 def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, notes: Notes) -> None:

@@ -42,6 +42,7 @@ class Px4(Autopilot):
     own: ClassVar[np.dtype[np.record] | None] = PX4
     equivalent_airspeeds: ClassVar = True
     refuses: ClassVar = True
+    speeds_by_value: ClassVar = True
     height_candidates: ClassVar = HEIGHT_CANDIDATES
     side_candidates: ClassVar = SIDE_CANDIDATES
     parameters: Px4Parameters = field()

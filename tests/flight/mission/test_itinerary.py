@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flight.mission.itinerary import make_itinerary
-from tests.mission_lines import ground, mission, refusal, route, wp
+from flight.mission.route import make_route
+from tests.mission_lines import ORIGIN, ground, mission, refusal, route, wp
 
 
 def test_speeds_count_for_the_legs_after_them() -> None:
@@ -34,6 +35,27 @@ def test_speeds_count_for_the_legs_after_them() -> None:
         "item 6: DO_CHANGE_SPEED of type 2, neither airspeed nor ground speed: ignored",
         "item 12: DO_CHANGE_SPEED to 0 m/s: ignored",
     )
+
+
+@pytest.mark.parametrize(
+    ("change", "airspeed", "noted"),
+    [
+        ("0 22 -1", 22.0, None),
+        ("1 22 -1", 22.0, "DO_CHANGE_SPEED of type 1: flown as airspeed, for no type is read"),
+        ("2 22 80", 22.0, "DO_CHANGE_SPEED of type 2: flown as airspeed, for no type is read"),
+        ("0 0 -1", 25.0, "DO_CHANGE_SPEED to 0 m/s: back to the autopilot's own airspeed"),
+        ("0 -1 -1", 25.0, "DO_CHANGE_SPEED to -1 m/s: back to the autopilot's own airspeed"),
+        ("0 -2 -1", 25.0, "DO_CHANGE_SPEED to -2 m/s: back to the autopilot's own airspeed"),
+        ("0 -1 80", 25.0, "DO_CHANGE_SPEED's throttle: not flown"),
+    ],
+)
+def test_a_speed_by_its_value_alone_is_that_or_the_autopilots_own(
+    change: str, airspeed: float, noted: str | None
+) -> None:
+    items = wp(0, 0), "2 178 0 28 -1 0 0 0 0", wp(0, 900), f"2 178 {change} 0 0 0 0", wp(0, 1800)
+    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, speeds_by_value=True)
+    assert flown.airspeed.tolist() == [28.0, airspeed]
+    assert flown.notes[-1:] == (() if noted is None else (f"item 4: {noted}",))
 
 
 def test_jumps_are_followed_as_often_as_they_say() -> None:
