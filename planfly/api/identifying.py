@@ -134,11 +134,10 @@ def identify_aircraft(
     with stage("drawing"):
         files["identify.html"] = _page(found, replays, None if check is None else Path(check).name, target.name)
     write_folder(target, {name: text.encode() for name, text in files.items()})
-    climb, sink, power = _intervals(found)
+    slow = slow_logs([one for one, _, _ in read])
     return IdentifiedAircraft(
-        read_aircraft(target), estimate, climb, sink, power, replays, without_current(records),
-        slow_logs([one for one, _, _ in read]),
-    )  # fmt: skip
+        read_aircraft(target), estimate, *_intervals(found), replays, without_current(records), slow
+    )
 
 
 def _base(base: str | Path) -> Aircraft:
