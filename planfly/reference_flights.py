@@ -47,7 +47,8 @@ def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], pass
     ('TECS_HDEM_TCONST', 3.0, 1.2)
     """
     failed = first_failed(findings)
-    if failed is None or autopilot.parameters is None:
+    if failed is None or autopilot.parameters is None or failed.rule == "mission":
+        # A mission that is not taken is taken by none of what decides how it is flown.
         return None
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
     heights, sides = autopilot.height_candidates, autopilot.side_candidates

@@ -8,6 +8,7 @@ told, without parameters, and returns to launch as ArduPlane does by its default
 otherwise.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -88,6 +89,21 @@ class SpeedLimits(NamedTuple):
     min_name: str
     max_name: str
     nearest: bool = False
+
+
+class MissionChecks(NamedTuple):
+    """What PX4's feasibility checks go by, by default as its fixed wings do.
+
+    acceptance: NAV_ACC_RAD, m.
+    landing_angle: FW_LND_ANG, rad.
+    requires: MIS_TKO_LAND_REQ: 0 nothing, 1 a takeoff, 2 a landing, 3 both, 4 and 5 both or neither.
+    stated: whether a person's file decides what it requires.
+    """
+
+    acceptance: float = 10.0
+    landing_angle: float = math.radians(5.0)
+    requires: int = 2
+    stated: bool = False
 
 
 class Candidate(NamedTuple):
@@ -300,6 +316,11 @@ class Autopilot(ABC):
     def loiter_rules(self) -> LoiterRules:
         """How it flies loiters: how wide where the mission does not say, how it joins and leaves them."""
         return USUAL_LOITERS
+
+    @property
+    def mission_checks(self) -> MissionChecks:
+        """What PX4's feasibility checks go by: with its default parameters where it is another autopilot."""
+        return MissionChecks()
 
     @property
     def stated_airspeed(self) -> tuple[float, str] | None:

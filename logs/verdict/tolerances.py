@@ -199,16 +199,12 @@ TOUCH = 1e-6
 # changes the exposure by less than 0.1 %.
 FAR = 30.0
 
-# PX4's checks: the defaults of the parameters that its `FeasibilityChecker` reads, by their names
+# PX4's checks: what its `FeasibilityChecker` goes by beside `flight.autopilots.autopilot.MissionChecks`
 
-# m.  NAV_ACC_RAD.
-PX4_ACCEPTANCE = 10.0
 # m.  A takeoff's height is to be this much more than the acceptance radius; the checker has it as a literal.
 PX4_TAKEOFF_BUFFER = 1.0
-# Degrees.  FW_LND_ANG.
-PX4_LANDING_ANGLE_DEG = 5.0
-# rad.  The steepest landing approach: FW_LND_ANG, and the 0.1 degrees that the checker adds.
-PX4_STEEPEST_LANDING = math.radians(PX4_LANDING_ANGLE_DEG + 0.1)
+# rad.  A landing approach may be steeper than FW_LND_ANG by this; the checker has it as a literal.
+PX4_LANDING_BUFFER = math.radians(0.1)
 # m.  MIS_DIST_1WP.
 PX4_FIRST_WAYPOINT = 10_000.0
 # m.  MIS_DIST_WPS of the releases that had it.

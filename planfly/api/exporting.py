@@ -8,6 +8,7 @@ from flight.mission.fences import numbered, zone_fences
 from flight.mission.items import Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
 from logs.recording.reader import FlightLog, read_log
+from logs.verdict.rules.mission_rule import lacks_landing
 from logs.views.exports.map_files import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
 from planfly.api.flying import FencePaths, FlownMission, named_fences
 from planfly.first_start import with_warm_up
@@ -29,7 +30,7 @@ class ExportedFiles:
     """What `planfly.export` wrote.
 
     files: in the order asked for.  contents: what each holds, in words.
-    notes: what of the source they do not hold, a line each.
+    notes: what of the source they do not hold, and what PX4 would refuse of a plan for it, a line each.
     loss: what of a flight log could not be read, in a line, which is among the notes; "" where nothing is missing.
     """
 
@@ -156,7 +157,8 @@ def _read_mission(path: Path, maps: bool, fences: NamedFences) -> _Source:
     if not is_plan:
         return _with_zones(source, setup.scenario)
     mission, notes = fence_of_plan(setup)
-    return replace(source, mission=mission, notes=notes)
+    lack = lacks_landing(mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
+    return replace(source, mission=mission, notes=(*notes, *([lack] if lack else [])))
 
 
 def _with_zones(source: _Source, scenario: Scenario) -> _Source:

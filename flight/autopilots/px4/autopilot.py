@@ -8,7 +8,15 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
-from flight.autopilots.autopilot import Autopilot, Floats, SpeedLimits, StoredAutopilot, StoredParameters, Tick
+from flight.autopilots.autopilot import (
+    Autopilot,
+    Floats,
+    MissionChecks,
+    SpeedLimits,
+    StoredAutopilot,
+    StoredParameters,
+    Tick,
+)
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_tick
 from flight.autopilots.px4.parameters import (
@@ -147,6 +155,17 @@ class Px4(Autopilot):
             sink=min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
             short=made["NAV_FW_ALT_RAD"],
         )
+
+    @property
+    def mission_checks(self) -> MissionChecks:
+        """By NAV_ACC_RAD, FW_LND_ANG and MIS_TKO_LAND_REQ, which a file of all parameters need not state.
+
+        >>> Px4(default_parameters()).mission_checks.requires
+        2
+        """
+        made = self.parameters
+        stated = made.is_whole_set or "MIS_TKO_LAND_REQ" in made.by_origin("file")
+        return MissionChecks(made["NAV_ACC_RAD"], made["FW_LND_ANG"], int(made["MIS_TKO_LAND_REQ"]), stated)
 
     @property
     def speed_limits(self) -> SpeedLimits | None:

@@ -98,7 +98,13 @@ DEFINITIONS = {
     # Return.
     "return_height": Definition("RTL_RETURN_ALT", 100.0, 0.0, 10_000.0),
     "return_radius": Definition("RTL_LOITER_RAD", 80.0, 1.0, 10_000.0),
+    # What a mission is taken by.
+    "mission_requires": Definition("MIS_TKO_LAND_REQ", 2.0, 0.0, 5.0),
+    "landing_angle": Definition("FW_LND_ANG", 5.0, 1.0, 45.0, _DEGREE),
     # Not flown.
+    "uses_airspeed": Definition("FW_USE_AIRSPD", 1.0, 0.0, 1.0),
+    "keeps_ground_speed": Definition("NPFG_EN_MIN_GSP", 1.0, 0.0, 1.0),
+    "landing_height_acceptance": Definition("NAV_FW_ALTL_RAD", 5.0, 0.05, 200.0),
     "track_keeping": Definition("NPFG_TRACK_KEEP", 1.0, 0.0, 1.0),
     "excess_wind": Definition("NPFG_WIND_REG", 1.0, 0.0, 1.0),
     "track_keeping_speed": Definition("NPFG_GSP_MAX_TK", 5.0, 0.0, 50.0),
@@ -114,8 +120,10 @@ DEFINITIONS = {
     "return_landing": Definition("RTL_LAND_DELAY", -1.0, -1.0, 10_000.0),
 }
 # Read, and no flight of ours shows what another value than PX4's own would do.
-NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-13:])
+NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-16:])
 _BY_NAME = {definition.name: definition for definition in DEFINITIONS.values()}
+# A station saves every parameter of the vehicle, a thousand and more; a person writes down what is of interest.
+_WHOLE_SET = 300
 # What has to be in order.
 _PAIRS = (("FW_THR_MIN", "FW_THR_MAX"), ("FW_AIRSPD_MIN", "FW_AIRSPD_MAX"))
 
@@ -189,6 +197,11 @@ class Px4Parameters:
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """The values (in PX4's units) that one source states, by name."""
         return {name: value for name, value, stated in self.values if stated == origin}
+
+    @property
+    def is_whole_set(self) -> bool:
+        """Whether the file holds all parameters of a vehicle: one that it does not state is the release's own."""
+        return len(self.unused) + len(self.by_origin("file")) >= _WHOLE_SET
 
     @property
     def anticipates(self) -> bool:

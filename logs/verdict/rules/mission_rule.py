@@ -1,10 +1,12 @@
 """The mission rule: what PX4's feasibility checker would refuse, by the names of its checks.
 
-After `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with the default
-parameters: NAV_ACC_RAD 10 m, FW_LND_ANG 5 degrees, MIS_DIST_1WP 10 km, MIS_TKO_LAND_REQ 0.  These are PX4's own limits
-and say nothing of the aircraft: what PX4 alone refuses is named, and fails only where PX4 is to fly.  Whoever flies, a
-command that neither PX4 nor ArduPlane takes fails, and a route beyond the mission's own fence.  Latitude, longitude,
-frames and counts that are none were refused when the file was read.
+After `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with the parameters that
+PX4 is flown with: NAV_ACC_RAD, FW_LND_ANG, MIS_TKO_LAND_REQ (its fixed wings ask for a landing by default: 2), and
+MIS_DIST_1WP 10 km.  These are PX4's own limits and say nothing of the aircraft: what PX4 alone refuses is named, and
+fails only where PX4 is to fly; the landing that it asks for by default only where a person's file of parameters says
+so, for most missions have none and it is one parameter to change.  Whoever flies, a command that neither PX4 nor
+ArduPlane takes fails, and a route beyond the mission's own fence.  Latitude, longitude, frames and counts that are none
+were refused when the file was read.
 """
 
 import itertools
@@ -14,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from flight.autopilots.autopilot import MissionChecks
 from flight.mission.fences import fence_problem
 from flight.mission.items import (
     LANDINGS,
@@ -31,14 +34,12 @@ from logs.verdict.findings import Finding, Message, make_finding, message
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
-    PX4_ACCEPTANCE,
     PX4_BETWEEN_WAYPOINTS,
     PX4_FIRST_WAYPOINT,
     PX4_GATE_APART,
-    PX4_LANDING_ANGLE_DEG,
+    PX4_LANDING_BUFFER,
     PX4_MAX_PWM,
     PX4_MAX_SERVO,
-    PX4_STEEPEST_LANDING,
     PX4_TAKEOFF_BUFFER,
 )
 from world.frames import GeoOrigin, to_map
@@ -58,13 +59,13 @@ _ARDUPLANE = frozenset(
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
     """One finding a check: the first item at fault, or that there is none."""
-    mission, origin = setup.mission, setup.scenario.origin
+    mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.mission_checks
     checks = (
         ("checkMissionItemValidity", _validity(mission)),
-        ("checkTakeoff", _takeoff(mission)),
+        ("checkTakeoff", _takeoff(mission, limits)),
         ("checkFixedWingLanding", _landing(mission)),
-        ("checkFixedWindLandApproach", _approach(mission, origin)),
-        ("checkTakeoffLandAvailable", _available(mission)),
+        ("checkFixedWindLandApproach", _approach(mission, origin, limits)),
+        ("checkTakeoffLandAvailable", _available(mission, limits, setup.autopilot.refuses)),
         ("checkDistanceToFirstWaypoint", _first_distance(mission, origin)),
         ("checkDistancesBetweenWaypoints", _distances(mission, origin)),
         ("checkIfBelowHomeAltitude", _below_home(mission)),
@@ -138,14 +139,17 @@ def _over_home(mission: Mission, item: MissionItem) -> float:
     return item.alt - mission.home.alt if mission.home is not None else math.nan
 
 
-def _takeoff(mission: Mission) -> Iterator[_Remark]:
+def _takeoff(mission: Mission, limits: MissionChecks) -> Iterator[_Remark]:
     placed = False
     for item in mission.items:
         if item.command in TAKEOFFS:
             height = _over_home(mission, item)
-            if height - PX4_TAKEOFF_BUFFER < PX4_ACCEPTANCE:
-                least = PX4_ACCEPTANCE + PX4_TAKEOFF_BUFFER
-                yield REFUSED, item.seq, f"takeoff altitude {height:.1f} m too low: at least {least:.0f} m"
+            if height - PX4_TAKEOFF_BUFFER < limits.acceptance:
+                least, radius = limits.acceptance + PX4_TAKEOFF_BUFFER, f"NAV_ACC_RAD {limits.acceptance:g} m"
+                low = message(
+                    f"takeoff altitude {height:.1f} m too low: at least {least:g} m", f", {radius} and 1 m more"
+                )
+                yield REFUSED, item.seq, low
             if placed:
                 yield REFUSED, item.seq, "takeoff is not the first waypoint item"
         placed = placed or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
@@ -167,7 +171,8 @@ def _landing(mission: Mission) -> Iterator[_Remark]:
         yield REFUSED, seq[starts[0]], "invalid land start: no landing follows"
 
 
-def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+def _approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Iterator[_Remark]:
+    steepest = math.degrees(limits.landing_angle)
     for before, item in zip(mission.items, mission.items[1:], strict=False):
         if item.command != C.NAV_LAND or before.command not in PLACES | TAKEOFFS or not before.has_position:
             continue
@@ -189,16 +194,46 @@ def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
             yield REFUSED, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
             continue
         angle = math.atan2(rise, run)
-        if angle > PX4_STEEPEST_LANDING:
-            steep = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {PX4_LANDING_ANGLE_DEG:.1f}°"
+        if angle > limits.landing_angle + PX4_LANDING_BUFFER:
+            steep = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {steepest:.1f}°"
             yield REFUSED, item.seq, steep
 
 
-def _available(mission: Mission) -> Iterator[_Remark]:
+# By MIS_TKO_LAND_REQ: what is asked for, in words.
+_REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "both or neither", 5: "both or neither"}
+
+
+def lacks_landing(mission: Mission, limits: MissionChecks) -> str:
+    """What PX4 says to a mission's lack of a takeoff or a landing, a sentence for people; "" to one that has it all.
+
+    >>> lacks_landing(Mission(None, ()), MissionChecks(requires=2))
+    "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
+    """
     takeoff = any(item.command in TAKEOFFS for item in mission.items)
     land = any(item.command in LANDINGS for item in mission.items)
-    has = [name for name, there in (("takeoff", takeoff), ("landing", land)) if there]
-    yield True, None, f"holds {' and '.join(has) or 'neither takeoff nor landing'}; MIS_TKO_LAND_REQ 0 asks for neither"
+    enough = {0: True, 1: takeoff, 2: land, 3: takeoff and land}.get(limits.requires, takeoff == land)
+    if enough:
+        return ""
+    if limits.requires == MissionChecks().requires and not limits.stated:
+        return "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
+    wanted = f"MIS_TKO_LAND_REQ {limits.requires} asks for {_REQUIRED[limits.requires]}"
+    return f"{wanted}, and this has {_held(takeoff, land)}"
+
+
+def _held(takeoff: bool, land: bool) -> str:
+    held = [name for name, there in (("a takeoff", takeoff), ("a landing", land)) if there]
+    return " and ".join(held) or "neither a takeoff nor a landing"
+
+
+def _available(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
+    lack = lacks_landing(mission, limits)
+    if not lack:
+        yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ asks for them"
+    elif limits.stated:
+        yield REFUSED, None, lack
+    else:
+        # One parameter, of which nothing is known: no verdict, and of no interest to who flies something else.
+        yield None if refuses else True, None, lack
 
 
 def _apart(a: MissionItem, b: MissionItem, origin: GeoOrigin) -> float:
@@ -277,7 +312,7 @@ RULE = Rule(
     asks="Would an autopilot take the mission's items, and does its route keep to its own fence?",
     margin=None,
     tolerances=(
-        *("PX4_ACCEPTANCE", "PX4_TAKEOFF_BUFFER", "PX4_LANDING_ANGLE_DEG", "PX4_STEEPEST_LANDING"),
+        *("PX4_TAKEOFF_BUFFER", "PX4_LANDING_BUFFER"),
         *("PX4_FIRST_WAYPOINT", "PX4_BETWEEN_WAYPOINTS", "PX4_GATE_APART", "PX4_MAX_SERVO", "PX4_MAX_PWM"),
     ),
     judge_items=mission_findings,

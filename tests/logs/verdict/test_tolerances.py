@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from flight.autopilots.autopilot import MissionChecks
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import default_parameters
 from logs.verdict import tolerances
 
 NAMES = [name for name in vars(tolerances) if name.isupper()]
@@ -39,6 +42,8 @@ def test_more_turbulence_allows_no_less() -> None:
 
 
 def test_px4s_defaults_are_those_of_its_parameters() -> None:
-    """NAV_ACC_RAD, FW_LND_ANG and MIS_DIST_1WP as PX4's parameter reference has them."""
-    assert (tolerances.PX4_ACCEPTANCE, tolerances.PX4_FIRST_WAYPOINT) == (10.0, 10_000.0)
-    assert math.degrees(tolerances.PX4_STEEPEST_LANDING) == pytest.approx(5.1)
+    """NAV_ACC_RAD, FW_LND_ANG and MIS_DIST_1WP as PX4's reference has them, MIS_TKO_LAND_REQ as its planes."""
+    usual = MissionChecks()
+    assert (usual.acceptance, tolerances.PX4_FIRST_WAYPOINT, usual.requires) == (10.0, 10_000.0, 2)
+    assert math.degrees(usual.landing_angle + tolerances.PX4_LANDING_BUFFER) == pytest.approx(5.1)
+    assert Px4(default_parameters()).mission_checks == usual

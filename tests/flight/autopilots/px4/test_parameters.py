@@ -71,7 +71,14 @@ def test_one_that_is_not_flown_counts_where_it_is_not_px4s_own() -> None:
     made = parameters_of("FW_T_F_ALT_ERR -1\nRTL_TYPE 1\n", "a.params")
     assert set(made.by_origin("file")) == {"RTL_TYPE"}
     assert {"FW_T_F_ALT_ERR", "RTL_TYPE"} <= set(NOT_FLOWN)
-    assert NOT_FLOWN[0] == "NPFG_TRACK_KEEP"
+    assert NOT_FLOWN[0] == "FW_USE_AIRSPD"
+
+
+def test_what_a_person_states_otherwise_and_is_not_flown_is_named() -> None:
+    made = parameters_of("FW_USE_AIRSPD 0\nNPFG_EN_MIN_GSP 0\nNAV_FW_ALTL_RAD 8\nFW_LND_ANG 7\n", "a.params")
+    assert {"FW_USE_AIRSPD", "NPFG_EN_MIN_GSP", "NAV_FW_ALTL_RAD"} <= set(made.by_origin("file")) & set(NOT_FLOWN)
+    assert made.by_origin("file")["FW_LND_ANG"] == 7.0
+    assert made.unused == ()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import default_parameters
+from flight.autopilots.px4.parameters import default_parameters, parameters_of
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import Place
@@ -109,6 +109,67 @@ def test_where_px4_flies_what_it_refuses_fails(case: str) -> None:
     verdict = judge_geometry(replace(setup_of(*lines), autopilot=Px4(default_parameters())))
     found = [one for one in verdict.findings if one.rule == "mission" and one.check == check]
     assert [(one.ok, one.place) for one in found] == [(False, Place("mission", item=item))]
+
+
+def by_px4(text: str, *lines: str) -> list[Finding]:
+    """The rule's findings where PX4 flies with a file of parameters, "" for none."""
+    made = parameters_of(text, "a.params") if text else default_parameters()
+    findings = judge_geometry(replace(setup_of(*lines), autopilot=Px4(made))).findings
+    return [item for item in findings if item.rule == "mission"]
+
+
+LANDING = (*GOOD, wp(1500, 0, 100), wp(0, 0, 0, command=21))
+# As long as a station's file.
+WHOLE = "".join(f"PARAMETER_{k} 1\n" for k in range(400))
+
+
+@pytest.mark.parametrize(
+    ("text", "lines", "ok", "words"),
+    [
+        ("", GOOD, None, "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LA"),
+        ("NAV_ACC_RAD 20", GOOD, None, "or set MIS_TKO_LAND_REQ 0"),
+        ("", LANDING, True, "as MIS_TKO_LAND_REQ asks"),
+        ("MIS_TKO_LAND_REQ 2", GOOD, False, "MIS_TKO_LAND_REQ 2 asks for a landing, and this has a takeoff"),
+        (WHOLE, GOOD, False, "MIS_TKO_LAND_REQ 2 asks for a landing"),
+        (WHOLE + "MIS_TKO_LAND_REQ 0", GOOD, True, "as MIS_TKO_LAND_REQ asks"),
+        ("MIS_TKO_LAND_REQ 1", GOOD, True, ""),
+        ("MIS_TKO_LAND_REQ 1", GOOD[1:], False, "asks for a takeoff, and this has neither a takeoff nor a landing"),
+        ("MIS_TKO_LAND_REQ 3", GOOD, False, "a takeoff and a landing"),
+        ("MIS_TKO_LAND_REQ 3", LANDING, True, ""),
+        ("MIS_TKO_LAND_REQ 4", GOOD, False, "both or neither"),
+        ("MIS_TKO_LAND_REQ 4", GOOD[1:], True, ""),
+    ],
+)
+def test_px4_asks_for_a_takeoff_or_a_landing(text: str, lines: tuple[str, ...], ok: bool | None, words: str) -> None:
+    (found,) = [item for item in by_px4(text, *lines) if item.check == "checkTakeoffLandAvailable"]
+    assert found.ok is ok
+    assert words in found.reason
+
+
+def test_without_a_landing_a_default_px4_flies_and_the_verdict_says_so() -> None:
+    verdict = judge_geometry(replace(setup_of(*GOOD), autopilot=Px4(default_parameters())))
+    said = "PX4 would not take it: PX4's fixed-wing default refuses a mission without a landing"
+    assert verdict.flyable
+    assert [line for line in verdict.lines if line.startswith(said)]
+    assert not [line for line in judge_geometry(setup_of(*GOOD)).lines if "MIS_TKO_LAND_REQ" in line]
+
+
+@pytest.mark.parametrize(("radius", "height", "taken"), [(30, 31.1, True), (30, 30.9, False), (105, 100.0, False)])
+def test_a_takeoff_climbs_beyond_the_acceptance_radius_that_is_set(radius: int, height: float, taken: bool) -> None:
+    lines = wp(0, 500, height, command=22), *GOOD[1:]
+    (found,) = [item for item in by_px4(f"NAV_ACC_RAD {radius}", *lines) if item.check == "checkTakeoff"]
+    assert found.ok is taken
+    # As a value that is suggested is tried.
+    law = Px4(default_parameters()).with_parameters(NAV_ACC_RAD=float(radius))
+    assert judge_geometry(replace(setup_of(*lines), autopilot=law)).flyable is taken
+
+
+@pytest.mark.parametrize(("degrees", "taken"), [(8.0, True), (7.5, False)])
+def test_a_landing_is_as_steep_as_fw_lnd_ang(degrees: float, taken: bool) -> None:
+    # 208.2 m down over 1,500 m: 7.9 degrees.
+    lines = (*GOOD, wp(1500, 0, 208.2), wp(0, 0, 0, command=21))
+    found = [item for item in by_px4(f"FW_LND_ANG {degrees}", *lines) if item.check == "checkFixedWindLandApproach"]
+    assert [item.ok for item in found] == [taken]
 
 
 def test_first_waypoint_too_far() -> None:
