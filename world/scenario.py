@@ -512,7 +512,7 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     28.0
     """
     given = {key: value for key, value in changes.items() if value is not None}
-    kept = scenario.flight.model_dump()
+    kept = scenario.flight.model_dump() | ({"aircraft_by_default": None} if "aircraft" in given else {})
     if "guidance" in given or "params" in given or "autopilot" in given:
         # Parameters alone are of the autopilot that the scenario names, where that takes any.
         named = bool(set(given) & {"guidance", "autopilot"}) or kept["autopilot"] in (None, OWN_GUIDANCE)

@@ -383,6 +383,7 @@ class FlightTable(ScenarioTable):
     """
 
     aircraft: FilePath = "aerosonde"  # an embedded name, or a folder where there is a slash
+    aircraft_by_default: Literal[True] | None = None  # written for a mission of which nobody named the aircraft
     airspeed_mps: Annotated[float, within(15.0, 60.0)] | None = None
     max_bank_deg: Annotated[float, within(5.0, 60.0)] = 30.0
     autopilot: Name | None = None

@@ -59,7 +59,7 @@ def implied_scenario(
     >>> scenario.external, scenario.bounds.round().tolist()
     (True, [[-2000.0, 2000.0], [-2000.0, 3110.0]])
     """
-    flight = flight or FlightTable()
+    flight = flight or FlightTable(aircraft_by_default=True)
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
     box, flown = _boxes(mission, itinerary, origin)

@@ -349,13 +349,20 @@ def _with_airspeed(place: PlacedStop, default: float, by_value: bool) -> PlacedS
     return PlacedStop(replace(place.stop, airspeed=default if math.isnan(stated) else stated), place.position)
 
 
+# Share of the airspeed by which a ground station's estimate differs where it is likely of another aircraft.
+FAR_SPEED = 0.2
+
+
 def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, notes: Notes) -> None:
     """Note a cruiseSpeed other than the default airspeed (m/s), if that is flown to the first stop."""
-    if mission.cruise_speed not in (None, airspeed) and first.airspeed == airspeed:
-        notes.add(
+    if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first.airspeed == airspeed:
+        text = (
             f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
             f" started at {airspeed:g} m/s"
         )
+        if abs(mission.cruise_speed - airspeed) > FAR_SPEED * airspeed:
+            text += f" (--aircraft names yours, --airspeed {mission.cruise_speed:g} flies it so)"
+        notes.add(text)
 
 
 def _own_radius(limits: Limits | None) -> OwnRadius:

@@ -184,6 +184,7 @@ class _Item(_Table):
 class _Mission(_Table):
     version: Annotated[int, Field(ge=2, le=2)]
     cruiseSpeed: Annotated[float, Field(ge=0.0, le=_FASTEST)] | None = None
+    vehicleType: int | None = None
     plannedHomePosition: Annotated[list[_Unset], Field(min_length=3, max_length=3)] | None = None
     items: Annotated[list[_Item], Field(max_length=MAX_ITEMS)]
 
@@ -220,6 +221,24 @@ class _File(_Table):
     rallyPoints: _Rally = _Rally()
 
 
+# What a plan can be for that is no fixed wing, by MAV_TYPE (MAVLink's common.xml).
+_OTHER_VEHICLES = (
+    ((2, 3, 4, 13, 14, 15, 29, 35, 43), "a multicopter or helicopter"),
+    ((7, 8), "a balloon or airship"),
+    ((10,), "a rover"),
+    ((11, 12), "a boat or submarine"),
+    ((19, 20, 21, 22, 23, 24, 25), "a VTOL aircraft"),
+)
+
+
+def _check_vehicle(kind: int | None, source: str) -> None:
+    """Raise MissionError for a plan that was made for another kind of vehicle than an aeroplane."""
+    for kinds, name in _OTHER_VEHICLES:
+        if kind in kinds:
+            allowed = f"{name}: planfly flies fixed-wing aircraft (1)"
+            raise MissionError.at(source, "mission.vehicleType", kind, allowed)
+
+
 def parse_plan_file(text: str, source: str) -> Mission:
     """Read the text of a `.plan` file; ``source`` names it in messages.
 
@@ -235,6 +254,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         file = _File.model_validate(data)
     except ValidationError as error:
         raise MissionError(**first_fault(error, data).at(source)) from error
+    _check_vehicle(file.mission.vehicleType, source)
     items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
     if not (items or file.geoFence.circles or file.geoFence.polygons or file.rallyPoints.points):
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
+from logs.verdict.conditions import condition_lines, navigation_text
 from logs.verdict.findings import Finding, Verdict, left_open
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
@@ -13,11 +14,6 @@ from world.html_table import html_table
 
 # Failed findings that the first line names.
 _NAMED = 4
-_NAV = {
-    "perfect": "exact",
-    "rtk": "with RTK's error (0.05 m on each axis)",
-    "gnss": "with GNSS's error (1.5 m on each axis)",
-}
 # How the other levels are introduced.
 _LEVELS = {
     "geometry": "By geometry alone",
@@ -131,13 +127,14 @@ def summary_lines(
     levels: Sequence[LevelAnswer],
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Lines of the summary: the answer; whose fault it is; the start; what was not judged; what the levels say.
+    """Lines of the summary: the answer; whose fault it is; start and conditions; what was not judged; the levels.
 
     levels: the verdict's own last, with the headline.
     """
     *others, own = levels
     lines = [own.headline, *_whose_fault(levels, deciding, setup)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
+    lines += condition_lines(setup)
     silent: dict[str, str] = {}
     for item in findings:
         if item.ok is None and RULES[item.rule].explained:
@@ -151,7 +148,7 @@ def summary_lines(
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
     if level == "flown":
-        lines.append(f"Flown by: {setup.autopilot.described(setup.aircraft)}; navigation {_NAV[setup.nav]}")
+        lines.append(f"Flown by: {setup.autopilot.described(setup.aircraft)}; {navigation_text(setup)}")
         lines += _parameter_lines(setup)
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")

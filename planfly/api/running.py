@@ -41,7 +41,7 @@ class Round:
     verdict: on its flight, or on its plan where nothing was flown.
     flown: whether it was flown.
     folder: where its files are.
-    notes: on the mission's route.
+    notes: on the scenario's zones and the mission's route.
     has_log: whether a flight log was written.
     returns_line: returns from a few places of the flight in a line; "" where nothing was flown.
     """
@@ -238,7 +238,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             folder, flown.setup, flown.track, flown.verdict, ended=flown.ended, versions=package_versions(),
             command=task.command, events=flown.events,
         )  # fmt: skip
-    notes = tuple(setup.route.notes)
+    notes = (*setup.scenario.notes, *setup.route.notes)
     line = returns_line(flown.setup, flown.track)
     has_log = len(flown.track) > 0
     return Round(number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=line)

@@ -14,6 +14,7 @@ from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import call, flown_by_options, pilot_options, result_options, scenario_argument
 from planfly.terminal.output import give_answer
+from planfly.terminal.results import print_warnings
 from world.errors import ScenarioError
 from world.interruption import interrupt
 
@@ -79,6 +80,7 @@ def plan(args: argparse.Namespace) -> int:
             overwrite=args.overwrite or args.out is None, stop=stop,
         )  # fmt: skip
     target = filled_pattern(out, made.scenario.name, made.seed)
+    print_warnings(made.scenario.notes)
     _print_plan(made)
     print(f"plan      {target}")
     code = FLYABLE if made.safe else NOT_FLYABLE

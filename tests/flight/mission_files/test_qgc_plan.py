@@ -34,6 +34,22 @@ def test_a_survey_is_its_items(name: str) -> None:
     assert mission.warnings == (f"a.plan: mission.items.1: {name} taken as the 3 simple items that it stands for",)
 
 
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [(2, "a multicopter or helicopter"), (13, "a multicopter or helicopter"), (10, "a rover"), (20, "a VTOL aircraft")],
+)
+def test_a_plan_for_another_kind_of_vehicle_is_a_line(kind: int, name: str) -> None:
+    data = plan_data()
+    data["mission"]["vehicleType"] = kind
+    with pytest.raises(MissionError) as caught:
+        parse_mission(json.dumps(data), "a.plan")
+    assert str(caught.value) == (f"a.plan: mission.vehicleType: {kind}: {name}: planfly flies fixed-wing aircraft (1)")
+    # An aeroplane, and what does not say.
+    for also in (1, 0, None):
+        data["mission"]["vehicleType"] = also
+        assert parse_mission(json.dumps(data), "a.plan").items
+
+
 @pytest.mark.parametrize(("clockwise", "spiral"), [(True, True), (False, True), (True, False)])
 def test_a_landing_pattern_is_three_items(clockwise: bool, spiral: bool) -> None:
     pattern = {
