@@ -107,5 +107,6 @@ def returns_line(setup: FlightSetup, track: Track | None) -> str:
         found = judge_returns(world, return_starts(setup, track, every), every)
     except PlanflyError as error:
         return f"not judged: {error}"
-    stands_in = f" (by ArduPlane's law in place of {setup.autopilot.title}'s)" if world.stands_in else ""
+    own = world.stands_in and not world.other_law
+    stands_in = f" (by ArduPlane's law in place of {setup.autopilot.title}'s)" if own else ""
     return headline(found) + stands_in

@@ -6,10 +6,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Command, Home, Mission, Notes
-from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
+from flight.mission.items import (
+    AMSL,
+    LANDINGS,
+    OVER_HOME,
+    PLACES,
+    TAKEOFFS,
+    Command,
+    Home,
+    Mission,
+    MissionItem,
+    Notes,
+)
+from flight.mission.itinerary import Itinerary, ItineraryStop, Loiter, loiter_of, make_itinerary
 from flight.mission.loiter_circles import PlacedStop
-from flight.mission.return_path import ReturnPlace
+from flight.mission.return_path import LandingStart, ReturnPlace
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
 from world.geometry import leg_courses
@@ -101,6 +112,41 @@ def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) 
         return ()
     heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
     return _return_places(mission, mission.home, origin, heights)
+
+
+def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[LandingStart, ...]:
+    """Where the landing sequences of a mission begin on the map: at the first place after each DO_LAND_START.
+
+    None of a mission without a home, as it has nowhere to return to.  A height that is not stated is home's.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> start = MissionItem(1, Command.DO_LAND_START, Frame.MISSION, (0.0,) * 4, 0.0, 0.0, 0.0)
+    >>> land = MissionItem(2, Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 10.0)
+    >>> landing_starts(Mission(Home(36.5, 8.0, 300.0), (start, land)), GeoOrigin(36.5, 8.0), None)[0][:2]
+    (2, (0.0, 0.0, 310.0))
+    """
+    if mission.home is None:
+        return ()
+    heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
+
+    def placed(item: MissionItem) -> tuple[float, float, float]:
+        stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
+        east, north = on_map(mission.source, (stop,), origin)[0].tolist()
+        return east, north, heights.amsl(stop, east, north, heights.home_amsl())
+
+    found = []
+    for k, mark in enumerate(mission.items):
+        flown_to = PLACES | LANDINGS
+        first = next((one for one in mission.items[k + 1 :] if one.command in flown_to and one.has_position), None)
+        if mark.command != Command.DO_LAND_START or first is None:
+            continue
+        place, loiter = placed(first), loiter_of(first)
+        counted = placed(mark) if mark.has_position else place
+        radius = (loiter or Loiter(0.0)).radius
+        found.append(
+            LandingStart(first.seq, place, counted, loiter is not None, radius, lands=first.command in LANDINGS)
+        )
+    return tuple(found)
 
 
 def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:

@@ -24,7 +24,7 @@ from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE, TRACK_R
 from flight.simulation.turbulence import GUST_FILTERS, step_gusts
 from world.frames import POLYMAP, polymap
 from world.geometry import wrap
-from world.kernels import Record, field_names, inner, record_dtype
+from world.kernels import Record, compiled, field_names, inner, record_dtype
 from world.terrain import Heights, pixel_height
 from world.wind import mean_wind_speed
 
@@ -291,7 +291,7 @@ def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  #
     memory.done = (memory.done and around and memory.circled > UNLIMITED) or memory.circled > longest_circling(radius)
 
 
-@inner
+@compiled
 def longest_circling(radius: float) -> float:  # pragma: no cover - compiled
     """After how long in its circle (m) a return is over, however that was flown, s."""
     longest: float = MOST_CIRCLES * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _SLOW)

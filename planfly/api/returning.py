@@ -10,7 +10,7 @@ from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
-from logs.verdict.returns.returns_text import causes_text, headline, range_text, remedy_text
+from logs.verdict.returns.returns_text import causes_text, headline, landing_text, range_text, remedy_text
 from logs.verdict.returns.suggest_returns import Remedy, suggest_parameters, suggest_rally
 from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario
@@ -53,12 +53,12 @@ class ReturnsFound:
     @property
     def safe(self) -> bool:
         """Whether every return is."""
-        return bool(self.returns.each) and all(one.safe for one in self.returns.each)
+        return self.returns.safe
 
     @property
     def undecided(self) -> bool:
         """Whether none is known to be unsafe, and of some it is not known."""
-        return not self.returns.unsafe and not self.returns.count("low") and bool(self.returns.count("unknown"))
+        return self.returns.undecided
 
     @property
     def headline(self) -> str:
@@ -67,8 +67,8 @@ class ReturnsFound:
 
     @property
     def lines_of_causes(self) -> tuple[str, ...]:
-        """What makes it return, and what does not."""
-        return tuple(causes_text(self.returns.causes))
+        """What makes it return, what does not, and how a return ends."""
+        return (*causes_text(self.returns.causes), *landing_text(self.returns))
 
     @property
     def lines_of_ranges(self) -> tuple[str, ...]:
@@ -91,6 +91,8 @@ class ReturnsFound:
             found.append(
                 f"{self.setup.autopilot.title} would come home by a law that is not flown here: ArduPlane's stands in"
             )
+        if self.returns.lands:
+            found.append("ways to a landing sequence are judged up to its first item; the landing is not")
         parameters = self.setup.autopilot.parameters
         if parameters is None or not parameters.source:
             found.append("no parameter file was given: the settings above are not yours, --params states them")
@@ -190,7 +192,7 @@ def _judged(setup: FlightSetup, track: Track | None, every: float, suggest: bool
     starts = return_starts(setup, track, every)
     with stage(f"flying {len(starts)} returns"):
         found = ReturnsFound(setup, judge_returns(world, starts, every, fly_return))
-    if not suggest or found.safe or not len(starts):
+    if not suggest or found.safe or not found.returns.each:
         return found
     with stage("looking for what would make them safe"):
         remedies = suggest_parameters(world, starts)

@@ -582,7 +582,7 @@ class CauseEntry:
 
     name: str
     does: str
-    """return, land, on, circle, glide, parachute, terminate, level or guided."""
+    """return, land, autoland, on, circle, glide, parachute, terminate, level, guided, landed or never."""
     parameter: str
     """That decides it; empty where none does."""
     value: int
@@ -598,7 +598,7 @@ class ReturnEntry:
     kind: str
     """ground, threat, zone, lost, energy, unknown, low or safe."""
     target: str
-    """home, or a rally point by its number."""
+    """home, or a rally point by its number, or a landing sequence by its first item."""
     reason: str
     """Why there; empty where there is nothing to choose."""
     worst_at_s: float

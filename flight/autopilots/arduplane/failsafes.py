@@ -1,16 +1,30 @@
 """What makes ArduPlane leave its mission, and what it does then, by its parameters.
 
 Read in ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event`, `failsafe_long_on_event` and
-`handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp.
+`handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp; AP_BattMonitor for the thresholds.
 """
 
 from typing import Literal, NamedTuple
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 
-# What it does: "return" to launch by RTL; "land" where the mission has a landing sequence, else it returns; it goes
-# "on" with its mission; or something that brings nobody home.
-Does = Literal["return", "land", "on", "circle", "glide", "parachute", "terminate", "level", "guided"]
+# What it does: "return" to launch by RTL; "land" by the mission's landing sequence; by mode AUTOLAND ("autoland"), or
+# else by RTL; it goes "on" with its mission; it has "landed"; what should happen "never" does, for nothing triggers it;
+# or something that brings nobody home.
+Does = Literal[
+    "return",
+    "land",
+    "autoland",
+    "on",
+    "circle",
+    "glide",
+    "parachute",
+    "terminate",
+    "level",
+    "guided",
+    "landed",
+    "never",
+]
 
 
 class Cause(NamedTuple):
@@ -27,12 +41,13 @@ class Cause(NamedTuple):
 
     @property
     def returns(self) -> bool:
-        """Whether it flies a return to launch."""
-        return self.does in ("return", "land")
+        """Whether it flies a return to launch; a landing is none."""
+        return self.does == "return"
 
 
-_LONG: dict[int, Does] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "land"}
-_SHORT: dict[int, Does] = {0: "on", 1: "circle", 2: "level", 3: "on", 4: "level"}
+_LONG: dict[int, Does] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
+# FBWA without a pilot: wings level, nose level, throttle at its minimum.
+_SHORT: dict[int, Does] = {0: "on", 1: "circle", 2: "glide", 3: "on", 4: "level"}
 # What only a quadplane can do, to land on its rotors (4, 6), is to any other aeroplane what 2 is.
 _BATTERY: dict[int, Does] = {
     0: "on",
@@ -42,18 +57,22 @@ _BATTERY: dict[int, Does] = {
     4: "land",
     5: "parachute",
     6: "land",
-    7: "land",
+    7: "autoland",
 }
-_FENCE: dict[int, Does] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "land"}
+_FENCE: dict[int, Does] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "autoland"}
 
 
-def failsafe_causes(parameters: ArduPilotParameters, *, has_fence: bool) -> tuple[Cause, ...]:
+def failsafe_causes(
+    parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
+) -> tuple[Cause, ...]:
     """What can take an aircraft off its mission in AUTO, in the order in which a person asks.
 
     has_fence: whether the mission carries a fence.
+    has_landing: whether it has a landing sequence; without one a landing is a return.
+    ends_landed: whether it ends on the ground.
 
     >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> made = default_parameters().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1)
+    >>> made = default_parameters().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
     >>> for cause in failsafe_causes(made, has_fence=False):
     ...     print(cause.name, cause.parameter, cause.value, cause.does)
     the pilot's RTL  0 return
@@ -64,15 +83,17 @@ def failsafe_causes(parameters: ArduPilotParameters, *, has_fence: bool) -> tupl
     battery critical BATT_FS_CRT_ACT 0 on
     """
     long = int(parameters.long_failsafe)
-    causes = [Cause("the pilot's RTL", "return"), Cause("the mission's end", "return")]
+    causes = [Cause("the pilot's RTL", "return"), Cause("the mission's end", "landed" if ends_landed else "return")]
     short = int(parameters.short_failsafe)
-    leaves_auto = _SHORT.get(short, "on") != "on" and parameters.throttle_failsafe > 0.0
+    # THR_FAILSAFE 2 notices the loss, and starts no failsafe.
+    notices = parameters.throttle_failsafe == 1.0
+    leaves_auto = _SHORT.get(short, "on") != "on" and notices
     if leaves_auto:
         causes.append(Cause("RC lost for 1.5 s", _SHORT[short], "FS_SHORT_ACTN", short))
-    if parameters.throttle_failsafe == 1.0 and leaves_auto and long == 0:
+    if leaves_auto and long == 0:
         # It is no longer in AUTO, and from any other mode FS_LONG_ACTN 0 is a return.
         causes.append(Cause("RC lost", "return", "FS_SHORT_ACTN", short))
-    elif parameters.throttle_failsafe == 1.0:
+    elif notices:
         causes.append(Cause("RC lost", _LONG.get(long, "on"), "FS_LONG_ACTN", long))
     else:
         causes.append(Cause("RC lost", "on", "THR_FAILSAFE", int(parameters.throttle_failsafe)))
@@ -80,15 +101,35 @@ def failsafe_causes(parameters: ArduPilotParameters, *, has_fence: bool) -> tupl
         causes.append(Cause("station lost", _LONG.get(long, "on"), "FS_LONG_ACTN", long))
     else:
         causes.append(Cause("station lost", "on", "FS_GCS_ENABL", 0))
-    for name, value, parameter in (
-        ("battery low", parameters.low_battery, "BATT_FS_LOW_ACT"),
-        ("battery critical", parameters.critical_battery, "BATT_FS_CRT_ACT"),
-    ):
-        causes.append(Cause(name, _BATTERY.get(int(value), "on"), parameter, int(value)))
+    causes += _of_battery(parameters, has_landing=has_landing)
     if has_fence:
         action = int(parameters.fence_action)
-        if parameters.fence_enable > 0.0:
+        if parameters.fence_enable > 0.0 or parameters.fence_auto_enable > 0.0:
             causes.append(Cause("fence broken", _FENCE.get(action, "on"), "FENCE_ACTION", action))
         else:
             causes.append(Cause("fence broken", "on", "FENCE_ENABLE", 0))
     return tuple(causes)
+
+
+def _of_battery(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
+    """What a low and a critical battery lead to.
+
+    Nothing triggers them without a monitor, or without a threshold.  What BATT_MONITOR is by default depends on the
+    board, so that a file that does not state it is taken to have one.
+    """
+    unstated = "BATT_MONITOR" in parameters.by_origin("default")
+    monitored = unstated or parameters.battery_monitor > 0.0
+    low = parameters.low_voltage > 0.0 or parameters.low_charge > 0.0
+    critical = parameters.critical_voltage > 0.0 or parameters.critical_charge > 0.0
+    found = []
+    for name, value, parameter, triggered in (
+        ("battery low", parameters.low_battery, "BATT_FS_LOW_ACT", low),
+        ("battery critical", parameters.critical_battery, "BATT_FS_CRT_ACT", critical),
+    ):
+        does = _BATTERY.get(int(value), "on")
+        if does == "land" and not has_landing:
+            does = "return"
+        if does != "on" and not (monitored and triggered):
+            does = "never"
+        found.append(Cause(name, does, parameter, int(value)))
+    return found

@@ -101,17 +101,27 @@ DEFINITIONS = {
     "short_failsafe": Definition("FS_SHORT_ACTN", 0.0, 0.0, 4.0),
     "long_failsafe": Definition("FS_LONG_ACTN", 0.0, 0.0, 5.0),
     "station_failsafe": Definition("FS_GCS_ENABL", 0.0, 0.0, 3.0),
+    "terrain_follow": Definition("TERRAIN_FOLLOW", 0.0, 0.0, 2.0**31 - 1.0),
+    "battery_monitor": Definition("BATT_MONITOR", 0.0, 0.0, 255.0),
     "low_battery": Definition("BATT_FS_LOW_ACT", 0.0, 0.0, 7.0),
+    "low_voltage": Definition("BATT_LOW_VOLT", 0.0, -1.0, 1000.0),
+    "low_charge": Definition("BATT_LOW_MAH", 0.0, -1.0, 1e6),
     "critical_battery": Definition("BATT_FS_CRT_ACT", 0.0, 0.0, 7.0),
+    "critical_voltage": Definition("BATT_CRT_VOLT", 0.0, -1.0, 1000.0),
+    "critical_charge": Definition("BATT_CRT_MAH", 0.0, -1.0, 1e6),
     "fence_enable": Definition("FENCE_ENABLE", 0.0, 0.0, 2.0),
+    "fence_auto_enable": Definition("FENCE_AUTOENABLE", 0.0, 0.0, 3.0),
     "fence_action": Definition("FENCE_ACTION", 1.0, 0.0, 8.0),
 }
 # Bit of FLIGHT_OPTIONS that has a return climb to its height before it turns.
 CLIMB_BEFORE_TURN = 1 << 4
+# Bits of TERRAIN_FOLLOW: every mode, and RTL.
+_FOLLOW_ALWAYS, _FOLLOW_HOME = 1 << 0, 1 << 4
 # Of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
 _USUAL_LOITER_RADIUS = 60.0
-# Read, and no flight of ours shows it: a return ends in its circle, where this would have it land.
-NOT_FLOWN = ("RTL_AUTOLAND",)
+# Read, and no flight of ours shows it: a return ends in its circle, where the first would have it land, and on a slope,
+# where the second would have it follow the terrain.
+NOT_FLOWN = ("RTL_AUTOLAND", "TERRAIN_FOLLOW")
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 
@@ -142,8 +152,11 @@ class ArduPilotParameters:
     flight_options: bits; bit 4 has a return climb to its height before it turns.
     rally_limit: m, a nearest rally point further away than this is not flown to; 0 for no limit.
     rally_includes_home: 1 where a return goes home if that is nearer than any rally point; 0 where not.
-    rtl_autoland: 0 where a return stays in its circle; other values have it land.
-    throttle_failsafe to fence_action: when it leaves its mission by itself, and what it does then; see
+    rtl_autoland: 0 where a return stays in its circle; 1 has it go on from there to the mission's landing sequence, 2
+        straight to it, 3 says that sequence is for go-arounds only, 4 goes by the mission's return path.
+    terrain_follow: bits of the modes that follow the terrain.
+    low_voltage, critical_voltage: V.  low_charge, critical_charge: mAh; 0 or less triggers nothing.
+    throttle_failsafe to fence_auto_enable: when it leaves its mission by itself, and what it does then; see
         `flight.autopilots.arduplane.failsafes`.
     """
 
@@ -199,9 +212,16 @@ class ArduPilotParameters:
     short_failsafe: float = field(init=False)
     long_failsafe: float = field(init=False)
     station_failsafe: float = field(init=False)
+    terrain_follow: float = field(init=False)
+    battery_monitor: float = field(init=False)
     low_battery: float = field(init=False)
+    low_voltage: float = field(init=False)
+    low_charge: float = field(init=False)
     critical_battery: float = field(init=False)
+    critical_voltage: float = field(init=False)
+    critical_charge: float = field(init=False)
     fence_enable: float = field(init=False)
+    fence_auto_enable: float = field(init=False)
     fence_action: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -228,6 +248,15 @@ class ArduPilotParameters:
     def climbs_before_turn(self) -> bool:
         """Whether a return climbs to its height before it turns: bit 4 of FLIGHT_OPTIONS."""
         return bool(int(self.flight_options) & CLIMB_BEFORE_TURN)
+
+    @property
+    def follows_terrain_home(self) -> bool:
+        """Whether a return follows the terrain: bit 0 or 4 of TERRAIN_FOLLOW.
+
+        >>> [default_parameters().changed(TERRAIN_FOLLOW=bits).follows_terrain_home for bits in (0, 1, 8, 16)]
+        [False, True, False, True]
+        """
+        return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS | _FOLLOW_HOME))
 
     @property
     def return_radius(self) -> float:

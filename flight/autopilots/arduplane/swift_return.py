@@ -346,11 +346,10 @@ def _fly_return(
     b = waypoints[1]
     estimated, state = np.zeros(1, MOTION)[0], np.zeros(1, STATE)[0]
     own = np.zeros(1, ARDUPILOT_MEMORY)[0]
-    _begin(start, estimated, out)
+    _begin(start, estimated, known, out)
     _fly_to(stages[0], waypoints, estimated, own)
     _take_over(start, parameters, aircraft, excess, state, own)
-    pitch = state.pitch
-    angle = pitch - state.alpha
+    pitch, angle = state.pitch, state.pitch - state.alpha
     dt = NAVIGATION_TICK
     roll_share = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
     pitch_share = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
@@ -359,9 +358,8 @@ def _fly_return(
     stage, used = 0, 0.0
     for tick in range(int(most / dt)):
         time = tick * dt
-        if tick % KEPT_EVERY == 0 and out.rows < way.shape[0]:
-            way[out.rows, 0], way[out.rows, 1], way[out.rows, 2] = estimated.east, estimated.north, estimated.up
-            out.rows += 1
+        if tick % KEPT_EVERY == 0:
+            _keep(estimated, way, out)
         factor = true_by_equivalent(estimated.up)
         is_last = stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - b.centre_east, estimated.north - b.centre_north)
@@ -395,9 +393,15 @@ def _fly_return(
         used += dt * _move(estimated, state, angle, own.throttle_demand, aircraft, excess, power, dt)
     if out.clearance <= 0.0:
         out.ended = HIT
-    if not known:
-        out.clearance = out.clearance_before = math.nan
     out.energy = used / 3600.0 if aircraft.has_power else math.nan
+
+
+@inner
+def _keep(here: Record, way: Floats, out: Record) -> None:  # pragma: no cover - compiled
+    """Keep a place of the way while there is room."""
+    if out.rows < way.shape[0]:
+        way[out.rows, 0], way[out.rows, 1], way[out.rows, 2] = here.east, here.north, here.up
+        out.rows += 1
 
 
 @inner
@@ -427,12 +431,13 @@ def _is_through(
 
 
 @inner
-def _begin(start: Record, estimated: Record, out: Record) -> None:  # pragma: no cover
+def _begin(start: Record, estimated: Record, known: bool, out: Record) -> None:  # pragma: no cover
     """Fill in where it begins, and what is told before anything was flown."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
-    out.clearance, out.clearance_before, out.threat = math.inf, math.inf, -1
+    out.clearance = out.clearance_before = math.inf if known else math.nan
+    out.threat = -1
     out.outside, out.outside_before = math.inf, math.inf
     out.to_circle, out.energy, out.ended, out.rows = math.nan, 0.0, NEVER, 0
 

@@ -1,5 +1,7 @@
 """Is every return to launch safe?  Each start is flown home by ArduPlane's law, and what it meets is judged.
 
+Where RTL_AUTOLAND, or a battery's failsafe, leads to a landing sequence of the mission, the way there is judged.
+
 A return is flown on a point mass (`flight.autopilots.arduplane.swift_return`), in the mean wind.  Those of which that
 could be wrong are flown again in JSBSim by whoever asks, and what was wrong is set right for all like them.
 """
@@ -27,8 +29,16 @@ from flight.autopilots.arduplane.swift_return import (
     point_mass,
     surroundings,
 )
-from flight.mission.placing import return_places
-from flight.mission.return_path import ReturnCircle, ReturnPlace, ReturnTarget, choose_target
+from flight.mission.items import LANDINGS, Command
+from flight.mission.placing import landing_starts, return_places
+from flight.mission.return_path import (
+    LandingStart,
+    ReturnCircle,
+    ReturnPlace,
+    ReturnTarget,
+    choose_target,
+    nearest_landing,
+)
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.path_moves import MOVE
 from logs.verdict.measures.route_requirements import Airspace, airspace_of
@@ -48,6 +58,14 @@ Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "low", "
 KINDS: tuple[Kind, ...] = ("ground", "threat", "zone", "lost", "energy", "unknown", "low", "safe")
 # What of them nobody would call a return that went well.
 UNSAFE = frozenset(KINDS[:5])
+
+# How it comes home: it stays in a circle there; goes on from it to a landing sequence (RTL_AUTOLAND 1); or flies
+# straight to a landing sequence (RTL_AUTOLAND 2, and what "land" means to a battery's failsafe).
+Way = Literal["circle", "on to land", "straight to land"]
+# What leaves returns open, whatever is judged of them: they follow the terrain; the autopilot has another law; mode
+# AUTOLAND lands by a pattern of its own; they go by the mission's return path (RTL_AUTOLAND 4); or the landing sequence
+# begins with the landing itself.
+Open = Literal["terrain", "law", "autoland", "return path", "landing"]
 
 # Nearer than this (m) to a limit the point mass could be wrong: it is within 7 m of 38 flights of ArduPlane.
 UNSURE = 10.0
@@ -111,6 +129,9 @@ class Returns:
     flown: whether they begin on a flown track; on the planned path otherwise.
     again: of those that were flown again in JSBSim, the clearance there less the one on the point mass, m.
     stands_in: whether ArduPlane's law stands in for an autopilot that has none of its own for this.
+    open: what is not judged of them.
+    autoland: RTL_AUTOLAND; None where it is another autopilot's mission.
+    landings: the mission's landing sequences.
     """
 
     each: tuple[ReturnFlown, ...]
@@ -122,6 +143,25 @@ class Returns:
     flown: bool
     again: tuple[float, ...] = ()
     stands_in: bool = False
+    open: tuple[Open, ...] = ()
+    autoland: int | None = None
+    landings: tuple[LandingStart, ...] = ()
+
+    @property
+    def safe(self) -> bool:
+        """Whether every return is, and nothing is left open; a landing at its end is not judged."""
+        return bool(self.each) and not self.open and all(one.safe for one in self.each)
+
+    @property
+    def undecided(self) -> bool:
+        """Whether none is known to be unsafe, and of some it is not known."""
+        wrong = bool(self.unsafe) or self.count("low") > 0
+        return not wrong and (bool(self.open) or self.count("unknown") > 0)
+
+    @property
+    def lands(self) -> bool:
+        """Whether any goes to a landing sequence."""
+        return any(one.target.landing is not None for one in self.each)
 
     @property
     def unsafe(self) -> tuple[ReturnFlown, ...]:
@@ -160,6 +200,8 @@ class ReturnWorld:
 
     parameters: of ArduPlane.  home, rally: on the map.
     aircraft: as a point mass.  around: ground and spheres.
+    stands_in: as of `Returns`.  other_law: whether it stands in for one that returns by a law of its own.
+    landings: the mission's landing sequences.
     """
 
     setup: FlightSetup
@@ -170,6 +212,8 @@ class ReturnWorld:
     around: Surroundings
     airspace: Airspace
     stands_in: bool = False
+    other_law: bool = False
+    landings: tuple[LandingStart, ...] = ()
 
     @property
     def scenario(self) -> Scenario:
@@ -181,11 +225,67 @@ class ReturnWorld:
         """Least height above ground, m."""
         return self.setup.limits.min_clearance
 
-    def target(self, row: Record) -> ReturnTarget:
-        """Where a return from a start goes."""
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """What can take the aircraft off its mission; of another autopilot that is not known."""
+        if self.other_law:
+            return ()
+        mission = self.setup.mission
+        return failsafe_causes(
+            self.parameters,
+            has_fence=bool(mission.fences),
+            has_landing=bool(self.landings),
+            ends_landed=any(item.command in LANDINGS for item in mission.items),
+        )
+
+    @property
+    def way(self) -> Way:
+        """How RTL comes home."""
+        named: dict[int, Way] = {1: "on to land", 2: "straight to land"}
+        return named.get(int(self.parameters.rtl_autoland), "circle") if self.landings else "circle"
+
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """How its returns come home, RTL's first."""
+        lands = any(cause.does == "land" for cause in self.causes) and self.way != "straight to land"
+        return (self.way, "straight to land") if lands else (self.way,)
+
+    @property
+    def open(self) -> tuple[Open, ...]:
+        """What cannot be judged of its returns."""
+        found: dict[Open, bool] = {
+            "terrain": self.parameters.follows_terrain_home,
+            "law": self.other_law,
+            "autoland": any(cause.does == "autoland" for cause in self.causes),
+            "return path": int(self.parameters.rtl_autoland) == 4 and _has_return_path(self.setup),
+            "landing": any(way != "circle" for way in self.ways) and any(one.lands for one in self.landings),
+        }
+        return tuple(name for name, is_so in found.items() if is_so)
+
+    def target(self, row: Record, way: Way | None = None) -> ReturnTarget:
+        """Where a return from a start goes.  way: RTL's if none is stated."""
         rules = ArduPlane(self.parameters).return_rules
         here = (float(row["east"]), float(row["north"]), float(row["up"]))
-        return choose_target(rules, here, self.home, self.rally)
+        way = way or self.way
+        if way == "straight to land" and (landing := nearest_landing(here, self.landings)) is not None:
+            away = math.dist(here[:2], landing.place[:2])
+            name, why = f"the landing sequence at item {landing.item}", self._chosen(landing)
+            return ReturnTarget(landing.place, name, why, away, landing=landing, straight=True)
+        target = choose_target(rules, here, self.home, self.rally)
+        return self.going_on(target) if way == "on to land" else target
+
+    def going_on(self, target: ReturnTarget) -> ReturnTarget:
+        """A return to a circle, with the landing sequence that RTL then goes on to."""
+        landing = nearest_landing(target.position, self.landings) if self.way == "on to land" else None
+        if landing is None:
+            return target
+        reasons = [one for one in (target.reason, self._chosen(landing)) if one]
+        name = f"{target.name}, and on to the landing sequence at item {landing.item}"
+        return target._replace(name=name, reason=", ".join(reasons), landing=landing)
+
+    def _chosen(self, landing: LandingStart) -> str:
+        """Why a landing sequence."""
+        return f"item {landing.item} is of the nearest of {len(self.landings)}" if len(self.landings) > 1 else ""
 
     def with_parameters(self, **values: float) -> "ReturnWorld":
         """The same with other parameters, by ArduPlane's names and in its units."""
@@ -194,6 +294,11 @@ class ReturnWorld:
     def with_rally(self, rally: Sequence[ReturnPlace]) -> "ReturnWorld":
         """The same with other rally points."""
         return replace(self, rally=tuple(rally))
+
+
+def _has_return_path(setup: FlightSetup) -> bool:
+    """Whether a mission has a landing sequence or a return path, which RTL_AUTOLAND 4 goes by."""
+    return any(item.command in (Command.DO_RETURN_PATH_START, Command.DO_LAND_START) for item in setup.mission.items)
 
 
 def return_world(setup: FlightSetup) -> ReturnWorld:
@@ -219,6 +324,8 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         surroundings(setup.scenario),
         airspace_of(setup),
         own is not parameters,
+        own is not None and own is not parameters,
+        landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
     )
 
 
@@ -236,27 +343,35 @@ def judge_returns(
 
     every: s between them.  fly_again: flies a return in JSBSim; None for no such flights.  most: of them.
     """
-    ends = [world.target(row) for row in starts.rows]
-    flown, ways = fly_home(world, starts, ends)
-    each = [
-        _judged(world, starts, k, ends[k], flown[k], ways[k] if ways else np.zeros((0, 3))) for k in range(len(starts))
-    ]
+    each: list[ReturnFlown] = []
     again: list[float] = []
-    if fly_again is not None:
-        each, again = _set_right(world, starts, each, flown, fly_again, most)
-    law = world.parameters
-    setup = world.setup
+    for way in world.ways:
+        if "terrain" in world.open or ("landing" in world.open and way == "straight to land"):
+            continue
+        ends = [world.target(row, way) for row in starts.rows]
+        flown, paths = fly_home(world, starts, ends)
+        ones = [_judged(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY) for k, row in enumerate(flown)]
+        if fly_again is not None and way == "circle":
+            ones, apart = _set_right(world, starts, ones, flown, fly_again, most)
+            again += apart
+        each += ones
     return Returns(
         each=tuple(each),
         every=every,
-        causes=failsafe_causes(law, has_fence=bool(setup.mission.fences)),
+        causes=world.causes,
         limit=world.limit,
         airspace=world.airspace,
-        reserve=RESERVE * setup.battery,
+        reserve=RESERVE * world.setup.battery,
         flown=starts.flown,
         again=tuple(again),
         stands_in=world.stands_in,
+        open=world.open,
+        autoland=None if world.other_law else int(world.parameters.rtl_autoland),
+        landings=world.landings,
     )
+
+
+_NO_WAY: Floats = np.zeros((0, 3))
 
 
 def fly_home(
@@ -270,9 +385,13 @@ def fly_home(
     least: as of `flight.autopilots.arduplane.swift_return.fly_returns`.
     """
     radius = ArduPlane(world.parameters).return_rules.radius
-    circles = [ReturnCircle(*end.position, radius, end.slope_base) for end in ends]
+    circles = [None if end.straight else ReturnCircle(*end.position, radius, end.slope_base) for end in ends]
+    # A landing is not flown: what would begin with it ends where it would go on to it.
+    landings = [end.landing if end.landing and not end.landing.lands else None for end in ends]
     keep = bool(world.airspace.zones)
-    found = fly_returns(starts.rows, circles, world.parameters, world.aircraft, world.around, keep=keep, least=least)
+    found = fly_returns(
+        starts.rows, circles, world.parameters, world.aircraft, world.around, landings=landings, keep=keep, least=least
+    )
     return found.flown, found.ways
 
 

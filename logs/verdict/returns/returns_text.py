@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from flight.autopilots.arduplane.failsafes import Cause
 from flight.mission.return_path import ReturnPlace
-from logs.verdict.returns.judge_returns import KINDS, Kind, ReturnFlown, ReturnRange, Returns
+from logs.verdict.returns.judge_returns import KINDS, Kind, Open, ReturnFlown, ReturnRange, Returns
 from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
 from world.scenario import Scenario
@@ -31,7 +31,8 @@ _MANY: dict[Kind, str] = {
 }
 _DOES = {
     "return": "returns",
-    "land": "goes to its landing sequence, or else returns",
+    "land": "by its landing sequence",
+    "autoland": "by mode AUTOLAND, or else it returns",
     "on": "goes on with its mission",
     "circle": "circles where it is",
     "glide": "glides straight on without its motor, which is no return",
@@ -39,6 +40,15 @@ _DOES = {
     "terminate": "ends its flight there",
     "level": "flies level straight on, which is no return",
     "guided": "circles at the fence's return point",
+    "landed": "has landed",
+    "never": "set, but no threshold triggers it",
+}
+_OPEN: dict[Open, str] = {
+    "terrain": "TERRAIN_FOLLOW has returns follow the terrain, which is not flown here",
+    "law": "the autopilot returns by a law of its own, and ArduPlane's stands in",
+    "autoland": "mode AUTOLAND lands by a pattern of its own",
+    "return path": "RTL_AUTOLAND 4 returns by the mission's return path",
+    "landing": "the landing sequence begins with the landing itself",
 }
 
 
@@ -55,18 +65,26 @@ def headline(returns: Returns) -> str:
     >>> from logs.verdict.measures.route_requirements import Airspace
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'no place to return from'
+    >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, open=("terrain",)))
+    'not judged: TERRAIN_FOLLOW has returns follow the terrain, which is not flown here'
     """
-    total = len(returns.each)
-    if not total:
-        return "no place to return from"
-    wrong = counts_text(returns)
+    reasons = "; ".join(_OPEN[one] for one in returns.open)
+    if not returns.each:
+        return f"not judged: {reasons}" if reasons else "no place to return from"
+    landing = "; the landing is not judged" if returns.lands else ""
+    return (f"not judged in full ({reasons}): " if reasons else "") + _judged(returns) + landing
+
+
+def _judged(returns: Returns) -> str:
+    total, wrong = len(returns.each), counts_text(returns)
     if wrong:
         safe = returns.count("safe")
         return f"of {total} returns {wrong}; {safe} {'is' if safe == 1 else 'are'} safe"
     lowest = min(returns.each, key=lambda one: one.clearance)
     left = min((one.left for one in returns.each if not math.isnan(one.left)), default=math.nan)
     energy = "" if math.isnan(left) else f", and {left:.0f} Wh are left at the least"
-    return f"all {total} returns are safe: never lower than {lowest.clearance:.0f} m above ground{energy}"
+    until = " up to their landing" if returns.lands else ""
+    return f"all {total} returns are safe{until}: never lower than {lowest.clearance:.0f} m above ground{energy}"
 
 
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
@@ -86,12 +104,45 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
 
     back = [f"{cause.name}{stated(cause)}" for cause in causes if cause.returns]
     lines = [f"it returns: {', '.join(back)}"] if back else []
-    others: dict[str, list[str]] = {}
-    for cause in causes:
-        if not cause.returns:
-            others.setdefault(_DOES[cause.does], []).append(f"{cause.name}{stated(cause)}")
-    told = [f"{', '.join(names)}: {does}" for does, names in others.items()]
-    return lines + ([f"it does not: {'; '.join(told)}"] if told else [])
+    for heading, counted in (("it lands", True), ("it does not", False)):
+        others: dict[str, list[str]] = {}
+        for cause in causes:
+            if not cause.returns and (cause.does in ("land", "autoland")) == counted:
+                others.setdefault(_DOES[cause.does], []).append(f"{cause.name}{stated(cause)}")
+        told = [f"{', '.join(names)}: {does}" for does, names in others.items()]
+        lines += [f"{heading}: {'; '.join(told)}"] if told else []
+    return lines
+
+
+def landing_text(returns: Returns) -> list[str]:
+    """What RTL_AUTOLAND has a return do at its end, and what a landing sequence changes; none of another autopilot.
+
+    >>> landing_text(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
+    ['RTL_AUTOLAND 0: a return stays in its circle']
+    """
+    if returns.autoland is None:
+        return []
+    stays = "a return stays in its circle"
+    where = f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(one.item) for one in returns.landings)}"
+    match returns.autoland, bool(returns.landings):
+        case 0, True:
+            told = f"{stays}; with DO_LAND_START in the mission ArduPlane does not arm so"
+        case ((1 | 2), False):
+            told = f"the mission has no DO_LAND_START: {stays}"
+        case 1, True:
+            told = f"from its circle a return goes on to the landing sequence at {where}"
+        case 2, True:
+            told = f"a return flies straight to the landing sequence at {where}"
+        case 3, _:
+            told = f"the landing sequence is for go-arounds only: {stays}"
+        case 4, _:
+            told = "a return goes by the mission's return path, where it has one"
+        case _:
+            told = stays
+    lines = [f"RTL_AUTOLAND {returns.autoland}: {told}"]
+    if returns.landings:
+        lines.append("within the landing sequence a lost transmitter or station changes nothing")
+    return lines
 
 
 def range_text(found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
@@ -116,7 +167,8 @@ def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: S
         case "zone":
             return f"{worst}violates zone {returns.airspace.zones[one.zone].name}"
         case "lost":
-            return f"{worst}does not get to its circle at {one.target.position[2]:.0f} m AMSL"
+            end = "landing sequence" if one.target.landing is not None else "circle"
+            return f"{worst}does not get to its {end} at {one.target.position[2]:.0f} m AMSL"
         case "energy":
             leaves = f"leaves {one.left:.0f} Wh, where {returns.reserve:.0f} Wh are to be left"
             return f"{worst}takes {one.energy:.0f} Wh and {leaves}"

@@ -191,7 +191,7 @@ def suggest_rally(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
     needs, total = _needs(world, starts), len(starts)
     # With the aircraft's own rally points taken away, the rest goes home.
     home = _flown_well(world.with_rally(()), starts, needs, _keep_all)
-    if home.all() or not total:
+    if home.all() or not total or world.way == "straight to land":
         return None
     asked = np.unique(np.linspace(0, total - 1, min(total, _STARTS)).round().astype(int))
     best: tuple[int, tuple[ReturnPlace, ...]] = (int(home.sum()), ())
@@ -322,7 +322,8 @@ class _Search:
         if not pairs:
             return
         first, second = (np.array(column) for column in zip(*pairs, strict=True))
-        ends = [ReturnTarget(place[:3], "", "", 0.0, place.base) for place in (self.places[c] for c in second.tolist())]
+        places = (self.places[c] for c in second.tolist())
+        ends = [self._world.going_on(ReturnTarget(place[:3], "", "", 0.0, place.base)) for place in places]
         starts, needs = self._starts.at(first), self._needs.at(first)
         self._good[first, second] = _ends_well(self._world, starts, ends, needs, _keep_all)
 

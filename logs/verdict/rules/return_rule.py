@@ -70,9 +70,10 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
     if table is None or "rtl" not in table.require:
         return []
     every = max(1.0, setup.path.length / setup.airspeed / _MANY)
+    ok: bool | None
     try:
         returns = judge_returns(return_world(setup), starts(every), every)
-        ok, reason = bool(returns.each) and all(one.safe for one in returns.each), headline(returns)
+        ok, reason = (None if returns.undecided else returns.safe), headline(returns)
     except MissionError as error:
         ok, reason = False, str(error)
     method = "each flown on a point mass by ArduPlane's law"

@@ -51,6 +51,31 @@ def test_parameters_make_it_safe(hill: Path) -> None:
     assert any(cause.name == "RC lost" and cause.returns for cause in found.returns.causes)
 
 
+def test_returns_that_follow_the_terrain_end_with_3(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (hill / "mine.parm").write_text("RTL_ALTITUDE 600\nTERRAIN_FOLLOW 1\n", encoding="utf-8")
+    asked = ["returns", "hill.waypoints", "--scenario", "hill.toml", "--every", "40", "--params", "mine.parm"]
+    assert main([*asked, "--suggest"]) == 3
+    out = capsys.readouterr().out
+    assert out.startswith("returns   not judged: TERRAIN_FOLLOW has returns follow the terrain")
+    assert "safe" not in out
+
+
+def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (hill / "short.waypoints").write_text(mission_text(0.0, 2000.0), encoding="utf-8")
+    asked = ["returns", "short.waypoints", "--scenario", "hill.toml", "--every", "20", "--autopilot-law"]
+    # From before the hill all returns are safe by ArduPlane's law, which is planfly's own guidance's too.
+    assert main([*asked, "ideal"]) == 0
+    assert "it returns: the pilot's RTL" in capsys.readouterr().out
+    assert main([*asked, "px4", "--json", "px4.json"]) == 3
+    out = capsys.readouterr().out
+    assert "not judged in full (the autopilot returns by a law of its own, and ArduPlane's stands in): all " in out
+    assert "PX4 would come home by a law that is not flown here: ArduPlane's stands in" in out
+    for words in ("FS_", "RTL_AUTOLAND", "it returns:", "it does not:"):
+        assert words not in out
+    answer = json.loads((hill / "px4.json").read_text(encoding="utf-8"))
+    assert (answer["exit_code"], answer["safe"], answer["causes"]) == (3, False, [])
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

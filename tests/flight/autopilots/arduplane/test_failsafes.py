@@ -5,10 +5,16 @@ import pytest
 from flight.autopilots.arduplane.failsafes import failsafe_causes
 from flight.autopilots.arduplane.parameters import default_parameters
 
+# A battery that is watched, with both thresholds.
+WATCHED = {"BATT_MONITOR": 4.0, "BATT_LOW_VOLT": 14.0, "BATT_CRT_MAH": 500.0}
 
-def does(name: str, *, has_fence: bool = False, **values: float) -> str:
+
+def does(
+    name: str, *, has_fence: bool = False, has_landing: bool = False, ends_landed: bool = False, **values: float
+) -> str:
     """What it does on this cause; "" where the cause is none."""
-    causes = failsafe_causes(default_parameters().changed(**values), has_fence=has_fence)
+    made = default_parameters().changed(**values)
+    causes = failsafe_causes(made, has_fence=has_fence, has_landing=has_landing, ends_landed=ends_landed)
     return next((cause.does for cause in causes if cause.name == name), "")
 
 
@@ -20,10 +26,11 @@ def does(name: str, *, has_fence: bool = False, **values: float) -> str:
         (0, 1, "", "return"),
         (0, 2, "", "glide"),
         (0, 4, "", "on"),
-        (0, 5, "", "land"),
+        (0, 5, "", "autoland"),
         # From CIRCLE, FBWA or FBWB "continue" is a return; from AUTO alone it is not.
         (1, 0, "circle", "return"),
-        (2, 0, "level", "return"),
+        # FBWA holds wings and nose level with the throttle at its minimum: a glide.  FBWB holds its height.
+        (2, 0, "glide", "return"),
         (4, 0, "level", "return"),
         (1, 2, "circle", "glide"),
         (1, 4, "circle", "on"),
@@ -32,28 +39,65 @@ def does(name: str, *, has_fence: bool = False, **values: float) -> str:
 def test_a_lost_transmitter(short: int, long: int, first: str, then: str) -> None:
     values = {"FS_SHORT_ACTN": float(short), "FS_LONG_ACTN": float(long)}
     assert (does("RC lost for 1.5 s", **values), does("RC lost", **values)) == (first, then)
-    # Without the failsafe nobody notices.
-    assert (does("RC lost for 1.5 s", **values, THR_FAILSAFE=0.0), does("RC lost", **values, THR_FAILSAFE=0.0)) == (
-        "",
-        "on",
-    )
+    # Without the failsafe nobody notices; with THR_FAILSAFE 2 the loss is noticed, and no failsafe begins.
+    for unset in (0.0, 2.0):
+        told = does("RC lost for 1.5 s", **values, THR_FAILSAFE=unset), does("RC lost", **values, THR_FAILSAFE=unset)
+        assert told == ("", "on")
 
 
 @pytest.mark.parametrize(
-    ("action", "done"),
-    [(0, "on"), (1, "return"), (2, "land"), (3, "terminate"), (4, "land"), (5, "parachute"), (6, "land")],
+    ("action", "done", "without"),
+    [
+        (0, "on", "on"),
+        (1, "return", "return"),
+        (2, "land", "return"),
+        (3, "terminate", "terminate"),
+        (4, "land", "return"),
+        (5, "parachute", "parachute"),
+        (6, "land", "return"),
+        (7, "autoland", "autoland"),
+    ],
 )
-def test_a_low_battery(action: int, done: str) -> None:
-    """Landing on rotors falls through to a landing, for an aeroplane without them."""
-    assert does("battery low", BATT_FS_LOW_ACT=float(action)) == done
-    assert does("battery critical", BATT_FS_CRT_ACT=float(action)) == done
+def test_a_low_battery(action: int, done: str, without: str) -> None:
+    """Landing on rotors falls through to a landing, for an aeroplane without them; that to a return without one."""
+    values = {"BATT_FS_LOW_ACT": float(action), "BATT_FS_CRT_ACT": float(action), **WATCHED}
+    for name in ("battery low", "battery critical"):
+        assert does(name, **values, has_landing=True) == done
+        assert does(name, **values) == without
 
 
-@pytest.mark.parametrize(("action", "done"), [(0, "on"), (1, "return"), (6, "guided"), (7, "guided"), (8, "land")])
+@pytest.mark.parametrize(
+    ("values", "low", "critical"),
+    [
+        ({"BATT_MONITOR": 0.0}, "never", "never"),
+        ({"BATT_LOW_VOLT": 0.0}, "never", "return"),
+        ({"BATT_LOW_VOLT": 0.0, "BATT_LOW_MAH": 800.0}, "return", "return"),
+        ({"BATT_CRT_MAH": 0.0}, "return", "never"),
+        ({"BATT_CRT_MAH": 0.0, "BATT_CRT_VOLT": 13.0}, "return", "return"),
+        ({"BATT_MONITOR": 0.0, "BATT_FS_LOW_ACT": 0.0}, "on", "never"),
+    ],
+)
+def test_a_battery_without_monitor_or_threshold_triggers_nothing(
+    values: dict[str, float], low: str, critical: str
+) -> None:
+    made = {"BATT_FS_LOW_ACT": 1.0, "BATT_FS_CRT_ACT": 1.0, **WATCHED, **values}
+    assert (does("battery low", **made), does("battery critical", **made)) == (low, critical)
+
+
+def test_a_monitor_that_nobody_stated_is_the_boards() -> None:
+    assert does("battery low", BATT_FS_LOW_ACT=1.0, BATT_LOW_VOLT=14.0) == "return"
+
+
+@pytest.mark.parametrize(("action", "done"), [(0, "on"), (1, "return"), (6, "guided"), (7, "guided"), (8, "autoland")])
 def test_a_broken_fence(action: int, done: str) -> None:
-    assert does("fence broken", has_fence=True, FENCE_ENABLE=1.0, FENCE_ACTION=float(action)) == done
+    for enabled in ({"FENCE_ENABLE": 1.0}, {"FENCE_AUTOENABLE": 1.0}, {"FENCE_AUTOENABLE": 3.0}):
+        assert does("fence broken", has_fence=True, FENCE_ACTION=float(action), **enabled) == done
+        assert does("fence broken", FENCE_ACTION=float(action), **enabled) == ""
     assert does("fence broken", has_fence=True, FENCE_ENABLE=0.0, FENCE_ACTION=float(action)) == "on"
-    assert does("fence broken", FENCE_ENABLE=1.0, FENCE_ACTION=float(action)) == ""
+
+
+def test_a_mission_that_ends_on_the_ground_does_not_return() -> None:
+    assert (does("the mission's end"), does("the mission's end", ends_landed=True)) == ("return", "landed")
 
 
 def test_a_lost_station() -> None:

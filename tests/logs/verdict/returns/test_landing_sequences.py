@@ -1,0 +1,160 @@
+"""Ways to a landing sequence over the hill, by plain sums; and what is said of a landing, which is not judged."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
+from logs.verdict.returns.return_starts import planned_starts
+from logs.verdict.returns.returns_text import causes_text, headline, landing_text
+from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
+
+EVERY = 4.0
+WATCHED = {"BATT_MONITOR": 4.0, "BATT_LOW_VOLT": 14.0}
+
+
+def row(number: int, command: int, east: float = 0.0, amsl: float = 0.0, north: float = 0.0, p2: float = 0.0) -> str:
+    """A line of a mission file; without a place, one of a command that has none."""
+    lat, lon = (46.0 + north / 111_150.0, 8.0 + east / DEGREE) if east or amsl else (0.0, 0.0)
+    return f"{number}\t0\t0\t{command}\t0\t{p2:g}\t0\t0\t{lat:.7f}\t{lon:.7f}\t{amsl:g}\t1\n"
+
+
+# Over the hill at 600 m to 5 km; a landing sequence that begins 6 km east, at 100 m.
+WAY = HEAD + row(1, 16, 10.0, 600.0) + row(2, 16, 5000.0, 600.0)
+LANDING = WAY + row(3, 189) + row(4, 16, 6000.0, 100.0) + row(5, 21, 7000.0, 1.0)
+
+
+def judged(folder: Path, mission: str = LANDING, more: str = "", **parameters: float) -> Returns:
+    setup = hill_setup(folder, more, mission)
+    world = return_world(setup).with_parameters(**parameters)
+    starts = planned_starts(setup, EVERY)
+    return judge_returns(world, starts.at(np.flatnonzero(starts.rows["east"] < 4900.0)), EVERY)
+
+
+def reaches(found: Returns, kind: str) -> float:
+    """The last place (m east) before the hill's top whose return comes to this."""
+    return max(one.start[0] for one in found.each if one.kind == kind and one.start[0] < 3000.0)
+
+
+def test_it_flies_straight_to_the_landing_sequence_over_what_is_between(tmp_path: Path) -> None:
+    found = judged(tmp_path, RTL_AUTOLAND=2)
+    assert {one.target.name for one in found.each} == {"the landing sequence at item 4"}
+    # From x it sinks 500 m in D = 6000 - x metres, 3 s late at 26 m/s: at the hill, 3000 m before the end, it is at
+    # 100 + 500 * (3000 + 78) / D.  That is the hill's 400 m for D = 5130 m, and 30 m more for D = 4664 m.
+    assert reaches(found, "ground") == pytest.approx(6000.0 - 5130.0, abs=150.0)
+    assert reaches(found, "low") == pytest.approx(6000.0 - 4664.0, abs=150.0)
+    assert all(one.safe for one in found.each if one.start[0] > 1500.0)
+    assert landing_text(found)[0] == "RTL_AUTOLAND 2: a return flies straight to the landing sequence at item 4"
+    assert not found.safe
+    assert headline(found).endswith("are safe; the landing is not judged")
+
+
+def test_it_goes_on_from_its_circle_to_the_landing_sequence(tmp_path: Path) -> None:
+    # At 100 m over home it comes home safely from before the hill, and goes on at 100 m into the hill, 400 m high.
+    stays = judged(tmp_path, RTL_AUTOLAND=0)
+    assert {one.kind for one in stays.each if one.start[0] < 2000.0} == {"safe"}
+    found = judged(tmp_path, RTL_AUTOLAND=1)
+    assert {one.kind for one in found.each} == {"ground"}
+    assert found.each[0].target.name == "home, and on to the landing sequence at item 4"
+    assert found.each[0].clearance_at[0] == pytest.approx(2600.0, abs=200.0)
+    # From 600 m over home it is over the hill at 100 + 500 * 3000 / 6000 m, and hits it; from 900 m at 500 m.
+    assert {one.kind for one in judged(tmp_path, RTL_AUTOLAND=1, RTL_ALTITUDE=600).each} == {"ground"}
+    high = judged(tmp_path, RTL_AUTOLAND=1, RTL_ALTITUDE=900)
+    assert {one.kind for one in high.each} == {"safe"}
+    assert min(one.clearance for one in high.each) == pytest.approx(100.0, abs=25.0)
+    assert high.safe
+    assert headline(high).startswith(f"all {len(high.each)} returns are safe up to their landing: ")
+    assert headline(high).endswith("; the landing is not judged")
+
+
+@pytest.mark.parametrize("value", [1, 2, 4])
+def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path, value: int) -> None:
+    alone, found = judged(tmp_path, WAY), judged(tmp_path, WAY, RTL_AUTOLAND=value)
+    assert [(one.kind, one.target) for one in found.each] == [(one.kind, one.target) for one in alone.each]
+    assert landing_text(found)[0].startswith(f"RTL_AUTOLAND {value}: ")
+    assert not found.open
+
+
+def test_what_each_value_says(tmp_path: Path) -> None:
+    said = [landing_text(judged(tmp_path, RTL_AUTOLAND=value))[0] for value in range(5)]
+    assert "does not arm so" in said[0]
+    assert said[1].endswith("from its circle a return goes on to the landing sequence at item 4")
+    assert "for go-arounds only" in said[3]
+    assert judged(tmp_path, RTL_AUTOLAND=3).each[0].target.name == "home"
+    by_path = judged(tmp_path, RTL_AUTOLAND=4)
+    assert by_path.open == ("return path",)
+    assert not by_path.safe
+
+
+def test_it_goes_to_the_nearest_of_two(tmp_path: Path) -> None:
+    two = LANDING + row(6, 189) + row(7, 31, -500.0, 100.0, 100.0, 150.0) + row(8, 21, -1500.0, 1.0)
+    found = judged(tmp_path, two, RTL_AUTOLAND=2)
+    # 3D distances from x at 600 m to 6000 m and to -500 m, both at 100 m: equal at 2750 m.
+    for one in found.each:
+        if abs(one.start[0] - 2750.0) > 20.0:
+            assert one.target.name == f"the landing sequence at item {7 if one.start[0] < 2750.0 else 4}"
+    assert found.each[0].target.reason == "item 7 is of the nearest of 2"
+    # Its first place is a loiter: flown around at its height, 99 m over the ground.
+    assert found.each[0].kind == "safe"
+    assert found.each[0].clearance == pytest.approx(100.0, abs=8.0)
+
+
+def test_a_landing_itself_is_not_judged(tmp_path: Path) -> None:
+    mission = WAY + row(3, 189) + row(4, 21, 6000.0, 1.0)
+    found = judged(tmp_path, mission, RTL_AUTOLAND=2)
+    assert (found.each, found.open) == ((), ("landing",))
+    assert headline(found) == "not judged: the landing sequence begins with the landing itself"
+    assert found.undecided
+    # The way to the circle is.
+    to_circle = judged(tmp_path, mission, RTL_AUTOLAND=1, RTL_ALTITUDE=600)
+    assert {one.kind for one in to_circle.each} == {"safe"}
+    assert (to_circle.safe, to_circle.undecided) == (False, True)
+
+
+def test_a_battery_that_lands_goes_another_way_than_rtl(tmp_path: Path) -> None:
+    both = judged(tmp_path, RTL_AUTOLAND=0, RTL_ALTITUDE=600, BATT_FS_LOW_ACT=2, **WATCHED)
+    names = ["home", "the landing sequence at item 4"]
+    assert sorted({one.target.name for one in both.each}) == names
+    kinds = {name: {one.kind for one in both.each if one.target.name == name} for name in names}
+    assert kinds["home"] == {"safe"}
+    assert "ground" in kinds["the landing sequence at item 4"]
+    lines = causes_text(both.causes)
+    assert "it lands: battery low (BATT_FS_LOW_ACT 2): by its landing sequence" in lines
+    assert "the mission's end: has landed" in lines[-1]
+    # Nothing triggers it, and it is not flown.
+    unset = judged(tmp_path, RTL_AUTOLAND=0, BATT_FS_LOW_ACT=2, BATT_MONITOR=0)
+    assert {one.target.name for one in unset.each} == {"home"}
+    assert "battery low (BATT_FS_LOW_ACT 2): set, but no threshold triggers it" in causes_text(unset.causes)[-1]
+
+
+def test_mode_autoland_is_not_judged(tmp_path: Path) -> None:
+    found = judged(tmp_path, WAY, FS_LONG_ACTN=5, RTL_ALTITUDE=600)
+    assert found.open == ("autoland",)
+    assert {one.kind for one in found.each} == {"safe"}
+    assert (found.safe, found.undecided) == (False, True)
+
+
+def test_returns_that_follow_the_terrain_are_not_judged(tmp_path: Path) -> None:
+    for bits in (1, 16):
+        found = judged(tmp_path, TERRAIN_FOLLOW=bits)
+        assert (found.each, found.open, found.safe, found.undecided) == ((), ("terrain",), False, True)
+    # Bits of other modes change nothing.
+    assert judged(tmp_path, WAY, TERRAIN_FOLLOW=2 + 8).open == ()
+
+
+def test_what_is_not_judged_is_neither_kept_nor_failed_where_it_is_required(tmp_path: Path) -> None:
+    law = 'params = "mine.parm"\n'
+    for number, (stated, ok) in enumerate(
+        [("RTL_ALTITUDE 600\n", True), ("RTL_ALTITUDE 600\nTERRAIN_FOLLOW 1\n", None)]
+    ):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "mine.parm").write_text(stated, encoding="utf-8")
+        setup = hill_setup(folder, f'[returns]\nrequire = ["rtl"]\n[flight]\nautopilot = "ardupilot"\n{law}', WAY)
+        (one,) = [each for each in judge_geometry(setup).findings if each.rule == "return"]
+        assert one.ok is ok
+    # By PX4's law none is known to be safe.
+    px4 = hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n[flight]\nautopilot = "px4"\n', mission_text(0.0, 2000.0))
+    assert [each.ok for each in judge_geometry(px4).findings if each.rule == "return"] == [None]
