@@ -28,5 +28,7 @@ FORMATS = (
     ElevationFormat("an .npz with `elevation`", ".npz", (b"PK",), "open_npz"),
 )
 SUFFIXES = tuple(known.suffix for known in FORMATS)
+# A list of such files, of which only their names are read (`world.elevation_tiles`).
+VIRTUAL = ".vrt"
 # Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
 EMBEDDED = {"jacksboro": "jacksboro.npz"}

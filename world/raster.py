@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from world.address_space import AddressSpaceError
 from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
+from world.elevation_tiles import is_ground, joined, tile_files
 from world.errors import TerrainError
 from world.files import did_you_mean
 from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, to_geo, to_map, transform_points
@@ -331,7 +332,7 @@ def open_hgt(file: Path, _name: str) -> RasterFile:
 
 
 def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
-    """Open an elevation file or an embedded name.  Relative paths count from ``base``.
+    """Open an elevation file, a folder or .vrt of tiles, or an embedded name.  Relative paths count from ``base``.
 
     datum: what its heights count from, where that is stated; None takes what the file says.
     Raises TerrainError for anything that is not a file of one band in one of `world.elevation_formats.FORMATS`, and for
@@ -347,6 +348,10 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
         allowed = "only local files are read, not URLs or virtual file systems"
         raise TerrainError(f"{path}: terrain path: {allowed}", file=path, allowed=allowed)
     file = Path(path) if base is None else base / path
+    files = tile_files(file) if file.exists() else None
+    if files is not None:
+        tiles = [open_raster(str(tile), None, datum) for tile in files]
+        return joined(tiles, f"{path} ({len(tiles)} tiles)" if len(tiles) > 1 else path)
     if not file.is_file():
         suffixes, known = _listed(SUFFIXES), ", ".join(sorted(EMBEDDED))
         raise TerrainError(
@@ -387,9 +392,6 @@ def _listed(words: Sequence[str]) -> str:
 # ----------------------------------------------------------------------
 # Windows of a raster as terrain.
 
-# Data that is missing without a stated nodata value: these, and what is lower or higher than any ground, m.
-UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
-LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
 # Worst error allowed for the polynomial from map to pixels, in pixels.
 PIXEL_TOLERANCE = 1e-3
 # Places along each side of a window at which mean sea level is looked up.
@@ -430,8 +432,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
             file=raster.name,
         )
     heights = raster.read(top, bottom, left, right)
-    valid = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND) & ~np.isin(heights, UNSTATED_NODATA)
-    heights[~valid] = np.nan
+    heights[~is_ground(heights)] = np.nan
     _count_from_sea_level(heights, raster, top, left)
     to_pixel = fit_polymap(
         lambda e, n: _shifted(raster.to_source, origin, e, n, left, top),

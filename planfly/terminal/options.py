@@ -91,7 +91,8 @@ def world_options(parser: CommandParser) -> None:
 def terrain_option(group: OptionTaker) -> None:
     """The ground."""
     suffixes, names = ", ".join(SUFFIXES), ", ".join(EMBEDDED)
-    group.add_argument("--terrain", metavar="DEM", help=f"elevation file ({suffixes}) or embedded name: {names}")
+    words = f"elevation file ({suffixes}), a folder or .vrt of such tiles, or an embedded name: {names}"
+    group.add_argument("--terrain", metavar="DEM", help=words)
 
 
 def fence_option(group: OptionTaker) -> None:

@@ -73,8 +73,8 @@ VRT = """<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Fl
 <SourceFilename>secret.tif</SourceFilename></SimpleSource></VRTRasterBand></VRTDataset>"""
 
 
-@pytest.mark.parametrize("name", ["a.vrt", "a.tif", "a.hgt", "N46E008.hgt"])
-def test_a_vrt_is_refused_under_any_name(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["a.tif", "a.hgt", "N46E008.hgt"])
+def test_a_vrt_is_refused_under_any_other_name(name: str, tmp_path: Path) -> None:
     write_geotiff(tmp_path / "secret.tif")
     (tmp_path / name).write_text(VRT, encoding="utf-8")
     assert_refused(tmp_path / name, "not a")
@@ -98,7 +98,8 @@ def test_what_is_no_elevation_is_refused(content: bytes, suffix: str, tmp_path: 
     path.write_bytes(content)
     assert_refused(path, "not")
     assert_refused(tmp_path / "missing.tif", "no such file")
-    assert_refused(tmp_path, "no such file")
+    (tmp_path / "empty").mkdir()
+    assert_refused(tmp_path / "empty", "a folder without an elevation file")
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])

@@ -1,0 +1,171 @@
+"""Several tiles as one: the heights of the same ground in one file, seams and overlaps included; what is no mosaic."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.world.made.elevation_files import (
+    BOUNDS,
+    COLS,
+    MIDDLE,
+    NORTH,
+    PITCH,
+    ROWS,
+    WEST,
+    assert_refused,
+    from_origin,
+    made_tile,
+    read_window,
+    write_geotiff,
+    write_hgt,
+    write_raster,
+)
+from world.raster import open_raster, read_terrain, tile_bounds
+
+
+def cut(folder: Path, name: str, rows: slice, cols: slice, shift: float = 0.0, crs: str = "EPSG:4326") -> Path:
+    """A part of the made tile as a file of its own.  shift: of its place, in pixels."""
+    folder.mkdir(exist_ok=True)
+    heights = made_tile()[rows, cols]
+    west, north = WEST + (cols.start + shift) * PITCH, NORTH - rows.start * PITCH
+    return write_raster(folder / name, heights, crs, from_origin(west, north, PITCH, PITCH))
+
+
+def four(folder: Path, overlap: int) -> Path:
+    """The made tile as four, whose seams go through its middle."""
+    row, col = ROWS // 2, COLS // 2
+    for k, rows in enumerate((slice(0, row + overlap), slice(row, ROWS))):
+        for m, cols in enumerate((slice(0, col + overlap), slice(col, COLS))):
+            cut(folder, f"{k}{m}.tif", rows, cols)
+    return folder
+
+
+def vrt(path: Path, names: list[str], relative: int = 1, root: str = "VRTDataset") -> Path:
+    """What gdalbuildvrt writes, as far as it is read."""
+    sources = "".join(
+        f'<ComplexSource><SourceFilename relativeToVRT="{relative}">{name}</SourceFilename></ComplexSource>'
+        for name in names
+    )
+    path.write_text(f'<{root}><VRTRasterBand dataType="Float32" band="1">{sources}</VRTRasterBand></{root}>')
+    return path
+
+
+@pytest.mark.parametrize("overlap", [0, 1, 17])
+@pytest.mark.parametrize("by", ["folder", "vrt"])
+def test_four_tiles_are_the_ground_of_one(overlap: int, by: str, tmp_path: Path) -> None:
+    folder = four(tmp_path / "dem", overlap)
+    whole = read_window(write_geotiff(tmp_path / "whole.tif"))
+    names = [f"dem/{file.name}" for file in sorted(folder.iterdir())]
+    parts = read_window(folder if by == "folder" else vrt(tmp_path / "dem.vrt", names))
+    east, north = np.random.default_rng(1).uniform(-2500.0, 2500.0, (2, 2000))
+    # On the seams themselves, too.
+    east[:100], north[100:200] = 0.0, 0.0
+    assert np.abs(parts.height(east, north) - whole.height(east, north)).max() < 0.01
+    assert parts.source.endswith("(4 tiles)")
+
+
+def test_the_outline_is_that_of_all_tiles(tmp_path: Path) -> None:
+    raster, whole = open_raster(str(four(tmp_path / "dem", 0))), open_raster(str(write_geotiff(tmp_path / "w.tif")))
+    assert raster.shape == whole.shape
+    assert tile_bounds(raster, MIDDLE) == pytest.approx(tile_bounds(whole, MIDDLE), abs=1.0)
+    one = cut(tmp_path / "alone", "a.tif", slice(0, 200), slice(0, 200))
+    assert open_raster(str(tmp_path / "alone")).sha256 == open_raster(str(one)).sha256
+
+
+def test_another_tile_is_another_terrain(tmp_path: Path) -> None:
+    folder = four(tmp_path / "dem", 0)
+    before = open_raster(str(folder)).sha256
+    write_raster(folder / "11.tif", made_tile()[ROWS // 2 :, COLS // 2 :] + 1, "EPSG:4326",
+                 from_origin(WEST + COLS // 2 * PITCH, NORTH - ROWS // 2 * PITCH, PITCH, PITCH))  # fmt: skip
+    assert open_raster(str(folder)).sha256 != before
+
+
+def test_where_one_has_no_data_another_may(tmp_path: Path) -> None:
+    """Of a stated value, and of one that nobody states."""
+    for nodata in (None, -5.0):
+        folder = tmp_path / f"dem{nodata}"
+        folder.mkdir()
+        heights = made_tile()
+        heights[100:200, 100:250] = -9999.0 if nodata is None else nodata
+        write_geotiff(folder / "a.tif", heights, nodata=nodata)
+        cut(folder, "b.tif", slice(90, 210), slice(90, 260))
+        whole = read_window(write_geotiff(tmp_path / "whole.tif"))
+        assert np.abs(read_window(folder).height(0.0, 0.0) - whole.height(0.0, 0.0)) < 0.01
+
+
+def test_the_gap_between_tiles_is_a_gap(tmp_path: Path) -> None:
+    folder = tmp_path / "dem"
+    cut(folder, "west.tif", slice(0, ROWS), slice(0, COLS // 2 - 20))
+    cut(folder, "east.tif", slice(0, ROWS), slice(COLS // 2 + 20, COLS))
+    assert_refused(folder, "no data at east")
+    # Beside it there is ground, the other tile's or not.
+    aside = np.array([[1200.0, 3000.0], [-1000.0, 1000.0]])
+    terrain = read_terrain(open_raster(str(folder)), MIDDLE, aside, 100.0)
+    assert np.isfinite(terrain.height(1500.0, 0.0))
+    assert BOUNDS[0, 0] < aside[0, 0]
+
+
+def test_tiles_of_srtm_share_their_outer_posts(tmp_path: Path) -> None:
+    write_hgt(tmp_path)
+    west = tmp_path / "N46E007.hgt"
+    west.write_bytes(np.full((1201, 1201), 500, dtype=">i2").tobytes())
+    raster = open_raster(str(tmp_path))
+    assert raster.shape == (1201, 2401)
+    assert float(raster.read(600, 601, 0, 1)[0, 0]) == 500.0
+
+
+FAULTS = {
+    "off the grid": (("b.tif", 0.5, "EPSG:4326"), r"b.tif: 0.5 pixels off: pixels on those of .*a.tif are expected"),
+    "another system": (("b.tif", 0.0, "EPSG:4258"), r"b.tif: another reference system"),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_what_is_no_mosaic(case: str, tmp_path: Path) -> None:
+    (name, shift, crs), match = FAULTS[case]
+    folder = tmp_path / "dem"
+    cut(folder, "a.tif", slice(0, ROWS), slice(0, COLS // 2))
+    cut(folder, name, slice(0, ROWS), slice(COLS // 2, COLS), shift, crs)
+    assert_refused(folder, match)
+
+
+def test_another_pitch_is_no_mosaic(tmp_path: Path) -> None:
+    folder = tmp_path / "dem"
+    cut(folder, "a.tif", slice(0, ROWS), slice(0, COLS // 2))
+    coarse = made_tile()[::2, COLS // 2 :: 2]
+    write_raster(
+        folder / "b.tif", coarse, "EPSG:4326", from_origin(WEST + COLS // 2 * PITCH, NORTH, 2 * PITCH, 2 * PITCH)
+    )
+    assert_refused(folder, "b.tif: .* pixels off")
+
+
+def test_no_more_tiles_are_opened_than_may_be(tmp_path: Path) -> None:
+    for k in range(101):
+        (tmp_path / f"{k}.tif").touch()
+    assert_refused(tmp_path, "tiles: 101: at most 100 tiles are read")
+
+
+VIRTUAL = {
+    "no text": (b"\xff\xfe", "cannot be read"),
+    "no XML": (b"II*\0", "not a virtual raster"),
+    "another root": (b"<kml/>", "SourceFilename is missing"),
+    "no source": (b"<VRTDataset/>", "SourceFilename is missing"),
+    "entities": (b'<!DOCTYPE a [<!ENTITY b "c">]><VRTDataset/>', "a document type is declared"),
+    "a warped one": (
+        b'<VRTDataset subClass="VRTWarpedDataset"><SourceFilename>a.tif</SourceFilename></VRTDataset>',
+        "a VRTWarpedDataset computes its pixels",
+    ),
+    "a URL": (b"<VRTDataset><SourceFilename>http://x/a.tif</SourceFilename></VRTDataset>", "only local .tif"),
+    "a virtual path": (b"<VRTDataset><SourceFilename>/vsizip/a.tif</SourceFilename></VRTDataset>", "only local .tif"),
+    "another's file": (b"<VRTDataset><SourceFilename>/etc/passwd</SourceFilename></VRTDataset>", "only local .tif"),
+    "another list": (b"<VRTDataset><SourceFilename>b.vrt</SourceFilename></VRTDataset>", "only local .tif"),
+    "a file that is not there": (b"<VRTDataset><SourceFilename>a.tif</SourceFilename></VRTDataset>", "no such file"),
+}
+
+
+@pytest.mark.parametrize("case", VIRTUAL)
+def test_a_virtual_raster_that_is_none(case: str, tmp_path: Path) -> None:
+    content, match = VIRTUAL[case]
+    (tmp_path / "a.vrt").write_bytes(content)
+    assert_refused(tmp_path / "a.vrt", match)

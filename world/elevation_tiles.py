@@ -1,0 +1,155 @@
+"""Several elevation files as one: the tiles of a folder, of a GDAL virtual raster (.vrt), or of a list.
+
+All tiles lie on one grid: the same reference system, the same pitch, their pixels on each other's where they overlap.
+What no tile covers is a gap.  Of a virtual raster only the names of its files are read, never what else it asks for.
+"""
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.elevation_formats import SUFFIXES, VIRTUAL
+from world.errors import TerrainError
+
+if TYPE_CHECKING:
+    from world.raster import RasterFile
+
+# Tiles of one terrain at most, and bytes of a virtual raster.
+MAX_TILES, _MAX_BYTES = 100, 4 * 2**20
+# Data that is missing without a stated nodata value: these, and what is lower or higher than any ground, m.
+UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
+LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
+# Pixels by which a tile may lie off the grid of the first.
+OFF_GRID = 0.01
+
+
+def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Which heights, m, are of ground, and not of missing data, stated or not.
+
+    >>> is_ground(np.array([-9999.0, 480.0, np.nan], dtype=np.float32)).tolist()
+    [False, True, False]
+    """
+    found: NDArray[np.bool_] = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND)
+    return found & ~np.isin(heights, UNSTATED_NODATA)
+
+
+def tile_files(path: Path) -> list[Path] | None:
+    """The files of a folder or of a virtual raster, sorted by name; None for a file that is neither.
+
+    Raises TerrainError for a folder without elevation files, and for a virtual raster that cannot be read.
+    """
+    if path.is_dir():
+        found = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file())
+        if not found:
+            raise TerrainError(f"{path}: a folder without an elevation file ({', '.join(SUFFIXES)})", file=path)
+    elif path.suffix.lower() == VIRTUAL:
+        found = _virtual_files(path)
+    else:
+        return None
+    if len(found) > MAX_TILES:
+        allowed = f"at most {MAX_TILES} tiles are read; give a folder with those that are needed"
+        raise TerrainError.at(path, "tiles", len(found), allowed)
+    return found
+
+
+def _virtual_files(path: Path) -> list[Path]:
+    """The files that a virtual raster is made of."""
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise TerrainError(f"{path}: a virtual raster has at most {_MAX_BYTES:,} bytes", file=path)
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise TerrainError(f"{path}: cannot be read: {error}", file=path) from error
+    # Entities could name other files, and grow a small file without end.
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise TerrainError(f"{path}: a document type is declared: not allowed in a virtual raster", file=path)
+    try:
+        root = ElementTree.fromstring(text)  # what could grow was refused above
+    except ElementTree.ParseError as error:
+        raise TerrainError(f"{path}: not a virtual raster: {error}", file=path) from error
+    sources = [element for element in root.iter("SourceFilename") if element.text]
+    if root.tag != "VRTDataset" or not sources:
+        raise TerrainError(f"{path}: not a virtual raster of other files: SourceFilename is missing", file=path)
+    if root.get("subClass") is not None:
+        message = f"{path}: a {root.get('subClass')} computes its pixels: only a mosaic of files is read"
+        raise TerrainError(message, file=path)
+    found = []
+    for element in sources:
+        name = str(element.text).strip()
+        if name.startswith("/vsi") or "://" in name or Path(name).suffix.lower() not in SUFFIXES:
+            allowed = f"only local {', '.join(SUFFIXES)} files are read"
+            raise TerrainError.at(path, "SourceFilename", name, allowed)
+        found.append(path.parent / name if element.get("relativeToVRT") == "1" else Path(name))
+    return sorted(set(found))
+
+
+def joined(tiles: Sequence["RasterFile"], name: str) -> "RasterFile":
+    """Tiles as one raster.  name: in messages.
+
+    Where tiles overlap, the first that has data counts.  Raises TerrainError for tiles that are not on one grid.
+    """
+    first = tiles[0]
+    if len(tiles) == 1:
+        return replace(first, name=name)
+    places = [_place(first, tile) for tile in tiles]
+    top, left = (min(place[k] for place in places) for k in (0, 1))
+    rows = max(row + tile.shape[0] for (row, _), tile in zip(places, tiles, strict=True)) - top
+    cols = max(col + tile.shape[1] for (_, col), tile in zip(places, tiles, strict=True)) - left
+    starts = [(row - top, col - left) for row, col in places]
+
+    def read(r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float32]:
+        block = np.full((r1 - r0, c1 - c0), np.nan, dtype=np.float32)
+        for (row, col), tile in zip(starts, tiles, strict=True):
+            low, high = max(r0, row), min(r1, row + tile.shape[0])
+            west, east = max(c0, col), min(c1, col + tile.shape[1])
+            if low < high and west < east:
+                part = block[low - r0 : high - r0, west - c0 : east - c0]
+                empty = ~is_ground(part)
+                if empty.any():
+                    part[empty] = tile.read(low - row, high - row, west - col, east - col)[empty]
+        return block
+
+    corners = np.concatenate([tile.corners for tile in tiles])
+    digest = hashlib.sha256("".join(tile.sha256 for tile in tiles).encode("ascii")).hexdigest()
+    return replace(
+        first,
+        name=name,
+        shape=(rows, cols),
+        to_source=lambda lon, lat: _moved(first.to_source(lon, lat), -left, -top),
+        to_place=lambda col, row: first.to_place(col + left, row + top),
+        corners=corners,
+        sha256=digest,
+        read=read,
+    )
+
+
+def _moved(
+    place: tuple[NDArray[np.float64], NDArray[np.float64]], cols: int, rows: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return place[0] + cols, place[1] + rows
+
+
+def _place(first: "RasterFile", tile: "RasterFile") -> tuple[int, int]:
+    """Row and column of a tile's first pixel on the grid of the first tile.  Raises TerrainError."""
+    if tile.crs != first.crs:
+        allowed = f"the reference system of {first.name} is expected: tiles lie on one grid"
+        raise TerrainError(f"{tile.name}: another reference system: {allowed}", file=tile.name, allowed=allowed)
+    rows, cols = tile.shape
+    lon, lat = tile.to_place(np.array([0.0, cols - 1.0]), np.array([0.0, rows - 1.0]))
+    col, row = first.to_source(lon, lat)
+    found = (round(float(row[0])), round(float(col[0])))
+    off = max(
+        math.hypot(col[0] - found[1], row[0] - found[0]),
+        math.hypot(col[1] - found[1] - (cols - 1), row[1] - found[0] - (rows - 1)),
+    )
+    if not off <= OFF_GRID:
+        allowed = f"pixels on those of {first.name} are expected: resample them to one grid (gdalwarp)"
+        raise TerrainError(f"{tile.name}: {off:.3g} pixels off: {allowed}", file=tile.name, allowed=allowed)
+    return found
