@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from aircraft.identification.alignment import Signals
+from aircraft.identification.flight_record import low_pass
 from aircraft.identification.flow import Flow
 from aircraft.identification.regression import fit_with_prior
 
@@ -45,12 +46,16 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     north, east, _ = thin.velocity.T
     stretches = list(zip(thin.edges[:-1], thin.edges[1:], strict=True))
     # Wind is velocity over the ground less that through the air; the heading's error turns the latter.  A gust is in
-    # the wind as well as in the airspeed and its direction, and would count for the scale: what the scale goes with is
-    # the velocity over the ground less the mean wind, which gusts hardly move.
+    # the wind, in the airspeed and its direction, and after a while in the velocity over the ground, with which the
+    # aircraft drifts: whatever has the gust in it would count for the scale.  What the scale goes with is therefore the
+    # mean airspeed along the course that is flown, smoothed over the time in which gusts change.
     steady = np.empty((2, len(ahead)))
     for first, last in stretches:
-        for k, (ground, air) in enumerate(((north, ahead), (east, right))):
-            steady[k, first:last] = ground[first:last] - np.mean(ground[first:last] - air[first:last])
+        rows = slice(first, last)
+        ground, air = np.column_stack([north[rows], east[rows]]), np.column_stack([ahead[rows], right[rows]])
+        course = low_pass(ground - (ground - air).mean(axis=0), 1.0 / _GUST_SECONDS, thin.hertz)
+        length = np.maximum(1.0, np.hypot(*course.T))
+        steady[:, rows] = (thin.airspeed[rows].mean() / length)[np.newaxis, :] * course.T
     columns = [(steady[0], steady[1]), (-steady[1], steady[0])]
     for first, last in stretches:
         one = np.zeros(len(ahead))
