@@ -52,13 +52,14 @@ def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], pass
         return None
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
     heights, sides = autopilot.height_candidates, autopilot.side_candidates
-    for name, step, far, unit in (*heights, *sides) if failed.rule in _OF_HEIGHT else (*sides, *heights):
+    for name, step, far, unit, least in (*heights, *sides) if failed.rule in _OF_HEIGHT else (*sides, *heights):
         current = values[name]
 
         def with_value(value: float, name: str = name) -> bool:
             return passes(autopilot.with_parameters(**{name: value}))
 
-        passing = _nearest(current, step, far, with_value)
+        # A value below the documented range is none to suggest.
+        passing = _nearest(max(current, least - step), step, far, with_value)
         if passing is not None:
             off = _off(failed, findings)
             return DecidingParameter(name, current, passing, unit, failed.rule, failed.place, off)

@@ -55,6 +55,7 @@ class Parameters(Protocol):
 
     values: every parameter that its law knows.  unused: names that the file states and the law has no use for.
     source: the file that a person gave, "" for none.  not_flown: read, but no flight shows them.
+    beyond: what of the file lies beyond the documented ranges and is flown, with these.
     """
 
     not_flown: ClassVar[tuple[str, ...]]
@@ -69,6 +70,10 @@ class Parameters(Protocol):
 
     @property
     def source(self) -> str:
+        """As above."""
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
         """As above."""
 
     def changed(self, **values: float) -> Self:
@@ -113,12 +118,14 @@ class Candidate(NamedTuple):
     step: the increment that its parameter reference gives, or a few of them.
     far: the farthest value that is tried, within the range that the reference gives.
     unit: of both.
+    least: what is named as passing at the least, in steps from here where the present value is below it.
     """
 
     name: str
     step: float
     far: float
     unit: str
+    least: float = -math.inf
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,8 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # A line of QGroundControl's: vehicle, component, name, value, type.
 _QGC_FIELDS = 5
 _WHOLE = re.compile(r"[0-9]{1,5}")
+# MAV_COMP_ID_AUTOPILOT1; others of a vehicle (a gimbal, a second computer) may have parameters of the same names.
+AUTOPILOT = 1
 _BETWEEN = re.compile(r"[\s,=]+")
 
 
@@ -29,11 +31,13 @@ class Entry:
     """One parameter of a file.
 
     where: file and line, for messages.
+    component: of the vehicle, by MAVLink's numbers.
     """
 
     name: str
     value: float
     where: TextLine
+    component: int = 1
 
 
 def read_parameter_file(path: Path) -> dict[str, Entry]:
@@ -49,7 +53,8 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
     r"""Read the text of a parameter file, in any of the forms; ``source`` names it in messages.
 
     Raises ParameterError with file, line, field, value and what is allowed, for a line that is none, a value that is no
-    finite number, a name that comes twice, and a file without a parameter.
+    finite number, a name that comes twice, and a file without a parameter.  Of a name that several components of a
+    vehicle have, the autopilot's counts.
 
     >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
     >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)
@@ -63,6 +68,11 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
         if not line:
             continue
         entry = _entry(line, TextLine(source, number))
+        if entry.name in found and found[entry.name].component != entry.component:
+            # Two devices of one vehicle: what flies is the autopilot's.
+            if entry.component == AUTOPILOT:
+                found[entry.name] = entry
+            continue
         if entry.name in found:
             first = found[entry.name].where.number
             allowed = "each name is expected once"
@@ -77,9 +87,10 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
 
 
 def _entry(line: str, where: TextLine) -> Entry:
-    fields = line.split("\t")
+    fields, component = line.split("\t"), AUTOPILOT
     if len(fields) == _QGC_FIELDS and _WHOLE.fullmatch(fields[0].strip()):
         name, text = fields[2].strip(), fields[3].strip()
+        component = int(fields[1]) if _WHOLE.fullmatch(fields[1].strip()) else AUTOPILOT
     else:
         fields = _BETWEEN.split(line)
         if len(fields) != 2:
@@ -97,7 +108,7 @@ def _entry(line: str, where: TextLine) -> Entry:
         raise ParameterError(
             f"{where}: {name}: {_shown(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
         )
-    return Entry(name, value, where)
+    return Entry(name, value, where, component)
 
 
 def _shown(text: str) -> str:

@@ -46,6 +46,7 @@ class LoiterRules:
     holds_height: whether on the way to a loiter to a height it holds the height at which it set out.
     climb, sink: its fastest in circles, m/s.
     short: by how much a height may be missed, m.
+    ends_in_circle: whether after a mission's last waypoint it circles about that without end.
 
     >>> LoiterRules().radius, LoiterRules().at_middle
     (0.0, False)
@@ -58,6 +59,17 @@ class LoiterRules:
     climb: float = math.inf
     sink: float = math.inf
     short: float = 0.0
+    ends_in_circle: bool = False
+
+    def end_note(self) -> str:
+        """What comes after the mission's end, a note for people.
+
+        >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
+        'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: not flown, not judged'
+        """
+        name = f"{self.radius_name}, " if self.radius_name else ""
+        circle = f"with {name}{abs(self.radius):g} m"
+        return f"after the last waypoint it circles about that without end, {circle}: not flown, not judged"
 
 
 # Of an autopilot that has none of its own.

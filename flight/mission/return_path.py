@@ -103,6 +103,8 @@ class ReturnRules:
     slope_to_stated_height: whether the slope down to a rally point is drawn to its height over home as if that were a
         height above the sea, and flown no higher than where it begins.  ArduPlane 4.6-dev does that: it holds its
         height at first, and comes down later than a straight slope to the point would have it.
+    rally_height: over a rally point's own height, m, at which it comes there.
+    instead: what of its own rules is flown otherwise, a note for people; "" for nothing.
     holds_height: whether it holds its height until it is over its target and comes down in circles there, and climbs,
         if it has to, in circles where it is, as PX4 does.
 
@@ -120,6 +122,8 @@ class ReturnRules:
     includes_home: bool = False
     slope_to_stated_height: bool = False
     holds_height: bool = False
+    rally_height: float = 0.0
+    instead: str = ""
 
 
 # A slope drawn to so far (m) below its target, and flown no higher than where it begins, is none until the very end.
@@ -196,7 +200,9 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
     count = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
     point = rally[nearest]
     base = point.base if rules.slope_to_stated_height else _FAR_BELOW * rules.holds_height
-    return ReturnTarget((point.east, point.north, point.up), name, f"the nearest {count}", away, base)
+    return ReturnTarget(
+        (point.east, point.north, point.up + rules.rally_height), name, f"the nearest {count}", away, base
+    )
 
 
 def described_return(target: ReturnTarget, rules: ReturnRules, up: float) -> str:

@@ -273,6 +273,13 @@ def lay_route(
     kept = [_with_airspeed(place, default_airspeed, speeds_by_value) for place in placed.stops]
     returning = kept.pop() if placed.itinerary.returns else None
     points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
+    if (
+        loiters.ends_in_circle
+        and returning is None
+        and placed.itinerary.landing is None
+        and kept[-1].stop.loiter is None
+    ):
+        notes.add(loiters.end_note(), kept[-1].stop.item)
     back: dict[str, Any] = {}
     if returning is not None:
         back = _lay_return(placed, returning.stop, points, rules, limits, notes)
@@ -337,6 +344,8 @@ def _lay_return(
         airspeed=stop.airspeed,
     )
     notes.add(described_return(target, rules, here[2]), stop.item)
+    if rules.instead:
+        notes.add(rules.instead, stop.item)
     first = len(points) - 1
     points += lay_return(points, stop, target, rules, ability)
     circle = ReturnCircle(*target.position, rules.radius or ability.circle, target.slope_base)

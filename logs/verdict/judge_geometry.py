@@ -23,8 +23,9 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
 
 
 def unflyable_items(setup: FlightSetup) -> list[Finding]:
-    """What fails of a person's mission by its items alone; planfly writes the items of a plan itself."""
-    return [item for item in mission_findings(setup) if item.ok is False] if setup.plan is None else []
+    """What fails of a mission by its items alone; those of a plan are planfly's own, but for what PX4 asks of them."""
+    asked = setup.plan is None or setup.autopilot.refuses
+    return [item for item in mission_findings(setup) if item.ok is False] if asked else []
 
 
 def geometric_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:

@@ -8,6 +8,7 @@ from logs.verdict.conditions import condition_lines, navigation_text
 from logs.verdict.findings import Finding, Verdict, left_open
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
+from logs.verdict.rules.mission_rule import lacks_landing
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
 from world.html_table import html_table
@@ -144,6 +145,9 @@ def summary_lines(
     lines += [
         f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None
     ]
+    lack = lacks_landing(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
+    if lack and not any(item.rule == "mission" for item in findings):
+        lines.append(f"PX4 would not take it: {lack}")
     lines += _less_error(findings, setup)
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
@@ -183,6 +187,9 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
     said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
     returns = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
     said += f"; read, not flown: {', '.join(returns)}" if returns else ""
+    said += f"; beyond {setup.autopilot.title}'s documented ranges, flown: {', '.join(parameters.beyond)}" * bool(
+        parameters.beyond
+    )
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
         f" {names['default']} {setup.autopilot.title}'s defaults{said}"

@@ -229,6 +229,11 @@ class ArduPilotParameters:
         for (name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=True):
             object.__setattr__(self, name, parameter.value * definition.to_si)
 
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """Nothing: a value beyond its range is refused."""
+        return ()
+
     def changed(self, **values: float) -> "ArduPilotParameters":
         """The same parameters but for these, by ArduPlane's names and in its units.
 

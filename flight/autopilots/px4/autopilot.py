@@ -35,6 +35,13 @@ from world.kernels import Record
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation
 from world.wind import Turbulence
 
+# By RTL_TYPE: what of it is not flown.
+_OTHER_RETURNS = {
+    2: "RTL_TYPE 2, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
+    3: "RTL_TYPE 3, to the nearest of home, rally points and the mission's landing: flown as 0, to no landing",
+    4: "RTL_TYPE 4, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
+}
+
 
 @dataclass(frozen=True)
 class Px4(Autopilot):
@@ -127,15 +134,27 @@ class Px4(Autopilot):
 
     @property
     def return_rules(self) -> ReturnRules:
-        """By RTL_RETURN_ALT and RTL_LOITER_RAD: to the nearest of home and rally points, however far."""
+        """By RTL_RETURN_ALT, above a rally point as above home, RTL_LOITER_RAD and RTL_TYPE, however far that is.
+
+        Facts of PX4's `src/modules/navigator/rtl.cpp`.  RTL_TYPE 0 is the nearest of home and the rally points; 1 (the
+        default of fixed wings) and 5 are the nearest rally point, and home where there is none.  The others, and 1,
+        know a mission's landing too, which is not flown to.
+
+        >>> rules = Px4(default_parameters()).return_rules
+        >>> rules.includes_home, rules.rally_height, rules.instead
+        (False, 100.0, '')
+        """
         made = self.parameters
+        kind = int(made["RTL_TYPE"])
         return ReturnRules(
             height=made["RTL_RETURN_ALT"],
             radius=made["RTL_LOITER_RAD"],
             sink=made["FW_T_SINK_R_SP"],
             rally_limit=0.0,
-            includes_home=True,
+            includes_home=kind in (0, 3),
             holds_height=True,
+            rally_height=made["RTL_RETURN_ALT"],
+            instead=_OTHER_RETURNS.get(kind, ""),
         )
 
     @property
@@ -154,6 +173,7 @@ class Px4(Autopilot):
             climb=min(made["FW_T_CLMB_R_SP"], made["FW_T_CLMB_MAX"]),
             sink=min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
             short=made["NAV_FW_ALT_RAD"],
+            ends_in_circle=True,
         )
 
     @property

@@ -128,13 +128,14 @@ def fly_as_px4(
     if not own.begun:
         _begin(state, estimated, waypoints, memory, parameters, own, factor)
     commanded = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
-    # Guidance is told the equivalent airspeed as if it were a true one.
-    navigate(estimated, waypoints, wind_east, wind_north, commanded, parameters, own, dt)
+    # Guidance is told the true airspeed, and from 1.17 on the equivalent one as if it were that.
+    told = factor if parameters.anticipates else 1.0
+    navigate(estimated, waypoints, wind_east, wind_north, commanded * told, parameters, own, dt)
     # Where PX4 left a circle sooner than the path does, the rest of it is not flown; nor is it over before its time.
     while pieces[memory.piece].leg < own.leg - 1 and memory.piece + 1 < pieces.shape[0]:
         memory.piece += 1
     memory.done = memory.done and is_last(waypoints, own)
-    wanted = max(commanded, own.airspeed_for_ground)
+    wanted = max(commanded, own.airspeed_for_ground / told)
     memory.speed_command = min(parameters.airspeed_max, wanted) * factor
     if own.returning:
         end_return(estimated, waypoints[own.leg + 1], memory, dt)

@@ -184,7 +184,7 @@ def _return(
     if not own.climbed:
         own.height_asked = height
         follow_circle(
-            estimated, own.from_east, own.from_north, parameters.return_radius, wind_east, wind_north,
+            estimated, own.from_east, own.from_north, parameters.loiter_radius, wind_east, wind_north,
             airspeed_demand, parameters, own,
         )  # fmt: skip
         return

@@ -1,10 +1,10 @@
 """PX4's parameters that decide how a fixed wing flies a mission, in SI units and radians.
 
 Names, units, ranges and defaults are those of PX4's parameter reference (docs.px4.io, v1.16 and v1.17), and of the
-`*_params.c` files beside the modules that read them; a range that PX4 itself does not enforce is taken wider where it
-flies outside it (FW_R_LIM is documented from 35 degrees, and 30 is flown).  Of three sources the first that states a
-parameter counts: the file that a person gives, the aircraft, PX4.  What an aircraft is, its folder says once, in
-`ardupilot.parm`: `FROM_ARDUPILOT` lists which of those values are the same quantity in PX4.
+`*_params.c` files beside the modules that read them.  PX4 itself enforces no range: what can be flown is taken, and
+said where it lies beyond the documented one (FW_R_LIM is documented from 35 degrees, and 30 is flown).  Of three
+sources the first that states a parameter counts: the file that a person gives, the aircraft, PX4.  What an aircraft is,
+its folder says once, in `ardupilot.parm`: `FROM_ARDUPILOT` lists which of those values are the same quantity in PX4.
 """
 
 import math
@@ -33,8 +33,9 @@ class Definition(NamedTuple):
 
     name: PX4's.
     default: PX4's, in its unit.
-    low, high: what is taken, in that unit.
+    low, high: what is taken, in that unit: what can be flown.
     to_si: factor to SI and radians.
+    documented: the range of PX4's reference, where that is narrower.
     """
 
     name: str
@@ -42,62 +43,64 @@ class Definition(NamedTuple):
     low: float
     high: float
     to_si: float = 1.0
+    documented: tuple[float, float] | None = None
 
 
 # By the field of `PX4_PARAMETERS`; those that are not flown at the end.
 DEFINITIONS = {
     # Lateral guidance.
-    "npfg_period": Definition("NPFG_PERIOD", 10.0, 1.0, 100.0),
-    "npfg_damping": Definition("NPFG_DAMPING", 0.7, 0.1, 1.0),
+    "npfg_period": Definition("NPFG_PERIOD", 10.0, 0.5, 1000.0, documented=(1.0, 100.0)),
+    "npfg_damping": Definition("NPFG_DAMPING", 0.7, 0.05, 5.0, documented=(0.1, 1.0)),
     "npfg_lower_bound": Definition("NPFG_LB_PERIOD", 1.0, 0.0, 1.0),
     "npfg_upper_bound": Definition("NPFG_UB_PERIOD", 1.0, 0.0, 1.0),
-    "npfg_roll_time": Definition("NPFG_ROLL_TC", 0.5, 0.0, 2.0),
-    "npfg_switch_share": Definition("NPFG_SW_DST_MLT", 0.32, 0.1, 1.0),
-    "npfg_period_safety": Definition("NPFG_PERIOD_SF", 1.5, 1.0, 3.0),
+    "npfg_roll_time": Definition("NPFG_ROLL_TC", 0.5, 0.0, 20.0, documented=(0.0, 2.0)),
+    "npfg_switch_share": Definition("NPFG_SW_DST_MLT", 0.32, 0.0, 10.0, documented=(0.1, 1.0)),
+    "npfg_period_safety": Definition("NPFG_PERIOD_SF", 1.5, 1.0, 10.0),
     "ground_speed_min": Definition("FW_GND_SPD_MIN", 5.0, 0.0, 40.0),
-    "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 65.0, _DEGREE),
+    "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 85.0, _DEGREE, (35.0, 75.0)),
     "roll_slew": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _DEGREE),
-    "roll_time": Definition("FW_R_TC", 0.4, 0.2, 1.0),
-    "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 180.0, _DEGREE),
+    "roll_time": Definition("FW_R_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
+    "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _DEGREE, (0.0, 180.0)),
     # When it turns to the next waypoint.
-    "acceptance": Definition("NAV_ACC_RAD", 10.0, 0.05, 200.0),
-    "height_acceptance": Definition("NAV_FW_ALT_RAD", 10.0, 0.05, 200.0),
+    "acceptance": Definition("NAV_ACC_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
+    "height_acceptance": Definition("NAV_FW_ALT_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "loiter_radius": Definition("NAV_LOITER_RAD", 80.0, -10_000.0, 10_000.0),
     # Height and speed.
-    "climb_reference": Definition("FW_T_CLMB_R_SP", 3.0, 0.5, 15.0),
-    "sink_reference": Definition("FW_T_SINK_R_SP", 2.0, 0.5, 15.0),
-    "climb_max": Definition("FW_T_CLMB_MAX", 5.0, 1.0, 15.0),
-    "sink_min": Definition("FW_T_SINK_MIN", 2.0, 1.0, 15.0),
-    "sink_max": Definition("FW_T_SINK_MAX", 5.0, 1.0, 15.0),
-    "height_time": Definition("FW_T_ALT_TC", 5.0, 2.0, 50.0),
+    "climb_reference": Definition("FW_T_CLMB_R_SP", 3.0, 0.1, 1000.0, documented=(0.5, 15.0)),
+    "sink_reference": Definition("FW_T_SINK_R_SP", 2.0, 0.1, 1000.0, documented=(0.5, 15.0)),
+    "climb_max": Definition("FW_T_CLMB_MAX", 5.0, 0.1, 100.0, documented=(1.0, 15.0)),
+    "sink_min": Definition("FW_T_SINK_MIN", 2.0, 0.1, 100.0, documented=(1.0, 15.0)),
+    "sink_max": Definition("FW_T_SINK_MAX", 5.0, 0.1, 100.0, documented=(1.0, 15.0)),
+    "height_time": Definition("FW_T_ALT_TC", 5.0, 0.1, 1000.0, documented=(2.0, 50.0)),
     "height_rate_share": Definition("FW_T_HRATE_FF", 0.3, 0.0, 1.0),
-    "speed_time": Definition("FW_T_TAS_TC", 5.0, 2.0, 50.0),
-    "pitch_integral": Definition("FW_T_I_GAIN_PIT", 0.1, 0.0, 2.0),
-    "pitch_damping": Definition("FW_T_PTCH_DAMP", 0.1, 0.0, 2.0),
-    "balance_share": Definition("FW_T_SEB_R_FF", 1.0, 0.5, 1.5),
-    "throttle_damping": Definition("FW_T_THR_DAMPING", 0.05, 0.0, 1.0),
-    "throttle_integral": Definition("FW_T_THR_INTEG", 0.02, 0.0, 1.0),
-    "roll_to_throttle": Definition("FW_T_RLL2THR", 15.0, 0.0, 20.0),
+    "speed_time": Definition("FW_T_TAS_TC", 5.0, 0.1, 1000.0, documented=(2.0, 50.0)),
+    "pitch_integral": Definition("FW_T_I_GAIN_PIT", 0.1, 0.0, 20.0, documented=(0.0, 2.0)),
+    "pitch_damping": Definition("FW_T_PTCH_DAMP", 0.1, 0.0, 20.0, documented=(0.0, 2.0)),
+    "balance_share": Definition("FW_T_SEB_R_FF", 1.0, 0.0, 3.0, documented=(0.5, 1.5)),
+    "throttle_damping": Definition("FW_T_THR_DAMPING", 0.05, 0.0, 10.0, documented=(0.0, 1.0)),
+    "throttle_integral": Definition("FW_T_THR_INTEG", 0.02, 0.0, 10.0, documented=(0.0, 1.0)),
+    "roll_to_throttle": Definition("FW_T_RLL2THR", 15.0, 0.0, 200.0, documented=(0.0, 20.0)),
     "speed_weight": Definition("FW_T_SPDWEIGHT", 1.0, 0.0, 2.0),
-    "energy_rate_time": Definition("FW_T_STE_R_TC", 0.4, 0.0, 2.0),
-    "vertical_acceleration": Definition("FW_T_VERT_ACC", 7.0, 1.0, 10.0),
+    "energy_rate_time": Definition("FW_T_STE_R_TC", 0.4, 0.0, 20.0, documented=(0.0, 2.0)),
+    "vertical_acceleration": Definition("FW_T_VERT_ACC", 7.0, 0.1, 100.0, documented=(1.0, 10.0)),
     "speed_deviation": Definition("FW_T_SPD_STD", 0.07, 0.01, 10.0),
     "speed_rate_deviation": Definition("FW_T_SPD_DEV_STD", 0.2, 0.01, 10.0),
     "speed_process_deviation": Definition("FW_T_SPD_PRC_STD", 0.2, 0.01, 10.0),
     "airspeed_min": Definition("FW_AIRSPD_MIN", 10.0, 0.5, 500.0),
     "airspeed_trim": Definition("FW_AIRSPD_TRIM", 15.0, 0.5, 500.0),
     "airspeed_max": Definition("FW_AIRSPD_MAX", 20.0, 0.5, 500.0),
-    "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -60.0, 0.0, _DEGREE),
-    "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 60.0, _DEGREE),
+    "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -80.0, 0.0, _DEGREE, (-60.0, 0.0)),
+    "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 80.0, _DEGREE, (0.0, 60.0)),
     "pitch_trim": Definition("FW_PSP_OFF", 0.0, -90.0, 90.0, _DEGREE),
-    "pitch_time": Definition("FW_P_TC", 0.4, 0.2, 1.0),
+    "pitch_time": Definition("FW_P_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
     "throttle_trim": Definition("FW_THR_TRIM", 0.6, 0.0, 1.0),
     "throttle_min": Definition("FW_THR_MIN", 0.0, 0.0, 1.0),
     "throttle_max": Definition("FW_THR_MAX", 1.0, 0.0, 1.0),
-    "throttle_slew": Definition("FW_THR_SLEW_MAX", 0.0, 0.0, 1.0),
+    "throttle_slew": Definition("FW_THR_SLEW_MAX", 0.0, 0.0, 100.0, documented=(0.0, 1.0)),
     # Return.
     "return_height": Definition("RTL_RETURN_ALT", 100.0, 0.0, 10_000.0),
     "return_radius": Definition("RTL_LOITER_RAD", 80.0, 1.0, 10_000.0),
+    "return_type": Definition("RTL_TYPE", 1.0, 0.0, 5.0),
     # What a mission is taken by.
     "mission_requires": Definition("MIS_TKO_LAND_REQ", 2.0, 0.0, 5.0),
     "landing_angle": Definition("FW_LND_ANG", 5.0, 1.0, 45.0, _DEGREE),
@@ -115,12 +118,11 @@ DEFINITIONS = {
     "weight_base": Definition("WEIGHT_BASE", -1.0, -1.0, 10_000.0),
     "weight_gross": Definition("WEIGHT_GROSS", -1.0, -1.0, 10_000.0),
     "service_ceiling": Definition("FW_SERVICE_CEIL", -1.0, -1.0, 20_000.0),
-    "return_type": Definition("RTL_TYPE", 0.0, 0.0, 5.0),
     "return_descent": Definition("RTL_DESCEND_ALT", 100.0, 0.0, 10_000.0),
     "return_landing": Definition("RTL_LAND_DELAY", -1.0, -1.0, 10_000.0),
 }
 # Read, and no flight of ours shows what another value than PX4's own would do.
-NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-16:])
+NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-15:])
 _BY_NAME = {definition.name: definition for definition in DEFINITIONS.values()}
 # A station saves every parameter of the vehicle, a thousand and more; a person writes down what is of interest.
 _WHOLE_SET = 300
@@ -197,6 +199,20 @@ class Px4Parameters:
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """The values (in PX4's units) that one source states, by name."""
         return {name: value for name, value, stated in self.values if stated == origin}
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """What the file states beyond PX4's documented ranges, which is flown all the same, with the range.
+
+        >>> parameters_of("FW_R_LIM 30", "mine.params").beyond
+        ('FW_R_LIM 30 (35..75)',)
+        """
+        found = []
+        for name, value in self.by_origin("file").items():
+            low, high = _BY_NAME[name].documented or (-math.inf, math.inf)
+            if not low <= value <= high:
+                found.append(f"{name} {value:g} ({low:g}..{high:g})")
+        return tuple(found)
 
     @property
     def is_whole_set(self) -> bool:
@@ -415,5 +431,5 @@ SIDE_CANDIDATES = (
     Candidate("NAV_ACC_RAD", 5.0, 90.0, "m"),
     Candidate("NAV_ACC_RAD", 5.0, 120.0, "m"),
     Candidate("NPFG_PERIOD", 1.0, 5.0, "s"),
-    Candidate("FW_R_LIM", 1.0, 60.0, "deg"),
+    Candidate("FW_R_LIM", 1.0, 60.0, "deg", least=35.0),
 )

@@ -89,8 +89,9 @@ def _set_pitch(
 ) -> None:  # pragma: no cover - compiled
     """Pitch angle for the balance of a climb rate (m/s) and an acceleration (m/s^2) that are demanded."""
     speed = own.airspeed
-    speed_weight = parameters.speed_weight * (1.0 - under) + 2.0 * under
-    height_weight = min(2.0, max(0.0, 2.0 - speed_weight))
+    weight = parameters.speed_weight * (1.0 - under) + 2.0 * under
+    # Beyond the middle, 1, one of the two counts for less, and the other for no more.
+    speed_weight, height_weight = min(1.0, max(0.0, weight)), min(1.0, max(0.0, 2.0 - weight))
     wanted = GRAVITY * climb * height_weight - speed * gain * speed_weight
     amiss = wanted - (GRAVITY * estimated.velocity_up * height_weight - speed * own.airspeed_rate * speed_weight)
     per_angle = speed * GRAVITY
@@ -133,6 +134,6 @@ def _set_throttle(
     throttle += under * (parameters.throttle_max - throttle)
     throttle = min(parameters.throttle_max, max(parameters.throttle_min, throttle))
     if parameters.throttle_slew > 0.0:
-        step = parameters.throttle_slew * dt
+        step = parameters.throttle_slew * (parameters.throttle_max - parameters.throttle_min) * dt
         throttle = min(own.throttle_demand + step, max(own.throttle_demand - step, throttle))
     own.throttle_demand = throttle

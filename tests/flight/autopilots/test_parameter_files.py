@@ -80,3 +80,10 @@ def test_what_is_no_text_file_is_refused(tmp_path: Path) -> None:
     file.write_bytes(b" " * (MAX_BYTES + 1))
     with pytest.raises(ParameterError, match="has at most"):
         read_parameter_file(file)
+
+
+@pytest.mark.parametrize("order", [(1, 51), (51, 1)])
+def test_of_several_components_the_autopilots_counts(order: tuple[int, int]) -> None:
+    value = {1: 90.0, 51: 20.0}
+    text = "".join(f"1\t{component}\tNAV_ACC_RAD\t{value[component]}\t9\n" for component in order)
+    assert parse_parameters(text, "a.params")["NAV_ACC_RAD"].value == 90.0

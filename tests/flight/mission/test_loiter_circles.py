@@ -244,3 +244,12 @@ def test_a_circle_left_when_its_time_is_over_is_drawn_no_longer() -> None:
     # 60 s at 25 m/s are 1.59 circles of 150 m.
     assert 0.59 < circled(laid_for(LoiterRules(at_middle=True), *lines), 2)[0] < 1.59
     assert 1.59 < circled(laid_for(LoiterRules(), *lines), 2)[0] < 2.59
+
+
+def test_what_comes_after_the_last_waypoint_is_said() -> None:
+    rules = LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True)
+    note = "item 2: after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: not flown"
+    assert any(line.startswith(note) for line in laid_for(rules, wp(0, -1500), wp(0, 0)).notes)
+    for last in (wp(0, 0, command=17, p="0 0 150 0"), "3 20 0 0 0 0 0 0 0", wp(0, 0, command=21)):
+        assert not any("without end" in line for line in laid_for(rules, wp(0, -1500), wp(900, -1500), last).notes)
+    assert not any("without end" in line for line in laid_for(LoiterRules(), wp(0, -1500), wp(0, 0)).notes)

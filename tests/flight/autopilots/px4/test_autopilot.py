@@ -10,10 +10,12 @@ from aircraft.catalog import Aircraft
 from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import load_parameters, parameters_of
+from flight.mission.return_path import ReturnPlace, choose_target
 from flight.simulation.simulate import simulate
 from tests.setups import MakeSetup
 from world.errors import ScenarioError
 from world.scenario import load_scenario, with_flight
+from world.scenario_tables import Px4Version
 
 
 def test_a_scenario_names_it_and_its_version(aerosonde: Aircraft) -> None:
@@ -57,7 +59,27 @@ def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     assert made.speeds_by_value
     assert made.stated_airspeed == (25.0, "FW_AIRSPD_TRIM")
     assert made.stated_bank == pytest.approx(np.radians(40.0))
-    assert (made.return_rules.height, made.return_rules.radius, made.return_rules.includes_home) == (100.0, 80.0, True)
+    assert (made.return_rules.height, made.return_rules.radius) == (100.0, 80.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "up"),
+    [
+        # Home is 1 km away at 300 m, the rally point 3 km at 450 m; RTL_RETURN_ALT is over either.
+        ("", "rally point 1", 570.0),
+        ("RTL_TYPE 0", "home", 420.0),
+        ("RTL_TYPE 1", "rally point 1", 570.0),
+        ("RTL_TYPE 5", "rally point 1", 570.0),
+        ("RTL_TYPE 3", "home", 420.0),
+    ],
+)
+def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> None:
+    rules = Px4(parameters_of(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).return_rules
+    home, rally = ReturnPlace(0.0, 0.0, 300.0), ReturnPlace(0.0, 4000.0, 450.0)
+    target = choose_target(rules, (0.0, 1000.0, 800.0), home, [rally])
+    assert (target.name, target.position[2]) == (name, up)
+    assert choose_target(rules, (0.0, 1000.0, 800.0), home, []).name == "home"
+    assert bool(rules.instead) is (kind == "RTL_TYPE 3")
 
 
 def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
@@ -90,3 +112,15 @@ def test_it_holds_a_leg_in_wind(make_setup: MakeSetup, aerosonde: Aircraft) -> N
     track = simulate(replace(setup, autopilot=Px4(load_parameters(aerosonde))), aerosonde).track
     late = track.time > 40.0
     assert np.abs(track.position[late, 0]).max() < 5.0
+
+
+@pytest.mark.parametrize(("version", "least", "most"), [("1.16", 0.0, 0.5), ("1.17", 3.0, 8.0)])
+def test_the_wind_is_held_by_the_true_airspeed_and_from_1_17_on_by_the_equivalent_one(
+    make_setup: MakeSetup, aerosonde: Aircraft, version: Px4Version, least: float, most: float
+) -> None:
+    # At 3,000 m 25 m/s are 29.0 true.  Of a wind of 12 m/s across asin(12 / 25) = 28.7 degrees are held, not 24.4: the
+    # track is off by what brings 4.2 degrees back, some 5 m.
+    setup = make_setup([[0, 0, 3000.0], [0, 4000, 3000.0]], wind=(12.0, 270.0))
+    track = simulate(replace(setup, autopilot=Px4(load_parameters(aerosonde, None, version))), aerosonde).track
+    off = abs(float(np.median(track.position[track.time > 60.0, 0])))
+    assert least <= off < most

@@ -238,3 +238,13 @@ def test_a_return_climbs_on_the_spot_flies_straight_and_comes_down_at_its_target
     assert own.height_asked == 800.0
     seen(4900.0, 800.0)
     assert own.height_asked == 600.0
+
+
+@pytest.mark.parametrize(("loiters", "returns"), [(150.0, 60.0), (60.0, 150.0)])
+def test_a_return_climbs_with_the_radius_of_loiters(loiters: float, returns: float) -> None:
+    route = waypoints((0.0, 0.0, 500.0), (0.0, 5000.0, 600.0), returns=True, circle=returns, centre_north=5000.0)
+    made = parameters("1.17", NAV_LOITER_RAD=loiters, RTL_LOITER_RAD=returns)
+    own = memory(returning=True, from_up=500.0)
+    # Around the place where it began, to the right: on the circle's east it flies south, with V^2 / r to the west.
+    navigate(flying(loiters, 0.0, 500.0, course=math.pi), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert own.side_acceleration == pytest.approx(25.0**2 / loiters, rel=1e-6)

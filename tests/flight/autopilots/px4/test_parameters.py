@@ -68,9 +68,9 @@ def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde:
 
 
 def test_one_that_is_not_flown_counts_where_it_is_not_px4s_own() -> None:
-    made = parameters_of("FW_T_F_ALT_ERR -1\nRTL_TYPE 1\n", "a.params")
-    assert set(made.by_origin("file")) == {"RTL_TYPE"}
-    assert {"FW_T_F_ALT_ERR", "RTL_TYPE"} <= set(NOT_FLOWN)
+    made = parameters_of("FW_T_F_ALT_ERR -1\nRTL_LAND_DELAY 5\n", "a.params")
+    assert set(made.by_origin("file")) == {"RTL_LAND_DELAY"}
+    assert {"FW_T_F_ALT_ERR", "RTL_LAND_DELAY"} <= set(NOT_FLOWN)
     assert NOT_FLOWN[0] == "FW_USE_AIRSPD"
 
 
@@ -84,9 +84,9 @@ def test_what_a_person_states_otherwise_and_is_not_flown_is_named() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("# x\nFW_R_LIM 66", "a.params:2: FW_R_LIM: 66: allowed 5..65"),
-        ("NAV_ACC_RAD 0", "a.params:1: NAV_ACC_RAD: 0: allowed 0.05..200"),
-        ("NPFG_DAMPING 1.01", "a.params:1: NPFG_DAMPING: 1.01: allowed 0.1..1"),
+        ("# x\nFW_R_LIM 86", "a.params:2: FW_R_LIM: 86: allowed 5..85"),
+        ("NAV_ACC_RAD 0", "a.params:1: NAV_ACC_RAD: 0: allowed 0.05..10000"),
+        ("FW_THR_TRIM 1.01", "a.params:1: FW_THR_TRIM: 1.01: allowed 0..1"),
         ("FW_AIRSPD_MIN 20", "a.params: FW_AIRSPD_MIN 20: must be below FW_AIRSPD_MAX 20"),
         ("FW_THR_MIN 1", "a.params: FW_THR_MIN 1: must be below FW_THR_MAX 1"),
     ],
@@ -141,3 +141,20 @@ def test_the_airspeed_filter_is_the_steady_kalman_filter(deviations: tuple[float
 
 def test_parameters_are_equal_by_value() -> None:
     assert default_parameters() == Px4Parameters(default_parameters().values)
+
+
+def test_what_lies_beyond_the_documented_range_is_flown_and_said() -> None:
+    text = "FW_R_LIM 30\nFW_P_LIM_MAX 70\nNPFG_PERIOD_SF 10\nFW_T_CLMB_R_SP 0.1\nFW_T_SINK_R_SP 40\nFW_T_SEB_R_FF 3\n"
+    made = parameters_of(text, "a.params")
+    assert made.by_origin("file")["FW_T_SINK_R_SP"] == 40.0
+    assert [said.split(" (")[0] for said in made.beyond] == [
+        "FW_R_LIM 30", "FW_T_CLMB_R_SP 0.1", "FW_T_SINK_R_SP 40", "FW_T_SEB_R_FF 3", "FW_P_LIM_MAX 70",
+    ]  # fmt: skip
+    assert made.beyond[0] == "FW_R_LIM 30 (35..75)"
+    assert parameters_of("FW_R_LIM 35\nNAV_ACC_RAD 200", "a.params").beyond == ()
+
+
+def test_a_documented_range_holds_the_default_and_is_within_what_is_taken() -> None:
+    for one in DEFINITIONS.values():
+        if one.documented is not None:
+            assert one.low <= one.documented[0] <= one.default <= one.documented[1] <= one.high

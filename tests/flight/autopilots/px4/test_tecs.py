@@ -93,6 +93,28 @@ def test_a_change_of_speed_takes_half_of_the_energy_there_is(demand: float, thro
     assert own.throttle_demand == pytest.approx(throttle)
 
 
+@pytest.mark.parametrize(("weight", "of_height", "of_speed"), [(0.0, 1.0, 0.0), (1.0, 1.0, 1.0), (2.0, 0.0, 1.0)])
+def test_neither_height_nor_speed_weighs_more_than_one(weight: float, of_height: float, of_speed: float) -> None:
+    # 5 m low: 1 m/s is asked for; 1.25 m/s fast: 0.25 m/s^2 less.  Their angles: g x 1 and 25 x 0.25 by 25 g.
+    own = memory(height_reference=505.0, height_asked=505.0, airspeed_demand=23.75)
+    for _ in range(40):
+        update_tecs(
+            state(airspeed=25.0), flying(), parameters(
+                FW_AIRSPD_MIN=18.0, FW_AIRSPD_TRIM=25.0, FW_AIRSPD_MAX=31.0, FW_T_SPDWEIGHT=weight,
+                FW_T_PTCH_DAMP=0.0, FW_T_I_GAIN_PIT=0.0,
+            ), own, 23.75, 1.0, DT,
+        )  # fmt: skip
+    assert own.pitch_demand == pytest.approx((of_height * G * 1.0 + of_speed * 25.0 * 0.25) / (25.0 * G), rel=1e-3)
+
+
+def test_the_throttles_rate_is_a_share_of_its_range() -> None:
+    own = memory(height_reference=1500.0, height_asked=1500.0, throttle_demand=0.6)
+    # 20 % of the 0.5 from 0.3 to 0.8, each second.
+    for _ in range(10):
+        demanded(own, FW_THR_SLEW_MAX=0.2, FW_THR_MIN=0.3, FW_THR_MAX=0.8)
+    assert own.throttle_demand == pytest.approx(0.6 + 0.2 * 0.5 * 10 * DT)
+
+
 def test_pitch_keeps_to_its_limits_less_the_trim() -> None:
     own = memory(height_reference=1500.0, height_asked=1500.0)
     for _ in range(150):
