@@ -21,6 +21,8 @@ from world.kernels import Record
 
 # It is flown in from so far away, m, so that it is steady where the return begins.
 _LEAD = 500.0
+# A flight that passes the start further away than this, m, across the ground or in height, has not begun there.
+_ASIDE, _HEIGHT = 60.0, 15.0
 # From a waypoint on, a law is late on a slope by this, s; so far ahead in height the waypoint stands.
 _LATE = 3.0
 
@@ -41,7 +43,11 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     track = flown.track
     begin = np.array([float(start["east"]), float(start["north"])])
     near = np.hypot(*(track.position[: round(2.0 * _LEAD / 10.0 * 60.0), :2] - begin).T)
+    if not near.size or float(near.min()) > _ASIDE:
+        return None
     position = track.position[int(np.argmin(near)) :]
+    if abs(float(position[0, 2]) - float(start["up"])) > _HEIGHT:
+        return None
     low = math.nan
     if world.scenario.terrain is not None:
         low = float((position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])).min())

@@ -11,7 +11,7 @@ from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
 from logs.verdict.returns.returns_text import causes_text, headline, landing_text, range_text, remedy_text
-from logs.verdict.returns.suggest_returns import Remedy, suggest_parameters, suggest_rally
+from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
@@ -91,6 +91,8 @@ class ReturnsFound:
             found.append(
                 f"{self.setup.autopilot.title} would come home by a law that is not flown here: ArduPlane's stands in"
             )
+        if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
+            found.append("the battery is guessed: energy is not judged; battery_wh in the scenario states it")
         if self.returns.lands:
             found.append("ways to a landing sequence are judged up to its first item; the landing is not")
         parameters = self.setup.autopilot.parameters
@@ -200,4 +202,4 @@ def _judged(setup: FlightSetup, track: Track | None, every: float, suggest: bool
     remedies += [] if rally is None else [rally]
     with stage(f"flying the returns of {len(remedies)} suggestions"):
         proved = [Suggested(one, judge_returns(one.on(world), starts, every, fly_return)) for one in remedies]
-    return replace(found, suggested=tuple(proved))
+    return replace(found, suggested=tuple(one for one in proved if helps(found.returns, one.returns)))

@@ -3,7 +3,8 @@
 Where RTL_AUTOLAND, or a battery's failsafe, leads to a landing sequence of the mission, the way there is judged.
 
 A return is flown on a point mass (`flight.autopilots.arduplane.swift_return`), in the mean wind.  Those of which that
-could be wrong are flown again in JSBSim by whoever asks, and what was wrong is set right for all like them.
+could be wrong are flown again in JSBSim by whoever asks: what that finds counts for the one that was flown, and where
+it is worse, for all like it.
 """
 
 import math
@@ -20,6 +21,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
 from flight.autopilots.arduplane.swift_return import (
+    CIRCLED,
     HIT,
     NEVER,
     OFF_GROUND,
@@ -48,6 +50,7 @@ from logs.verdict.tolerances import CLEARANCE_TOLERANCE, RESERVE
 from world.errors import MissionError
 from world.kernels import Record, Records
 from world.scenario import Scenario
+from world.wind import mean_wind_speed
 
 Floats = NDArray[np.float64]
 
@@ -69,6 +72,11 @@ Open = Literal["terrain", "law", "autoland", "return path", "landing"]
 
 # Nearer than this (m) to a limit the point mass could be wrong: it is within 7 m of 38 flights of ArduPlane.
 UNSURE = 10.0
+# A return that begins lower than the least height above ground, as after a take-off, is held to the height that it has
+# there, less what its turn takes, m.
+TURN = 2.0
+# A start banked by more than this (rad) is none that a flight in JSBSim could begin at: it is flown in to, straight.
+_BANKED = math.radians(10.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +91,7 @@ class ReturnFlown:
     zone: which zone it goes wrong at, an index of `Returns.airspace`, -1 for none.
     energy: that it takes, Wh; left: what is left then, Wh; NaN where it is not known.
     seconds: to its circle, NaN where it does not get there.
+    floor: height above ground that is asked of it, m: the least height, or what it begins with where that is less.
     """
 
     time: float
@@ -97,6 +106,7 @@ class ReturnFlown:
     energy: float
     left: float
     seconds: float
+    floor: float = math.nan
 
     @property
     def safe(self) -> bool:
@@ -350,7 +360,11 @@ def judge_returns(
             continue
         ends = [world.target(row, way) for row in starts.rows]
         flown, paths = fly_home(world, starts, ends)
-        ones = [_judged(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY) for k, row in enumerate(flown)]
+        asked = floors(world, starts)
+        ones = [
+            _judged(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(asked[k]))
+            for k, row in enumerate(flown)
+        ]
         if fly_again is not None and way == "circle":
             ones, apart = _set_right(world, starts, ones, flown, fly_again, most)
             again += apart
@@ -395,10 +409,25 @@ def fly_home(
     return found.flown, found.ways
 
 
-def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float) -> Kind:
+def floors(world: ReturnWorld, starts: ReturnStarts) -> Floats:
+    """Height above ground (n,) that is asked of the return from each start, m."""
+    begins = heights_above_ground(world, starts)
+    return np.where(begins < world.limit, begins - TURN, world.limit)
+
+
+def heights_above_ground(world: ReturnWorld, starts: ReturnStarts) -> Floats:
+    """Of starts (n,), m; NaN where the ground is not known."""
+    if world.scenario.terrain is None:
+        return np.full(len(starts), math.nan)
+    rows = starts.rows
+    return np.asarray(rows["up"] - world.scenario.terrain.height(rows["east"], rows["north"]), dtype=np.float64)
+
+
+def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float, floor: float) -> Kind:
     """What a flown return comes to.
 
     zone: that it goes wrong at, -1 for none.  left: Wh in the end, NaN where it is not known.
+    floor: height above ground that is asked of it, m.
     """
     if flown["ended"] == HIT:
         return "ground"
@@ -410,13 +439,14 @@ def kind_of(world: ReturnWorld, flown: Record, zone: int, left: float) -> Kind:
         return "lost"
     if left < RESERVE * world.setup.battery:
         return "energy"
-    if flown["ended"] == OFF_GROUND or math.isnan(flown["clearance"]):
-        return "unknown"
-    return "low" if flown["clearance"] < world.limit - CLEARANCE_TOLERANCE else "safe"
+    if flown["clearance"] < floor - CLEARANCE_TOLERANCE:
+        # Wherever it goes after that.
+        return "low"
+    return "unknown" if flown["ended"] == OFF_GROUND or math.isnan(flown["clearance"]) else "safe"
 
 
 def _judged(
-    world: ReturnWorld, starts: ReturnStarts, k: int, target: ReturnTarget, flown: Record, way: Floats
+    world: ReturnWorld, starts: ReturnStarts, k: int, target: ReturnTarget, flown: Record, way: Floats, floor: float
 ) -> ReturnFlown:
     zone = zone_met(world, way) if len(way) > 1 else -1
     guessed = world.setup.envelope.battery_guessed and world.scenario.flight.battery_wh is None
@@ -427,7 +457,7 @@ def _judged(
         time=float(starts.time[k]),
         start=(float(row["east"]), float(row["north"]), float(row["up"])),
         target=target,
-        kind=kind_of(world, flown, zone, left),
+        kind=kind_of(world, flown, zone, left, floor),
         clearance=float(flown["clearance"]),
         clearance_at=tuple(float(flown[f"clearance_{axis}"]) for axis in ("east", "north", "up")),  # type: ignore[arg-type]
         outside=float(flown["outside"]),
@@ -436,6 +466,7 @@ def _judged(
         energy=float(flown["energy"]),
         left=left,
         seconds=float(flown["to_circle"]),
+        floor=floor,
     )
 
 
@@ -462,35 +493,63 @@ def zone_met(world: ReturnWorld, way: Floats) -> int:
 def _set_right(
     world: ReturnWorld, starts: ReturnStarts, each: list[ReturnFlown], flown: Records, fly_again: FlyAgain, most: int
 ) -> tuple[list[ReturnFlown], list[float]]:
-    """Fly the least sure of each stretch of unsure returns in JSBSim, and move the whole stretch as that one moved."""
+    """Fly the least sure of each stretch of unsure returns in JSBSim, and set right what that tells of the stretch."""
     out, differences = list(each), []
-    by_doubt = groupby(range(len(each)), lambda k: _doubt(world, each[k]) < UNSURE)
-    groups = [list(group) for unsure, group in by_doubt if unsure]
-    groups.sort(key=lambda group: min(_doubt(world, each[k]) for k in group))
-    for group in groups[:most]:
-        k = min(group, key=lambda k: _doubt(world, each[k]))
+    by_doubt = groupby(range(len(each)), lambda k: _doubt(each[k]) < UNSURE)
+    groups = [[k for k in group if _is_steady(world, starts.rows[k])] for unsure, group in by_doubt if unsure]
+    stretches = sorted((min(_doubt(each[k]) for k in group), group) for group in groups if group)
+    for _, group in stretches[:most]:
+        k = min(group, key=lambda k: _doubt(each[k]))
         found = fly_again(world, starts.rows[k])
         if found is None:
             continue
-        higher, farther = found[0] - each[k].clearance, found[1] - each[k].outside
-        if math.isfinite(higher):
+        # By how much it was higher, and farther outside spheres, m; 0 where there is nothing to compare.
+        apart = [new - old for new, old in zip(found, (each[k].clearance, each[k].outside), strict=True)]
+        higher, farther = (one if math.isfinite(one) else 0.0 for one in apart)
+        if math.isfinite(apart[0]):
             differences.append(higher)
+        disagrees = max(abs(higher), abs(farther)) > UNSURE
+        out[k] = _moved(world, each[k], flown[k], higher, farther)
+        if disagrees and out[k].kind not in ("ground", "threat"):
+            out[k] = replace(out[k], kind="unknown")
         for j in group:
-            moved = flown[j].copy()
-            moved["clearance"] += higher if math.isfinite(higher) else 0.0
-            moved["outside"] += farther if math.isfinite(farther) else 0.0
-            if each[j].kind in ("ground", "low", "safe"):
-                moved["ended"] = HIT if moved["clearance"] <= 0.0 else 1
-            out[j] = replace(
-                each[j],
-                clearance=float(moved["clearance"]),
-                outside=float(moved["outside"]),
-                kind=kind_of(world, moved, each[j].zone, each[j].left),
-            )
+            if j != k and disagrees and each[j].kind in ("low", "safe"):
+                out[j] = replace(each[j], kind="unknown")
+            elif j != k and not disagrees:
+                # What was flown of one return makes no other better.
+                out[j] = _moved(world, each[j], flown[j], min(0.0, higher), min(0.0, farther))
     return out, differences
 
 
-def _doubt(world: ReturnWorld, one: ReturnFlown) -> float:
-    """How near to what decides it a return comes, m: the ground, the least height above it, or a kill sphere."""
-    near = [abs(one.clearance), abs(one.clearance - world.limit), abs(one.outside)]
-    return min(value for value in near if not math.isnan(value)) if one.kind not in ("zone", "unknown") else math.inf
+def _moved(world: ReturnWorld, one: ReturnFlown, flown: Record, higher: float, farther: float) -> ReturnFlown:
+    """A return that is so much higher and farther outside spheres than it was flown, m."""
+    moved = flown.copy()
+    moved["clearance"] += higher
+    moved["outside"] += farther
+    if moved["clearance"] <= 0.0:
+        moved["ended"] = HIT
+    elif moved["ended"] == HIT:
+        # It was flown on from where it grazed the ground: energy and zones are of the whole way.
+        moved["ended"] = NEVER if math.isnan(one.seconds) else CIRCLED
+    kind = kind_of(world, moved, one.zone, one.left, one.floor)
+    return replace(one, clearance=float(moved["clearance"]), outside=float(moved["outside"]), kind=kind)
+
+
+def _is_steady(world: ReturnWorld, row: Record) -> bool:
+    """Whether an aircraft could be flown in to a start: not far banked, nor slower than it flies."""
+    wind = world.scenario.wind
+    over = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
+    east = float(row["velocity_east"]) + over * math.sin(wind.from_course)
+    north = float(row["velocity_north"]) + over * math.cos(wind.from_course)
+    airspeed = math.hypot(east, north, float(row["velocity_up"]))
+    return abs(float(row["roll"])) <= _BANKED and airspeed >= float(world.aircraft.record.slowest)
+
+
+def _doubt(one: ReturnFlown) -> float:
+    """How near to what decides it a return comes, m: the ground, the height that is asked of it, or a kill sphere."""
+    if one.kind in ("zone", "unknown"):
+        return math.inf
+    near = [abs(one.clearance)]
+    if one.kind != "ground":
+        near += [abs(one.clearance - one.floor), abs(one.outside)]
+    return min((value for value in near if not math.isnan(value)), default=math.inf)

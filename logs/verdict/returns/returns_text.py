@@ -174,6 +174,8 @@ def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: S
             return f"{worst}takes {one.energy:.0f} Wh and {leaves}"
         case "unknown":
             return f"{worst}flies where the elevation is not known"
+    if one.floor < returns.limit:
+        low += " (taking off: it begins lower than the least height)"
     left = "" if math.isnan(one.left) else f", {one.left:.0f} Wh left"
     outside = "" if math.isinf(one.outside) else f", {one.outside:.0f} m outside every missile's sphere"
     return f"{worst}{low} at the least{outside}{left}"

@@ -15,7 +15,16 @@ from numpy.typing import NDArray
 from flight.autopilots.arduplane.parameters import CLIMB_BEFORE_TURN
 from flight.autopilots.arduplane.swift_return import CIRCLED
 from flight.mission.return_path import ReturnPlace, ReturnTarget
-from logs.verdict.returns.judge_returns import ReturnWorld, fly_home, zone_met
+from logs.verdict.returns.judge_returns import (
+    KINDS,
+    TURN,
+    Returns,
+    ReturnWorld,
+    floors,
+    fly_home,
+    heights_above_ground,
+    zone_met,
+)
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import RESERVE
 from world.kernels import Records
@@ -25,8 +34,6 @@ Flags = NDArray[np.bool_]
 
 # What is kept beyond each limit, m: twice what the point mass was wrong by.
 MARGIN = 15.0
-# Less than at the start no return can keep; so much less is allowed for the turn, m.
-_TURN = 2.0
 # m, of RTL_ALTITUDE.
 _STEP = 25.0
 # Heights that RTL_CLIMB_MIN is tried with, m.
@@ -50,6 +57,18 @@ class Remedy:
         return changed if self.rally is None else changed.with_rally(self.rally)
 
 
+def helps(before: Returns, after: Returns) -> bool:
+    """Whether returns with something suggested are better than without: fewer go wrong, and in no way more than before.
+
+    Only of those that come low, and of those that are safe, there may be more.
+    """
+    more = any(after.count(kind) > before.count(kind) for kind in KINDS if kind not in ("low", "safe"))
+    low = after.count("low") > before.count("low") and len(after.unsafe) >= len(before.unsafe)
+    return (
+        not more and not low and (len(after.unsafe) < len(before.unsafe) or after.count("safe") > before.count("safe"))
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class _Needs:
     """What is asked of the return from each start: clearance and distance outside spheres (n,), m."""
@@ -62,19 +81,17 @@ class _Needs:
 
 
 def _needs(world: ReturnWorld, starts: ReturnStarts) -> _Needs:
-    """The limits with their margin, or what the start itself has where that is less."""
-    rows, count = starts.rows, len(starts)
-    clear, outside = np.full(count, math.inf), np.full(count, math.inf)
-    if world.scenario.terrain is not None:
-        ground = world.scenario.terrain.height(rows["east"], rows["north"])
-        clear = np.nan_to_num(rows["up"] - ground, nan=math.inf)
+    """The limits with their margin, or what the start itself has, less what the turn takes, where that is less."""
+    rows = starts.rows
+    outside = np.full(len(starts), math.inf)
+    clear = np.nan_to_num(heights_above_ground(world, starts), nan=math.inf)
     place = np.stack([rows["east"], rows["north"], rows["up"]], axis=1)
     for centre, radius in zip(world.around.spheres, world.around.radii, strict=True):
         if radius > 0.0:
             outside = np.minimum(outside, np.linalg.norm(place - centre, axis=1) - radius)
     return _Needs(
-        np.minimum(world.limit + MARGIN, np.maximum(world.limit, clear - _TURN)),
-        np.minimum(MARGIN, np.maximum(0.0, outside - _TURN)),
+        np.minimum(world.limit + MARGIN, np.maximum(floors(world, starts), clear - TURN)),
+        np.minimum(MARGIN, np.maximum(0.0, outside - TURN)),
     )
 
 

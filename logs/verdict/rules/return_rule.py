@@ -5,6 +5,7 @@ waypoint and no slope to anybody, and what stands for it in the route is not jud
 area, speed, stall and energy are judged on it as on every other leg.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -23,8 +24,8 @@ from logs.verdict.returns.returns_text import headline
 from logs.verdict.rule import Rule
 from world.errors import MissionError
 
-# Returns that are flown where all are required to be safe, about.
-_MANY = 200
+# Returns that are flown where all are required to be safe: one a second, and no more than this, 2 ms each.
+_MOST = 3000
 # Rules that hold a flight to its legs.
 _OF_LEGS = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 
@@ -69,14 +70,14 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
     table = setup.scenario.spec.returns
     if table is None or "rtl" not in table.require:
         return []
-    every = max(1.0, setup.path.length / setup.airspeed / _MANY)
+    every = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MOST)))
     ok: bool | None
     try:
         returns = judge_returns(return_world(setup), starts(every), every)
         ok, reason = (None if returns.undecided else returns.safe), headline(returns)
     except MissionError as error:
         ok, reason = False, str(error)
-    method = "each flown on a point mass by ArduPlane's law"
+    method = f"from every {every:.0f} s of the way, on a point mass by ArduPlane's law"
     return [make_finding("return", FLIGHT, ok=ok, reason=reason, source="scenario", method=method)]
 
 

@@ -1,5 +1,6 @@
 """What returns over a hill come to, by plain sums; and ranges, worst first."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,12 +8,21 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Command, Frame, MissionItem
+from flight.mission.return_path import ReturnPlace
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.returns.judge_returns import KINDS, Returns, badness, judge_returns, return_world
-from logs.verdict.returns.return_starts import planned_starts
+from logs.verdict.returns.judge_returns import (
+    KINDS,
+    ReturnFlown,
+    Returns,
+    ReturnWorld,
+    badness,
+    judge_returns,
+    return_world,
+)
+from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.returns_text import headline, range_text
-from tests.logs.verdict.returns.hill import DEGREE, hill_setup, mission_text
+from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 from world.errors import MissionError
 
 
@@ -107,24 +117,117 @@ def test_a_mission_that_returns_is_asked_up_to_there(tmp_path: Path) -> None:
     assert found.each[-1].time < 270.0
 
 
-def test_a_flight_in_jsbsim_sets_the_unsure_right(tmp_path: Path) -> None:
-    setup = hill_setup(tmp_path)
-    world, starts = return_world(setup), planned_starts(setup, 4.0)
-    before = judge_returns(world, starts, 4.0)
-    asked = []
+class Stub:
+    """A flight in JSBSim that finds each return so much higher, m, and farther outside spheres."""
 
-    def lower(_world: object, row: np.record) -> tuple[float, float]:
-        asked.append(float(row["east"]))
-        one = min(before.each, key=lambda one: abs(one.start[0] - float(row["east"])))
-        return one.clearance - 50.0, one.outside
+    def __init__(self, before: Returns, higher: float, farther: float = 0.0) -> None:
+        self.before, self.higher, self.farther = before, higher, farther
+        self.asked: list[ReturnFlown] = []
 
-    after = judge_returns(world, starts, 4.0, lower, 2)
-    assert len(asked) == 2
-    assert after.again == pytest.approx((-50.0, -50.0))
-    assert after.count("ground") > before.count("ground")
+    def __call__(self, _world: object, row: np.record) -> tuple[float, float]:
+        one = min(self.before.each, key=lambda one: abs(one.start[0] - float(row["east"])))
+        self.asked.append(one)
+        return one.clearance + self.higher, one.outside + self.farther
+
+
+@pytest.fixture
+def hill(tmp_path: Path) -> tuple[ReturnWorld, ReturnStarts, Returns]:
+    """Returns every second: dozens graze the hill, or come within 10 m of the least height over it."""
+    world = return_world(hill_setup(tmp_path))
+    starts = planned_starts(world.setup, 1.0)
+    return world, starts, judge_returns(world, starts, 1.0)
+
+
+@pytest.mark.parametrize("higher", [2.0, 5.0, 9.0, 31.0, 400.0])
+def test_a_flight_that_finds_it_higher_makes_that_one_better_alone(
+    hill: tuple[ReturnWorld, ReturnStarts, Returns], higher: float
+) -> None:
+    world, starts, before = hill
+    stub = Stub(before, higher)
+    after = judge_returns(world, starts, 1.0, stub)
+    asked = {one.time for one in stub.asked}
+    assert 0 < len(asked) <= 4
+    assert after.again == pytest.approx([higher] * len(asked))
+    for old, new in zip(before.each, after.each, strict=True):
+        if old.kind == "ground" and old.time not in asked:
+            assert new.kind == "ground"
+        if old.time not in asked:
+            assert KINDS.index(new.kind) <= KINDS.index(old.kind)
+        if old.time in asked and higher <= 10.0:
+            assert new.clearance == pytest.approx(old.clearance + higher)
+            assert new.kind == ("ground" if new.clearance <= 0.0 else "low" if new.clearance < 29.9 else "safe")
+        # So far apart, neither is believed.
+        if old.time in asked and higher > 10.0:
+            assert new.kind == "unknown"
+
+
+def test_a_flight_that_finds_it_lower_makes_all_like_it_worse(
+    hill: tuple[ReturnWorld, ReturnStarts, Returns],
+) -> None:
+    world, starts, before = hill
+    after = judge_returns(world, starts, 1.0, Stub(before, -8.0), 2)
+    assert after.count("ground") + after.count("low") > before.count("ground") + before.count("low")
+    assert after.count("safe") < before.count("safe")
+    assert not after.count("unknown")
+    # Further apart than it may be: what was flown hits, and nobody knows of the others.
+    stub = Stub(before, -50.0)
+    far = judge_returns(world, starts, 1.0, stub)
+    assert {one.kind for one in far.each if one.time in {asked.time for asked in stub.asked}} == {"ground"}
+    assert far.count("unknown") > 5
     # What could not be flown stays as it was.
-    unflown = judge_returns(world, starts, 4.0, lambda *_: None)
+    unflown = judge_returns(world, starts, 1.0, lambda *_: None)
     assert [(one.kind, one.clearance) for one in unflown.each] == [(one.kind, one.clearance) for one in before.each]
+
+
+def test_one_deep_in_the_ground_is_sure(hill: tuple[ReturnWorld, ReturnStarts, Returns]) -> None:
+    world, starts, before = hill
+    # From 6.5 km it is at 100 + 500 * 3078 / 6500 = 337 m where the ground is 366 m high.
+    deep = {one.time for one in before.each if one.start[0] > 6200.0}
+    assert {(one.kind, one.clearance < -10.0) for one in before.each if one.time in deep} == {("ground", True)}
+    stub = Stub(before, 5.0)
+    judge_returns(world, starts, 1.0, stub, 100)
+    assert not deep & {one.time for one in stub.asked}
+
+
+@pytest.mark.parametrize("changed", [{"roll": 0.3}, {"velocity_east": 3.3}])
+def test_no_flight_begins_where_none_can(
+    hill: tuple[ReturnWorld, ReturnStarts, Returns], changed: dict[str, float]
+) -> None:
+    """Banked by 17 degrees, or at 3.3 m/s, where the aircraft stalls at 17."""
+    world, starts, _ = hill
+    for name, value in changed.items():
+        starts.rows[name] = value
+    judge_returns(world, starts, 1.0, lambda *_: pytest.fail("it was flown"))
+
+
+def test_one_that_begins_low_is_held_to_what_it_has(tmp_path: Path) -> None:
+    """A take-off: the way climbs from 10 m to 100 m over level ground, and the returns go to 100 m."""
+    way = HEAD + "1\t0\t0\t16\t0\t0\t0\t0\t46.0\t8.0010000\t10\t1\n2\t0\t0\t16\t0\t0\t0\t0\t46.0\t8.0140000\t100\t1\n"
+    found = judged(hill_setup(tmp_path, mission=way), 2.0)
+    low = [one for one in found.each if one.start[2] < 30.0]
+    assert len(low) > 2
+    assert all(one.floor == pytest.approx(one.start[2] - 2.0, abs=0.2) for one in low)
+    assert {one.kind for one in found.each} == {"safe"}
+    assert "taking off" in range_text(found.ranges[0], found, hill_setup(tmp_path, mission=way).scenario)
+    # Down to 15 m over home it is lower than those that begin higher, and than the least height where they begin above.
+    sinks = judged(hill_setup(tmp_path, mission=way), 2.0, RTL_ALTITUDE=15.0)
+    assert {one.kind for one in sinks.each if one.start[2] > 20.0} == {"low"}
+    assert {one.kind for one in sinks.each if one.start[2] < 14.0} == {"safe"}
+
+
+def test_what_was_low_before_it_left_the_elevation_file_is_low(tmp_path: Path) -> None:
+    world = return_world(hill_setup(tmp_path))
+    # Home lies 3 km west of the file, which ends at -3000 m, its circle 225 m below the ground here.  From x metres east
+    # it sinks 825 m in D = x + 6000 m, 3 s late at 26 m/s: where the file ends it is at -225 + 825 * 3078 / D.  That
+    # is the least height of 30 m for D = 9960 m, and the ground for 11290 m.
+    away = replace(world, home=ReturnPlace(-6000.0, 0.0, -325.0))
+    starts = planned_starts(world.setup, 2.0)
+    found = judge_returns(away, starts, 2.0)
+    assert {one.kind for one in found.each} == {"ground", "low", "unknown"}
+    assert first_of(found, "low") == pytest.approx(9960.0 - 6000.0, abs=150.0)
+    assert first_of(found, "ground") == pytest.approx(11290.0 - 6000.0, abs=150.0)
+    assert all(math.isnan(one.seconds) for one in found.each)
+    assert all((one.kind == "unknown") == (one.clearance > 29.9) for one in found.each)
 
 
 def test_a_scenario_that_requires_them_fails_where_one_is_not_safe(tmp_path: Path) -> None:

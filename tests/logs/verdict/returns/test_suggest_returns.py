@@ -2,16 +2,25 @@
 
 import itertools
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flight.mission.return_path import ReturnPlace
-from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, return_world
+from flight.mission.return_path import ReturnPlace, ReturnTarget
+from logs.verdict.returns.judge_returns import ReturnFlown, Returns, ReturnWorld, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
-from logs.verdict.returns.suggest_returns import MARGIN, Remedy, _Needs, _Search, suggest_parameters, suggest_rally
-from tests.logs.verdict.returns.hill import hill_setup
+from logs.verdict.returns.suggest_returns import (
+    MARGIN,
+    Remedy,
+    _Needs,
+    _Search,
+    helps,
+    suggest_parameters,
+    suggest_rally,
+)
+from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup
 
 
 def asked(folder: Path, every: float = 8.0, more: str = "") -> tuple[ReturnWorld, ReturnStarts]:
@@ -57,6 +66,59 @@ def test_a_sphere_that_nothing_goes_around_leaves_no_altitude(tmp_path: Path) ->
     for remedy in suggest_parameters(world, starts):
         judged = judge_returns(remedy.on(world), starts, 8.0)
         assert judged.count("ground") == judged.count("low") == 0
+
+
+def test_a_take_off_below_the_least_height_leaves_the_altitude_to_be_found(tmp_path: Path) -> None:
+    """A way that begins 25 m over the ground, where the least height is 30 m, and goes over the hill at 600 m."""
+    rows = ((300.0, 25.0), (2000.0, 300.0), (2600.0, 600.0), (6500.0, 600.0))
+    way = HEAD + "".join(
+        f"{k}\t0\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up:g}\t1\n" for k, (x, up) in enumerate(rows, 1)
+    )
+    setup = hill_setup(tmp_path, mission=way)
+    world, starts = return_world(setup), planned_starts(setup, 4.0)
+    assert judge_returns(world, starts, 4.0).each[0].floor == pytest.approx(23.0, abs=0.1)
+    (found,) = suggest_parameters(world, starts)
+    # As without the take-off.
+    assert found.parameters["RTL_ALTITUDE"] in (250.0, 275.0)
+    assert all(one.safe for one in judge_returns(found.on(world), starts, 4.0).each)
+
+
+def kinds(**counts: int) -> Returns:
+    """Returns that come to so many of each kind."""
+    flown = ReturnFlown(
+        0.0,
+        (0.0,) * 3,
+        ReturnTarget((0.0,) * 3, "home", "", 0.0),
+        "safe",
+        50.0,
+        (0.0,) * 3,
+        99.0,
+        -1,
+        -1,
+        1.0,
+        9.0,
+        1.0,
+    )
+    each = [replace(flown, kind=kind) for kind, count in counts.items() for _ in range(count)]
+    return Returns(tuple(each), 1.0, (), 30.0, None, 0.0, True)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("after", "good"),
+    [
+        # Counted in the demo: RTL_ALTITUDE 700 keeps all above ground, and takes 17 more into a sphere.
+        ({"threat": 76, "safe": 27}, False),
+        ({"threat": 59, "safe": 44}, True),
+        ({"threat": 59, "low": 34, "safe": 10}, True),
+        ({"ground": 33, "threat": 60, "safe": 10}, False),
+        ({"ground": 34, "threat": 59, "safe": 10}, False),
+        ({"ground": 34, "threat": 59, "low": 10}, False),
+        ({"unknown": 34, "threat": 59, "safe": 10}, False),
+        ({"safe": 103}, True),
+    ],
+)
+def test_only_what_makes_nothing_worse_is_suggested(after: dict[str, int], good: bool) -> None:
+    assert helps(kinds(ground=34, threat=59, safe=10), kinds(**after)) is good
 
 
 @pytest.mark.parametrize("seed", range(4))
