@@ -67,6 +67,21 @@ def sources_digest(root: Path) -> str:
 VARIABLE = "NUMBA_CACHE_DIR"
 
 
+# What stands in the names of folders that hold the kernels of one version of the sources.
+_PREFIX = "kernels-"
+
+
+def wanted_folder(base: Path, root: Path) -> Path:
+    """The folder within a base where the kernels of the sources below a root are kept.
+
+    A base that is such a folder itself, or a temporary one of this process, is taken as it is.
+
+    >>> wanted_folder(Path("/tmp/kernels-mine"), Path(__file__).parents[1]).as_posix()
+    '/tmp/kernels-mine'
+    """
+    return base if _PREFIX in base.name else base / f"{_PREFIX}{sources_digest(root)}"
+
+
 def can_write(folder: Path) -> bool:
     """Whether files can be made in a folder, which is made where it is not there.
 

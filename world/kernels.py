@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 from world.compile_events import kernel_is_compiled
-from world.kernel_cache import sources_digest, usable_folder
+from world.kernel_cache import usable_folder, wanted_folder
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _Array = TypeVar("_Array", bound=NDArray[Any])
@@ -25,10 +25,9 @@ Record: TypeAlias = Any
 # An array of them.
 Records: TypeAlias = NDArray[Any]
 # Numba fills its settings in when it is imported, and states no types for them.  The folder is read when a kernel is
-# decorated; one that the user has set stays.
+# decorated; within one that the user has set, each version of the sources has its own.
 _settings: Any = numba.config
-_OWN = Path(user_cache_dir("planfly"))
-WANTED = Path(_settings.CACHE_DIR or _OWN / f"kernels-{sources_digest(Path(__file__).parents[1])}")
+WANTED = wanted_folder(Path(_settings.CACHE_DIR or user_cache_dir("planfly")), Path(__file__).parents[1])
 _usable = usable_folder(WANTED)
 _settings.CACHE_DIR = str(_usable or WANTED)
 # Whether kernels are kept for this process alone.

@@ -44,7 +44,7 @@ class Workplace:
             self.copy,
             {
                 "PYTHONPATH": str(self.copy),
-                "NUMBA_CACHE_DIR": str(self._cache / "kernels"),
+                "NUMBA_CACHE_DIR": str(self._cache / "kernels-of-all-mutants"),
                 "XDG_CACHE_HOME": str(self._cache),
                 "MPLCONFIGDIR": str(self._cache / "matplotlib"),
             },
