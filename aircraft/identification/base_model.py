@@ -53,6 +53,7 @@ class BaseModel:
     inertia: (4,) Ixx, Iyy, Izz and Ixz (the integral of x z dm), kg m^2.
     servo_lag, motor_lag: first-order time constants, s.
     reacts: whether the propeller's torque rolls it; a flying wing's elevons are rigged against that.
+    induced_factor: drag_induced of the coefficients by that of the aircraft it was scaled from.
     """
 
     mass: float
@@ -65,3 +66,4 @@ class BaseModel:
     coefficients: Coefficients
     motor: ElectricMotor
     reacts: bool = True
+    induced_factor: float = 1.0

@@ -184,15 +184,20 @@ def read_motor(aircraft: Aircraft) -> ElectricMotor:
 def scaled(base: BaseModel, mass: float, span: float, area: float, volts: float | None = None) -> BaseModel:
     """The same kind of aircraft with another mass (kg), span (m) and area (m^2).
 
-    Inertia goes with mass and span squared.  The chord keeps its share of the mean chord; coefficients and motor stay.
+    Inertia goes with mass and span squared.  The chord keeps its share of the mean chord.  Induced drag is CL^2 over
+    pi, the span efficiency and the aspect ratio (Anderson, Fundamentals of Aerodynamics, section 5.3.2): the efficiency
+    stays, as all other coefficients and the motor do.
     volts: of the battery; another one has a motor for it, that turns as fast at full throttle.
     """
     weight, wide = mass / base.mass, span / base.span
     chord = base.chord * (area / span) / (base.area / base.span)
     ixx, iyy, izz, ixz = base.inertia
     factor = weight * wide * wide
+    slender = (span * span / area) / (base.span * base.span / base.area)
+    induced = base.coefficients.drag_induced / slender
     return replace(
-        base, mass=mass, span=span, area=area, chord=chord,
+        base, coefficients=replace(base.coefficients, drag_induced=induced),
+        induced_factor=base.induced_factor / slender, mass=mass, span=span, area=area, chord=chord,
         inertia=(ixx * factor, iyy * factor, izz * factor, ixz * factor),
         motor=base.motor if volts is None else _for_voltage(base.motor, volts),
     )  # fmt: skip

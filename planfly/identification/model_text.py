@@ -149,8 +149,8 @@ def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control
         "X": (
             f"{drag} ",
             _term(c.drag_zero, _factor("zero-lift-drag")),
-            _term(c.drag_induced, f"<sum> <product> <p> ident/induced-drag </p> {after} </product>"
-                  f" <product> <v> -1 </v> {before} </product> </sum>"),
+            _term(c.drag_induced, "<p> ident/induced-drag </p>", after),
+            _term(-c.drag_induced / numbers.induced_factor, before),
         ),
         "Z": ("", "<difference> <p> ident/lift-after </p> <p> ident/lift-before </p> </difference>"),
         "ROLL": (

@@ -17,7 +17,7 @@ from planfly.api.identifying import slow_logs, without_current
 from planfly.cli import main
 from planfly.identification.records import LEAST_HZ, slowest_rows
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
-from tests.instrumented_flights import short_motion, write_motion
+from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_motion, write_px4
 
 ARGUMENTS = ["--mass", "13.2", "--span", "2.8956", "--area", "0.55"]
 
@@ -38,9 +38,9 @@ def identify(*more: str) -> int:
 
 def test_a_log_becomes_a_folder_that_flies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("a.BIN").write_bytes(log_bytes())
-    # The same flight in a file of other bytes.
-    write_motion(Path("b.BIN"), replace(flown_truth().log, program="ArduPlane V4.6.1"))
-    assert identify("--battery", "44.4V,888Wh", "--check", "b.BIN") == 0
+    # The same flight as PX4 would have logged it.
+    write_px4(Path("b.ulg"), px4_topics(flown_truth().log), PX4_PARAMETERS)
+    assert identify("--battery", "44.4V,888Wh", "--check", "b.ulg") == 0
     said = capsys.readouterr().out
     assert "at cruise" in said
     folder = tmp_path / "mine"

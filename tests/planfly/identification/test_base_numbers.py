@@ -52,6 +52,15 @@ def test_scaling_takes_mass_and_lengths() -> None:
     assert made.chord == pytest.approx(base.chord)
 
 
+def test_a_stubbier_wing_has_more_induced_drag() -> None:
+    """Over pi e AR: twice the area at the same span is half the aspect ratio, and twice the drag; not at twice both."""
+    base = base_model(load_aircraft("aerosonde"))
+    own = base.coefficients.drag_induced
+    assert scaled(base, 11.0, base.span, 2.0 * base.area).coefficients.drag_induced == pytest.approx(2.0 * own)
+    assert scaled(base, 11.0, 2.0 * base.span, 4.0 * base.area).coefficients.drag_induced == pytest.approx(own)
+    assert scaled(base, 11.0, base.span, base.area).coefficients == base.coefficients
+
+
 def test_an_engine_that_burns_fuel_is_refused_in_one_line() -> None:
     with pytest.raises(FlightError, match="its motor cannot be identified") as refused:
         base_model(load_aircraft("c172x"))

@@ -25,12 +25,13 @@ FACTORS = {
 }  # fmt: skip
 
 
-def written(place: Path, values: np.ndarray, mass: float = 11.0) -> Aircraft:
+def written(place: Path, values: np.ndarray, mass: float = 11.0, area: float = BASE.wing_area) -> Aircraft:
     folder = place / "mine"
     folder.mkdir()
-    numbers = scaled(base_model(BASE), mass, BASE.wing_span, BASE.wing_area)
+    numbers = scaled(base_model(BASE), mass, BASE.wing_span, area)
     (folder / "mine.xml").write_text(identified_xml(BASE, "mine", numbers, values), encoding="utf-8")
     text = (BASE.folder / "aerosonde.toml").read_text(encoding="utf-8").replace("mass_kg = 11.0", f"mass_kg = {mass}")
+    text = text.replace("wing_area_m2 = 0.55", f"wing_area_m2 = {area}")
     (folder / "mine.toml").write_text(text, encoding="utf-8")
     return read_aircraft(folder)
 
@@ -43,6 +44,15 @@ def test_every_factor_and_offset_is_in_the_model(tmp_path: Path) -> None:
         assert getattr(found, field) == pytest.approx(expected, rel=2e-3), name
     assert found.lift_zero == pytest.approx(0.23 + values[INDEX["lift-offset"]], rel=1e-3)
     assert found.pitch_zero == pytest.approx(0.0135 + values[INDEX["pitch-offset"]], rel=1e-3)
+
+
+def test_a_stubbier_wing_has_the_induced_drag_of_its_aspect_ratio(tmp_path: Path) -> None:
+    """1.5 times the area at the same span: 1.5 times the base's own 0.0232 of CL^2, and 1.2 times that as estimated."""
+    values = prior_means()
+    values[INDEX["induced-drag"]] = 1.2
+    found = _Probe(written(tmp_path, values, area=1.5 * BASE.wing_area)).coefficients()
+    assert found.drag_induced == pytest.approx(1.2 * 1.5 * base_model(BASE).coefficients.drag_induced, rel=2e-3)
+    assert found.drag_zero == pytest.approx(0.043, rel=2e-3)
 
 
 def test_at_the_prior_it_is_the_base_trim_for_trim(tmp_path: Path) -> None:
