@@ -13,6 +13,8 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_parameters, load_parameters
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import default_parameters as px4_parameters
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.verdict.findings import Fact, Finding, make_finding, verdict_json
@@ -56,6 +58,25 @@ def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> 
     assert (found.rule, found.place, found.off) == ("clearance", LEG, -8.4)
     # The farthest value, and the nine between it and the present one by halves.
     assert flights.count <= 5
+
+
+@pytest.mark.parametrize(("present", "passing"), [(30.0, 35.0), (40.0, 41.0)])
+def test_no_value_below_the_documented_range_is_named(present: float, passing: float) -> None:
+    def banks_further(law: Autopilot) -> bool:
+        assert isinstance(law, Px4)
+        return law.parameters["FW_R_LIM"] > math.radians(present + 0.5)
+
+    law = Px4(px4_parameters("1.17")).with_parameters(FW_R_LIM=present)
+    found = deciding_parameter(law, (WIDE,), banks_further)
+    assert found is not None
+    assert (found.name, found.current, found.passing) == ("FW_R_LIM", present, passing)
+
+
+def test_nothing_decides_how_a_mission_is_flown_that_is_not_taken() -> None:
+    refused = make_finding("mission", Place("mission", item=1), ok=False, reason="")
+    flights = Flights(lambda _: True)
+    assert deciding_parameter(ArduPlane(default_parameters()), (refused,), flights) is None
+    assert flights.count == 0
 
 
 def test_what_failed_says_where_to_look_first() -> None:

@@ -1,6 +1,7 @@
 """`planfly.figures`, `report`, `compare` and `export`: pictures as figures, and the commands' own files."""
 
 import re
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,6 +15,7 @@ from logs.views import figures
 from logs.views.drawing import new_figure, png_bytes
 from planfly.cli import main
 from tests.soak import SOAK
+from world.scenario import with_flight
 
 FLOWN = ["map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy"]
 
@@ -92,6 +94,13 @@ def test_what_a_file_does_not_hold_is_told(tmp_path: Path) -> None:
     (tmp_path / "a.waypoints").write_text(gap)
     (note,) = planfly.export(tmp_path / "a.waypoints", tmp_path / "a.plan").notes
     assert "a gap in seq before 2" in note
+
+
+def test_a_plan_for_px4_without_a_landing_is_exported_with_a_word(path: planfly.Plan, tmp_path: Path) -> None:
+    for_px4 = replace(path, scenario=with_flight(path.scenario, autopilot="px4"))
+    said = "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
+    assert said in planfly.export(for_px4, tmp_path / "a.plan").notes
+    assert said not in planfly.export(path, tmp_path / "b.plan").notes
 
 
 def test_bad_exports_write_nothing(path: planfly.Plan, tmp_path: Path) -> None:
