@@ -74,7 +74,8 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     """Half width of the corridor along a leg, m, and whose it is.
 
     A corridor that the scenario does not state is wide enough for the turns at the leg's ends, as they are planned; and
-    at a loiter for all of its circle, where whoever flies joins and leaves that about its middle.
+    at a loiter for all of its circle and a turn back beside it, where whoever flies joins and leaves that about its
+    middle.
     """
     half = requirements.setup.corridor
     if requirements.setup.scenario.limits.corridor_m is not None:
@@ -82,8 +83,10 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     ends = slice(leg, leg + 2)
     turning = float(corner_depths(requirements)[ends].max()) + PASS
     if requirements.setup.autopilot.loiter_rules.at_middle:
-        across = 2.0 * float(requirements.setup.route.arcs[ends].max()) + PASS
-        if across > max(turning, half):
+        arcs, tightest = requirements.setup.route.arcs[ends], requirements.tightest[ends]
+        back = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
+        across = 2.0 * float(arcs.max()) + back + PASS
+        if arcs.any() and across > max(turning, half):
             return across, "circle"
     if turning > half:
         return turning, "fly-by path"

@@ -71,7 +71,7 @@ def fold_loiters(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Findings with those at a loiter's corners replaced by one, and those of its legs by the worst of each rule."""
-    found = list(findings)
+    found, at_once = list(findings), requirements.setup.autopilot.loiter_rules.at_middle
     for circle in circles(requirements):
         corners = {requirements.waypoint(i) for i in range(circle.first, circle.last + 1)}
         legs = {requirements.leg(leg) for leg in range(circle.first, circle.last)}
@@ -81,6 +81,11 @@ def fold_loiters(
             found = [item for item in found if not any(item is other for other in at[1:])]
         for rule in ("slope", "speed", "clearance", "corridor"):
             mine = [item for item in found if item.rule == rule and item.place in legs]
+            if at_once and any(item.ok is not None for item in mine):
+                # Left before it came to these: what was flown there is judged on the others.
+                unflown = [item for item in mine if item.ok is None]
+                found = [item for item in found if not any(item is other for other in unflown)]
+                mine = [item for item in mine if item.ok is not None]
             if len(mine) > 1:
                 worst = min(mine, key=_badness)
                 one = replace(worst, reason=f"{worst.reason}; the worst of the circle's {len(mine)} legs")

@@ -58,6 +58,8 @@ def test_a_loiter_to_a_height_is_flown_to_level_and_left_at_that_height(aerosond
     assert np.abs(position[late, 1]).max() < 15.0
     # The drawn leg to the circle is level.
     assert setup.route.waypoints[:2, 2] == pytest.approx([600.0, 600.0])
+    # At 30 degrees of bank a circle of 119 m is the tightest.
+    assert (judge_flight(setup, result.track, result.ended).headline == "flyable") is (radius == 200)
 
 
 @pytest.mark.parametrize(("radius", "flyable"), [(100, False), (150, True)])
@@ -74,3 +76,19 @@ def test_a_loiter_for_a_time_ends(aerosonde: Aircraft, radius: int, flyable: boo
     assert verdict.flyable is flyable
     # The bank of 30 degrees flies 119 m at the least.
     assert {item.rule for item in verdict.failed} == (set() if flyable else {"loiter"})
+
+
+def test_a_circle_left_on_its_far_side_is_left_within_its_corridor(aerosonde: Aircraft) -> None:
+    # The leg climbs beside the loiter, which begins the later for it, and ends on the course away from what follows.
+    setup, result = flown(aerosonde, wp(0, -2500, 300), wp(0, 0, 420, 19, p="60 0 150 0"), wp(2500, 1500, 420))
+    verdict = judge_flight(setup, result.track, result.ended)
+    assert verdict.flyable, verdict.headline
+    # What is said of every mission that ends without a landing.
+    assert [
+        line for line in verdict.lines if line.startswith("PX4 would not take it: PX4's fixed-wing default refuses")
+    ]
+    assert "item 3: after the last waypoint it circles about that without end" in verdict.notes[-1]
+    # On the way it climbs at 3 m/s from the beginning, not along the slope: 120 m in 40 s, of 2,500 m.
+    track = result.track
+    level = int(np.argmax(track.position[:, 2] > 710.0))
+    assert track.time[level] == pytest.approx(110.0 / 3.0 + 3.5, abs=4.0)
