@@ -133,6 +133,12 @@ class Verdict:
         answer = "not judged in full" if self.undecided else answer
         return f"<Verdict {self.level}: {answer}; {len(self.findings)} findings, {len(self.failed)} failed>"
 
+    def to_junit(self, name: str) -> str:
+        """The verdict as JUnit XML, as continuous integration shows test results.  name: of what was judged."""
+        from logs.verdict.junit import junit_text
+
+        return junit_text(self, name)
+
     def _repr_html_(self) -> str:
         """How a notebook shows it."""
         from logs.verdict.summary import verdict_html

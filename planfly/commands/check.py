@@ -16,7 +16,7 @@ from planfly.terminal.options import (
     result_options,
     world_options,
 )
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import give_answer, give_junit
 from planfly.terminal.results import print_returns, print_verdict, print_warnings
 from world.errors import ArgumentError
 
@@ -49,7 +49,7 @@ def check_options(line: LineParser) -> None:
         help="fly a mission by the laws of several autopilots, and print one table, a column each: "
         + ", ".join(CHOICES["autopilot_law"]),
     )  # fmt: skip
-    result_options(parser)
+    result_options(parser, junit=True)
 
 
 def check(args: argparse.Namespace) -> int:
@@ -60,6 +60,7 @@ def check(args: argparse.Namespace) -> int:
     if judged.verdict.level == "geometric":
         print_warnings([*judged.setup.mission.warnings, *judged.setup.scenario.notes])
     give_answer(args, lambda: _document(judged))
+    give_junit(args, judged.verdict, args.what)
     print_warnings([judged.loss] if judged.loss else [])
     print_verdict(judged.verdict, judged.setup.route.notes)
     print_returns(judged.returns_line)
@@ -69,7 +70,7 @@ def check(args: argparse.Namespace) -> int:
 
 
 # What does not go with several autopilots: what belongs to one of them, or to a log.
-_OF_ONE = ("params", "guidance", "autopilot_law", "plan", "flight", "datum", "json")
+_OF_ONE = ("params", "guidance", "autopilot_law", "plan", "flight", "datum", "json", "junit")
 
 
 def _check_for(args: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from planfly.terminal.arguments import MISSIONS, completed, files, number
 from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import call, flight_options, log_rate_option, result_options, world_options
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import give_answer, give_junit
 from planfly.terminal.results import print_returns, print_verdict, print_warnings
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def fly_options(line: LineParser) -> None:
         "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
     )
     log_rate_option(log)
-    result_options(parser)
+    result_options(parser, junit=True)
 
 
 def fly(args: argparse.Namespace) -> int:
@@ -57,6 +57,7 @@ def fly(args: argparse.Namespace) -> int:
         print(coloured(f"next      planfly report {shlex.quote(str(flown.log))}", "hint"))
     code = verdict_code(flown.verdict)
     give_answer(args, lambda: _answer(args.mission, flown, code))
+    give_junit(args, flown.verdict, args.mission)
     return code
 
 

@@ -17,7 +17,7 @@ from planfly.terminal.options import (
     turbulence_option,
     world_options,
 )
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import give_answer, give_junit
 from planfly.terminal.results import print_verdict, warn_of_loss
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def import_log_options(line: LineParser) -> None:
     imported_log_options(parser)
     world_options(parser)
     flown_by_options(parser)
-    result_options(parser)
+    result_options(parser, junit=True)
 
 
 def import_log(args: argparse.Namespace) -> int:
@@ -49,6 +49,7 @@ def import_log(args: argparse.Namespace) -> int:
     print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
     code = LOSS if flight.lossy else verdict_code(flight.verdict)
     give_answer(args, lambda: _import_answer(Path(args.target), flight, code))
+    give_junit(args, flight.verdict, args.log)
     return code
 
 

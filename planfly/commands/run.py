@@ -15,7 +15,7 @@ from planfly.terminal.options import (
     scenario_argument,
     terrain_option,
 )
-from planfly.terminal.output import give_answer
+from planfly.terminal.output import give_answer, give_junit
 from planfly.terminal.results import print_returns, print_verdict
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def run_options(line: LineParser) -> None:
     terrain_option(planning)
     flight_options(parser)
     log_rate_option(parser.group("the log"))
-    result_options(parser, "where the files go (default: runs/<name>-seed<N>, replaced)")
+    result_options(parser, "where the files go (default: runs/<name>-seed<N>, replaced)", junit=True)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
         _print_rounds(result)
     code = verdict_code(result.verdict)
     give_answer(args, lambda: _answer(result, bool(args.refine), code))
+    give_junit(args, result.verdict, result.scenario)
     return code
 
 

@@ -45,10 +45,12 @@ def call(function: Callable[..., Returned], args: argparse.Namespace, **more: An
 # What is written, and how much is printed.
 
 
-def result_options(parser: CommandParser, out: str = "", what: str = "DIR", *, json: bool = True) -> None:
+def result_options(
+    parser: CommandParser, out: str = "", what: str = "DIR", *, json: bool = True, junit: bool = False
+) -> None:
     """Where results go, and how much is printed.
 
-    out: what --out names, "" for a command without it.  what: its placeholder.
+    out: what --out names, "" for a command without it.  what: its placeholder.  junit: whether its answer is a verdict.
     """
     group = parser.group("results")
     if out:
@@ -56,6 +58,10 @@ def result_options(parser: CommandParser, out: str = "", what: str = "DIR", *, j
     group.add_argument("--overwrite", action="store_true", help="replace named targets that exist")
     if json:
         json_option(group, parser.prog.split()[-1])
+    if junit:
+        group.add_argument(
+            "--junit", metavar="FILE", help="also write the verdict as JUnit XML, which shows in continuous integration"
+        )
 
 
 def json_option(group: OptionTaker, command: str) -> None:

@@ -10,12 +10,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from planfly.stages import Advance, Receiver, received_by
 from planfly.targets import refuse_existing
 from world.errors import PlanflyError
 from world.files import write_whole
+
+if TYPE_CHECKING:
+    from logs.verdict.findings import Verdict
 
 # ----------------------------------------------------------------------
 # Standard output that outlives its reader: ``planfly check M | head -1`` still ends with the verdict's exit code.
@@ -188,9 +191,10 @@ def asked_output(args: argparse.Namespace) -> Iterator[None]:
     Raises PlanflyError for a file to answer into that exists, or that the command reads.
     """
     answer, quiet = getattr(args, "json", None), getattr(args, "quiet", False)
-    if answer not in (None, STANDARD_OUTPUT):
-        _refuse_inputs(Path(answer), args)
-        refuse_existing(Path(answer), getattr(args, "overwrite", False))
+    for target in (answer, getattr(args, "junit", None)):
+        if target not in (None, STANDARD_OUTPUT):
+            _refuse_inputs(Path(target), args)
+            refuse_existing(Path(target), getattr(args, "overwrite", False))
     token = _output.set(sys.stdout)
     try:
         with contextlib.ExitStack() as opened:
@@ -221,9 +225,17 @@ def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) ->
         write_whole(Path(target), text)
 
 
+def give_junit(args: argparse.Namespace, verdict: "Verdict", name: str) -> None:
+    """Write a verdict as JUnit XML, where that was asked for.  name: of what was judged."""
+    if args.junit is not None:
+        write_whole(Path(args.junit), verdict.to_junit(name))
+
+
 def _refuse_inputs(target: Path, args: argparse.Namespace) -> None:
     """Refuse to answer into a file that the command line names otherwise, too."""
-    named = [value for key, value in vars(args).items() if isinstance(value, str) and key not in ("json", "command")]
+    named = [
+        value for key, value in vars(args).items() if isinstance(value, str) and key not in ("json", "junit", "command")
+    ]
     for name in named:
         with contextlib.suppress(OSError):
             if target.exists() and target.samefile(name):

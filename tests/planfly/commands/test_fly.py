@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -73,3 +74,19 @@ def test_a_full_disk_is_one_line_and_leaves_a_readable_log(flight: Path, tmp_pat
     full = read_log(flight / "flight.mcap").track
     assert 10 < len(read.track) < len(full)
     assert read.track.position.tobytes() == full.position[: len(read.track)].tobytes()
+
+
+def test_a_log_that_is_replaced_and_a_verdict_for_continuous_integration(
+    flight: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    argv = ["fly", str(flight / "plan.json"), "--junit", "r.xml"]
+    code = main(argv)
+    assert "is there: replaced" not in capsys.readouterr().err
+    suite = ElementTree.parse("r.xml").getroot()[0]
+    assert (int(suite.get("failures", "-1")) > 0) == (code == 4)
+    # A file that was named is not replaced, a log that nobody named is, and is said to be.
+    assert main(argv) == 2
+    assert capsys.readouterr().err == "planfly: r.xml: exists; --overwrite replaces it\n"
+    assert main([*argv, "--overwrite"]) == code
+    assert "flight.mcap is there: replaced\n" in capsys.readouterr().err

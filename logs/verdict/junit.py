@@ -1,0 +1,64 @@
+"""A verdict as JUnit XML, as continuous integration shows test results: a case for each finding, one for the answer."""
+
+from collections import Counter
+from xml.etree import ElementTree
+
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.rules.registry import RULES
+from logs.verdict.wording import place_text, suggestions_text
+
+
+def junit_text(verdict: Verdict, name: str) -> str:
+    """The text of the file.  name: of what was judged, a mission or a log.
+
+    A finding that fails is a failure, and one that was not judged is skipped.  The case ``verdict`` fails where the
+    answer is not "flyable", also where nothing failed but a part was not judged.
+
+    >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown")
+    >>> "<testcase" in junit_text(verdict, "m.waypoints"), "<failure" in junit_text(verdict, "m.waypoints")
+    (True, False)
+    """
+    cases = [_answer_case(verdict), *_finding_cases(verdict.findings)]
+    counts = Counter(child.tag for case in cases for child in case)
+    root = ElementTree.Element("testsuites")
+    suite = ElementTree.SubElement(
+        root, "testsuite", name=_plain(name), tests=str(len(cases)), failures=str(counts["failure"]),
+        errors="0", skipped=str(counts["skipped"]),
+    )  # fmt: skip
+    suite.extend(cases)
+    ElementTree.SubElement(suite, "system-out").text = _plain(verdict.summary, keep="\n")
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _answer_case(verdict: Verdict) -> ElementTree.Element:
+    case = ElementTree.Element("testcase", classname="planfly", name="verdict")
+    if not verdict.flyable:
+        ElementTree.SubElement(case, "failure", message=_plain(verdict.headline))
+    return case
+
+
+def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
+    seen: Counter[tuple[str, str]] = Counter()
+    cases = []
+    for finding in findings:
+        place = _plain(place_text(finding.place))
+        seen[finding.rule, place] += 1
+        # Names of cases are unique.
+        number = seen[finding.rule, place]
+        name = place if number == 1 else f"{place} ({number})"
+        case = ElementTree.Element("testcase", classname=f"planfly.{finding.rule}", name=name)
+        if finding.ok is False:
+            title = RULES[finding.rule].title
+            failure = ElementTree.SubElement(case, "failure", message=_plain(f"{title}: {finding.reason}"))
+            if finding.suggestions:
+                failure.text = _plain(f"would pass: {suggestions_text(finding.suggestions)}")
+        elif finding.ok is None:
+            ElementTree.SubElement(case, "skipped", message=_plain(f"not judged: {finding.reason}"))
+        cases.append(case)
+    return cases
+
+
+def _plain(text: str, keep: str = "") -> str:
+    """Text without what XML 1.0 cannot hold."""
+    return "".join(letter if letter.isprintable() or letter in keep else " " for letter in text)

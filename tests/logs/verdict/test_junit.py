@@ -1,0 +1,51 @@
+"""JUnit XML of a verdict: counted, named once each, and read by a parser whatever a reason holds."""
+
+from xml.etree import ElementTree
+
+import pytest
+
+from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.junit import junit_text
+from logs.verdict.places import FLIGHT, Place
+
+
+def verdict(*findings: Finding, flyable: bool, line: str) -> Verdict:
+    return Verdict(findings, flyable=flyable, complete=True, lines=(line, "Start: in the air"), level="flown")
+
+
+def cases(text: str) -> dict[tuple[str, str], ElementTree.Element]:
+    root = ElementTree.fromstring(text)
+    suite = root[0]
+    found = {(case.get("classname", ""), case.get("name", "")): case for case in suite.iter("testcase")}
+    assert suite.get("tests") == str(len(found))
+    for kind, key in (("failure", "failures"), ("skipped", "skipped")):
+        assert suite.get(key) == str(len(list(suite.iter(kind))))
+    return found
+
+
+def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
+    leg = Place("leg", 1, to_item=3)
+    found = (
+        make_finding("slope", leg, ok=False, reason='climbs 9° & more than <8°> on "leg"\x1b[2J', margin=-1.0),
+        make_finding("slope", leg, ok=True, reason=""),
+        make_finding("clearance", FLIGHT, ok=None, reason="no terrain"),
+    )
+    made = cases(junit_text(verdict(*found, flyable=False, line="not flyable: slope"), "a & b.waypoints"))
+    assert len(made) == 4
+    failed, passed, unknown, answer = (
+        made["planfly.slope", "leg 1, to item 3"],
+        made["planfly.slope", "leg 1, to item 3 (2)"],
+        made["planfly.clearance", "flight"],
+        made["planfly", "verdict"],
+    )
+    assert failed[0].get("message") == 'slopes: climbs 9° & more than <8°> on "leg" [2J'
+    assert len(passed) == 0
+    assert (unknown[0].tag, unknown[0].get("message")) == ("skipped", "not judged: no terrain")
+    assert answer[0].get("message") == "not flyable: slope"
+
+
+@pytest.mark.parametrize(("flyable", "failures"), [(True, 0), (False, 1)])
+def test_what_was_not_judged_in_full_is_no_success(flyable: bool, failures: int) -> None:
+    """Nothing failed, but slopes are within what is not known of the aircraft: exit code 3, and no green case."""
+    text = junit_text(verdict(flyable=flyable, line="not judged in full: slopes"), "m")
+    assert len(list(ElementTree.fromstring(text).iter("failure"))) == failures
