@@ -596,7 +596,7 @@ class ReturnEntry:
     last_s: float
     count: int
     kind: str
-    """ground, threat, zone, lost, energy, unknown, low or safe."""
+    """ground, threat, zone, lost, energy, unknown, unsure, low or safe."""
     target: str
     """home, or a rally point by its number, or a landing sequence by its first item."""
     reason: str

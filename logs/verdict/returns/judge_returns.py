@@ -55,10 +55,10 @@ from world.wind import mean_wind_speed
 Floats = NDArray[np.float64]
 
 # What a return comes to, the worst first: it hits the ground, enters a missile's sphere, goes into a zone or out of
-# one, does not arrive, takes more energy than there is, leaves the elevation data, comes lower than the least height
-# above ground; or is safe.
-Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "low", "safe"]
-KINDS: tuple[Kind, ...] = ("ground", "threat", "zone", "lost", "energy", "unknown", "low", "safe")
+# one, does not arrive, takes more energy than there is, leaves the elevation data, is flown too differently by the
+# point mass and in JSBSim, comes lower than the least height above ground; or is safe.
+Kind = Literal["ground", "threat", "zone", "lost", "energy", "unknown", "unsure", "low", "safe"]
+KINDS: tuple[Kind, ...] = ("ground", "threat", "zone", "lost", "energy", "unknown", "unsure", "low", "safe")
 # What of them nobody would call a return that went well.
 UNSAFE = frozenset(KINDS[:5])
 
@@ -72,6 +72,8 @@ Open = Literal["terrain", "law", "autoland", "return path", "landing"]
 
 # Nearer than this (m) to a limit the point mass could be wrong: it is within 7 m of 38 flights of ArduPlane.
 UNSURE = 10.0
+# How far apart the two are counts this near (m) to a limit; further away it decides nothing.
+_DECIDES = 50.0
 # A return that begins lower than the least height above ground, as after a take-off, is held to the height that it has
 # there, less what its turn takes, m.
 TURN = 2.0
@@ -166,7 +168,7 @@ class Returns:
     def undecided(self) -> bool:
         """Whether none is known to be unsafe, and of some it is not known."""
         wrong = bool(self.unsafe) or self.count("low") > 0
-        return not wrong and (bool(self.open) or self.count("unknown") > 0)
+        return not wrong and (bool(self.open) or self.count("unknown") > 0 or self.count("unsure") > 0)
 
     @property
     def lands(self) -> bool:
@@ -508,13 +510,15 @@ def _set_right(
         higher, farther = (one if math.isfinite(one) else 0.0 for one in apart)
         if math.isfinite(apart[0]):
             differences.append(higher)
-        disagrees = max(abs(higher), abs(farther)) > UNSURE
+        low = min(each[k].clearance, each[k].clearance + higher) < each[k].floor + _DECIDES
+        close = min(each[k].outside, each[k].outside + farther) < _DECIDES
+        disagrees = (low and abs(higher) > UNSURE) or (close and abs(farther) > UNSURE)
         out[k] = _moved(world, each[k], flown[k], higher, farther)
         if disagrees and out[k].kind not in ("ground", "threat"):
-            out[k] = replace(out[k], kind="unknown")
+            out[k] = replace(out[k], kind="unsure")
         for j in group:
             if j != k and disagrees and each[j].kind in ("low", "safe"):
-                out[j] = replace(each[j], kind="unknown")
+                out[j] = replace(each[j], kind="unsure")
             elif j != k and not disagrees:
                 # What was flown of one return makes no other better.
                 out[j] = _moved(world, each[j], flown[j], min(0.0, higher), min(0.0, farther))
@@ -548,6 +552,7 @@ def _is_steady(world: ReturnWorld, row: Record) -> bool:
 def _doubt(one: ReturnFlown) -> float:
     """How near to what decides it a return comes, m: the ground, the height that is asked of it, or a kill sphere."""
     if one.kind in ("zone", "unknown"):
+        # Neither comes of how far away anything is.
         return math.inf
     near = [abs(one.clearance)]
     if one.kind != "ground":

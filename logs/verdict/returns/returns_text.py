@@ -18,6 +18,7 @@ _ONE: dict[Kind, str] = {
     "lost": "does not arrive",
     "energy": "takes more energy than may be used",
     "unknown": "flies where the ground is not known",
+    "unsure": "is flown too differently by the point mass and in JSBSim to be judged",
     "low": "comes lower than {limit:.0f} m above ground",
 }
 _MANY: dict[Kind, str] = {
@@ -27,6 +28,7 @@ _MANY: dict[Kind, str] = {
     "lost": "do not arrive",
     "energy": "take more energy than may be used",
     "unknown": "fly where the ground is not known",
+    "unsure": "are flown too differently by the point mass and in JSBSim to be judged",
     "low": "come lower than {limit:.0f} m above ground",
 }
 _DOES = {
@@ -174,6 +176,8 @@ def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: S
             return f"{worst}takes {one.energy:.0f} Wh and {leaves}"
         case "unknown":
             return f"{worst}flies where the elevation is not known"
+        case "unsure":
+            return f"{worst}{low} by the point mass, and JSBSim has it or one like it too far from there"
     if one.floor < returns.limit:
         low += " (taking off: it begins lower than the least height)"
     left = "" if math.isnan(one.left) else f", {one.left:.0f} Wh left"

@@ -158,7 +158,7 @@ def test_a_flight_that_finds_it_higher_makes_that_one_better_alone(
             assert new.kind == ("ground" if new.clearance <= 0.0 else "low" if new.clearance < 29.9 else "safe")
         # So far apart, neither is believed.
         if old.time in asked and higher > 10.0:
-            assert new.kind == "unknown"
+            assert new.kind == "unsure"
 
 
 def test_a_flight_that_finds_it_lower_makes_all_like_it_worse(
@@ -168,12 +168,15 @@ def test_a_flight_that_finds_it_lower_makes_all_like_it_worse(
     after = judge_returns(world, starts, 1.0, Stub(before, -8.0), 2)
     assert after.count("ground") + after.count("low") > before.count("ground") + before.count("low")
     assert after.count("safe") < before.count("safe")
-    assert not after.count("unknown")
+    assert not after.count("unsure")
     # Further apart than it may be: what was flown hits, and nobody knows of the others.
     stub = Stub(before, -50.0)
     far = judge_returns(world, starts, 1.0, stub)
     assert {one.kind for one in far.each if one.time in {asked.time for asked in stub.asked}} == {"ground"}
-    assert far.count("unknown") > 5
+    assert far.count("unsure") > 5
+    assert "too differently" in headline(far)
+    # How far it is from a sphere that is far away decides nothing.
+    assert not judge_returns(world, starts, 1.0, Stub(before, 0.0, 2000.0)).count("unsure")
     # What could not be flown stays as it was.
     unflown = judge_returns(world, starts, 1.0, lambda *_: None)
     assert [(one.kind, one.clearance) for one in unflown.each] == [(one.kind, one.clearance) for one in before.each]
@@ -217,9 +220,9 @@ def test_one_that_begins_low_is_held_to_what_it_has(tmp_path: Path) -> None:
 
 def test_what_was_low_before_it_left_the_elevation_file_is_low(tmp_path: Path) -> None:
     world = return_world(hill_setup(tmp_path))
-    # Home lies 3 km west of the file, which ends at -3000 m, its circle 225 m below the ground here.  From x metres east
-    # it sinks 825 m in D = x + 6000 m, 3 s late at 26 m/s: where the file ends it is at -225 + 825 * 3078 / D.  That
-    # is the least height of 30 m for D = 9960 m, and the ground for 11290 m.
+    # Home lies 3 km west of the file, which ends at -3000 m, its circle 225 m below the ground here.  From x metres
+    # east it sinks 825 m in D = x + 6000 m, 3 s late at 26 m/s: where the file ends it is at -225 + 825 * 3078 / D.
+    # That is the least height of 30 m for D = 9960 m, and the ground for 11290 m.
     away = replace(world, home=ReturnPlace(-6000.0, 0.0, -325.0))
     starts = planned_starts(world.setup, 2.0)
     found = judge_returns(away, starts, 2.0)
