@@ -4,7 +4,6 @@ from collections import Counter
 from xml.etree import ElementTree
 
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text, suggestions_text
 
 
@@ -49,8 +48,7 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
         name = place if number == 1 else f"{place} ({number})"
         case = ElementTree.Element("testcase", classname=f"planfly.{finding.rule}", name=name)
         if finding.ok is False:
-            title = RULES[finding.rule].title
-            failure = ElementTree.SubElement(case, "failure", message=_plain(f"{title}: {finding.reason}"))
+            failure = ElementTree.SubElement(case, "failure", message=_plain(f"{finding.rule}: {finding.reason}"))
             if finding.suggestions:
                 failure.text = _plain(f"would pass: {suggestions_text(finding.suggestions)}")
         elif finding.ok is None:

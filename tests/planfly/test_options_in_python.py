@@ -40,8 +40,8 @@ RENAMED = {
     ("replay", "movie"): ("movie", "out"),
     ("campaign", "refly"): ("campaign_flight", "index"),
 }
-# What only a terminal has, and what Python has in `Verdict.to_junit`; of a replay, how the timeline is printed, and that another function is meant; of a check,
-# whether the file of --json is replaced.
+# What only a terminal has, and what Python has in `Verdict.to_junit`; of a replay, how the timeline is printed, and
+# that another function is meant; of a check, whether the file of --json is replaced.
 TERMINAL_ONLY = {
     *("help", "json", "junit", "quiet", "schema", "topic", "shell"),
     *(("replay", "at_once"), ("replay", "foxglove"), ("check", "overwrite")),

@@ -38,7 +38,7 @@ def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
         made["planfly.clearance", "flight"],
         made["planfly", "verdict"],
     )
-    assert failed[0].get("message") == 'slopes: climbs 9° & more than <8°> on "leg" [2J'
+    assert failed[0].get("message") == 'slope: climbs 9° & more than <8°> on "leg" [2J'
     assert len(passed) == 0
     assert (unknown[0].tag, unknown[0].get("message")) == ("skipped", "not judged: no terrain")
     assert answer[0].get("message") == "not flyable: slope"
