@@ -92,6 +92,8 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         causes=[
             CauseEntry(name=one.name, does=one.does, parameter=one.parameter, value=one.value) for one in returns.causes
         ],
+        rtl_autoland=returns.autoland,
+        not_judged=list(returns.open),
         ranges=[return_entry(found, one) for one in returns.ranges],
         suggestions=[suggestion_entry(found, one) for one in found.suggested],
         notes=list(found.notes),

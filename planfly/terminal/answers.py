@@ -648,6 +648,10 @@ class ReturnsAnswer:
     every_s: float
     least_clearance_m: float
     causes: list[CauseEntry]
+    rtl_autoland: int | None
+    """ArduPlane's parameter; null by another autopilot's law."""
+    not_judged: list[str]
+    """What leaves the returns open: terrain, law, autoland, return path or landing; empty where nothing does."""
     ranges: list[ReturnEntry]
     suggestions: list[ReturnSuggestion]
     """Of --suggest."""

@@ -238,6 +238,11 @@ class ReturnWorld:
         return self.setup.limits.min_clearance
 
     @property
+    def battery_known(self) -> bool:
+        """Whether anybody stated what the battery holds; energy is not judged otherwise."""
+        return not self.setup.envelope.battery_guessed or self.scenario.flight.battery_wh is not None
+
+    @property
     def causes(self) -> tuple[Cause, ...]:
         """What can take the aircraft off its mission; of another autopilot that is not known."""
         if self.other_law:
@@ -451,9 +456,8 @@ def _judged(
     world: ReturnWorld, starts: ReturnStarts, k: int, target: ReturnTarget, flown: Record, way: Floats, floor: float
 ) -> ReturnFlown:
     zone = zone_met(world, way) if len(way) > 1 else -1
-    guessed = world.setup.envelope.battery_guessed and world.scenario.flight.battery_wh is None
     used = 0.0 if math.isnan(starts.used[k]) else float(starts.used[k])
-    left = math.nan if guessed else float(world.setup.battery - used - flown["energy"])
+    left = float(world.setup.battery - used - flown["energy"]) if world.battery_known else math.nan
     row = starts.rows[k]
     return ReturnFlown(
         time=float(starts.time[k]),

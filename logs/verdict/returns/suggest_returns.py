@@ -121,7 +121,7 @@ def _ends_well(
     good = keeps(world, flown, needs)
     if keeps is not _keep_all:
         return good
-    if world.setup.envelope.power_level.size and not world.setup.envelope.battery_guessed:
+    if world.setup.envelope.power_level.size and world.battery_known:
         left = world.setup.battery - np.nan_to_num(starts.used) - flown["energy"]
         good &= ~(left < RESERVE * world.setup.battery)
     for k, way in enumerate(ways):

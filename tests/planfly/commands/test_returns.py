@@ -74,6 +74,7 @@ def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFi
         assert words not in out
     answer = json.loads((hill / "px4.json").read_text(encoding="utf-8"))
     assert (answer["exit_code"], answer["safe"], answer["causes"]) == (3, False, [])
+    assert (answer["rtl_autoland"], answer["not_judged"]) == (None, ["law"])
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.returns_text import headline, range_text
+from planfly.api.returning import ReturnsFound
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 from world.errors import MissionError
 
@@ -243,6 +244,45 @@ def test_a_scenario_that_requires_them_fails_where_one_is_not_safe(tmp_path: Pat
     # From above the hill and back there is nothing that could be hit.
     near = judge_geometry(hill_setup(tmp_path, asked, mission_text(0.0, 2000.0)))
     assert [one.ok for one in near.findings if one.rule == "return"] == [True]
+
+
+def test_where_it_is_required_one_is_flown_from_each_second(tmp_path: Path) -> None:
+    verdict = judge_geometry(hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n'))
+    (failed,) = [one for one in verdict.failed if one.rule == "return"]
+    # 6.5 km at the 25 m/s that are commanded.
+    assert int(failed.reason.split()[1]) == pytest.approx(6500.0 / 25.0, abs=2.0)
+    assert failed.method.startswith("from every 1 s of the way, ")
+
+
+def test_where_the_ground_is_not_known_it_is_undecided_where_it_is_required(tmp_path: Path) -> None:
+    # From no further than 3 km east it leaves the file at more than 57 m: -225 + 825 * 3078 / 9000 m.
+    home = f"0\t1\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 - 6000.0 / DEGREE:.7f}\t-325\t1\n"
+    way = "QGC WPL 110\n" + home + mission_text(0.0, 2500.0).removeprefix(HEAD)
+    found = judge_geometry(hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n', way))
+    (one,) = [one for one in found.findings if one.rule == "return"]
+    assert one.ok is None
+    assert "fly where the ground is not known" in one.reason
+
+
+def guessed(setup: FlightSetup) -> FlightSetup:
+    """The same with a battery of which nobody said what it holds."""
+    limits = replace(setup.limits, envelope=replace(setup.envelope, battery_guessed=True))
+    return replace(setup, limits=limits)
+
+
+def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path)
+    guess = guessed(setup)
+    world, starts = return_world(guess), planned_starts(guess, 20.0)
+    found = ReturnsFound(guess, judge_returns(world, starts, 20.0))
+    assert all(math.isnan(one.left) for one in found.returns.each)
+    assert not found.returns.count("energy")
+    assert any("the battery is guessed: energy is not judged" in note for note in found.notes)
+    stated = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
+    known = guessed(stated)
+    found = ReturnsFound(known, judge_returns(return_world(known), starts, 20.0))
+    assert found.returns.count("energy")
+    assert not any("battery" in note for note in found.notes)
 
 
 def test_without_a_home_there_is_nowhere_to_return_to(tmp_path: Path) -> None:
