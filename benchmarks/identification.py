@@ -138,6 +138,11 @@ def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]
     drawn = performance(base, draw_aircraft(estimate), _CRUISE, DENSITY)
     low, high = np.degrees(np.percentile(drawn.climb, [2.5, 97.5]))
     climb, found = np.degrees(best.climb)
+
+    def within(true: Floats, draws: Floats) -> bool:
+        low, high = np.percentile(draws, [2.5, 97.5])
+        return bool(low <= true[0] <= high)
+
     off = np.abs(estimate.values - truth) / estimate.sds
     return {
         "climb_deg": found - climb,
@@ -145,6 +150,8 @@ def errors(base: BaseModel, truth: Floats, estimate: Estimate) -> dict[str, Any]
         "climb_inside": bool(low <= climb <= high),
         "sink_percent": 100.0 * (best.sink[1] / best.sink[0] - 1.0),
         "power_percent": 100.0 * (best.power[1] / best.power[0] - 1.0),
+        "sink_inside": within(best.sink, drawn.sink),
+        "power_inside": within(best.power, drawn.power),
         "drag_percent": 100.0 * (best.drag[1] / best.drag[0] - 1.0),
         "inside": int((off < 1.96).sum()),
         "outside": [name for name, one in zip(NAMES, off, strict=True) if one >= 1.96],
@@ -223,7 +230,7 @@ def main() -> None:
     parser.add_argument("--sensors", type=float, default=1.0, metavar="FACTOR", help="on the sensors' errors")
     parser.add_argument("--out", default="build/identification.json")
     args = parser.parse_args()
-    rows = []
+    rows: list[dict[str, Any]] = []
     Path(args.out).parent.mkdir(parents=True, exist_ok=True)
     seed = args.first
     while len(rows) < args.count:
@@ -248,7 +255,8 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         for name in ("climb_deg", "sink_percent", "power_percent"):
             sizes = np.abs([row[name] for row in chosen])
             made[f"{kind}.{name}"] = {"median": float(np.median(sizes)), "worst": float(sizes.max())}
-        made[f"{kind}.climb_inside"] = sum(row["climb_inside"] for row in chosen)
+        for name in ("climb_inside", "sink_inside", "power_inside"):
+            made[f"{kind}.{name}"] = sum(row[name] for row in chosen)
         made[f"{kind}.climb_interval_deg"] = float(np.median([row["climb_interval_deg"] for row in chosen]))
         made[f"{kind}.coverage"] = sum(row["inside"] for row in chosen) / (len(NAMES) * len(chosen))
         for answer in ("refused", "undecided", "flyable"):
