@@ -12,7 +12,6 @@ from logs.verdict.returns.returns_text import causes_text, headline, landing_tex
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 
 EVERY = 4.0
-WATCHED = {"BATT_MONITOR": 4.0, "BATT_LOW_VOLT": 14.0}
 
 
 def row(number: int, command: int, east: float = 0.0, amsl: float = 0.0, north: float = 0.0, p2: float = 0.0) -> str:
@@ -114,7 +113,7 @@ def test_a_landing_itself_is_not_judged(tmp_path: Path) -> None:
 
 
 def test_a_battery_that_lands_goes_another_way_than_rtl(tmp_path: Path) -> None:
-    both = judged(tmp_path, RTL_AUTOLAND=0, RTL_ALTITUDE=600, BATT_FS_LOW_ACT=2, **WATCHED)
+    both = judged(tmp_path, RTL_AUTOLAND=0, RTL_ALTITUDE=600, BATT_FS_LOW_ACT=2, BATT_MONITOR=4, BATT_LOW_VOLT=14)
     names = ["home", "the landing sequence at item 4"]
     assert sorted({one.target.name for one in both.each}) == names
     kinds = {name: {one.kind for one in both.each if one.target.name == name} for name in names}

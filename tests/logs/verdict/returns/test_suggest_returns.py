@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flight.mission.return_path import ReturnPlace, ReturnTarget
-from logs.verdict.returns.judge_returns import ReturnFlown, Returns, ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.judge_returns import Kind, ReturnFlown, Returns, ReturnWorld, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.suggest_returns import (
     MARGIN,
@@ -83,7 +83,7 @@ def test_a_take_off_below_the_least_height_leaves_the_altitude_to_be_found(tmp_p
     assert all(one.safe for one in judge_returns(found.on(world), starts, 4.0).each)
 
 
-def kinds(**counts: int) -> Returns:
+def kinds(counts: dict[Kind, int]) -> Returns:
     """Returns that come to so many of each kind."""
     flown = ReturnFlown(
         0.0,
@@ -117,8 +117,8 @@ def kinds(**counts: int) -> Returns:
         ({"safe": 103}, True),
     ],
 )
-def test_only_what_makes_nothing_worse_is_suggested(after: dict[str, int], good: bool) -> None:
-    assert helps(kinds(ground=34, threat=59, safe=10), kinds(**after)) is good
+def test_only_what_makes_nothing_worse_is_suggested(after: dict[Kind, int], good: bool) -> None:
+    assert helps(kinds({"ground": 34, "threat": 59, "safe": 10}), kinds(after)) is good
 
 
 @pytest.mark.parametrize("seed", range(4))
