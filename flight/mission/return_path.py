@@ -104,6 +104,7 @@ class ReturnRules:
         height above the sea, and flown no higher than where it begins.  ArduPlane 4.6-dev does that: it holds its
         height at first, and comes down later than a straight slope to the point would have it.
     rally_height: over a rally point's own height, m, at which it comes there.
+    landing_counts: whether a mission's landing is a place that it returns to, which is noted and not flown.
     instead: what of its own rules is flown otherwise, a note for people; "" for nothing.
     holds_height: whether it holds its height until it is over its target and comes down in circles there, and climbs,
         if it has to, in circles where it is, as PX4 does.
@@ -123,6 +124,7 @@ class ReturnRules:
     slope_to_stated_height: bool = False
     holds_height: bool = False
     rally_height: float = 0.0
+    landing_counts: bool = False
     instead: str = ""
 
 

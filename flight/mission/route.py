@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
-from flight.mission.items import Mission, Notes, command_name
+from flight.mission.items import LANDINGS, Mission, Notes, command_name
 from flight.mission.itinerary import Itinerary, ItineraryStop
 from flight.mission.loiter_circles import (
     PLAIN_SLOPE,
@@ -344,6 +344,8 @@ def _lay_return(
         airspeed=stop.airspeed,
     )
     notes.add(described_return(target, rules, here[2]), stop.item)
+    if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
+        notes.add(f"the mission's landing counts as a place to return to: not flown to; to {target.name}", stop.item)
     if rules.instead:
         notes.add(rules.instead, stop.item)
     first = len(points) - 1

@@ -154,6 +154,7 @@ class Px4(Autopilot):
             includes_home=kind in (0, 3),
             holds_height=True,
             rally_height=made["RTL_RETURN_ALT"],
+            landing_counts=kind == 1,
             instead=_OTHER_RETURNS.get(kind, ""),
         )
 

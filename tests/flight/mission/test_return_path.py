@@ -18,7 +18,8 @@ from flight.mission.return_path import (
     described_return,
     lay_return,
 )
-from tests.mission_lines import ORIGIN, refusal, route, wp
+from flight.mission.route import make_route
+from tests.mission_lines import ORIGIN, mission, refusal, route, wp
 from world.frames import to_geo
 
 HOME = ReturnPlace(0.0, 0.0, 300.0)
@@ -273,3 +274,15 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     )
     low = choose_target(rules, (0.0, 8000.0, 350.0), HOME, ())
     assert ", climbing 50 m first, to 400 m AMSL" in described_return(low, rules, 350.0)
+
+
+def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:
+    lines = wp(0, 3000), wp(2000, 3000), RTL, wp(0, 0, 0, command=21)
+    told = "item 3: the mission's landing counts as a place to return to: not flown to; to home"
+
+    def notes(rules: ReturnRules, *items: str) -> tuple[str, ...]:
+        return make_route(mission(*items), ORIGIN, None, 25.0, False, rules=rules).notes
+
+    assert told in notes(ReturnRules(landing_counts=True), *lines)
+    assert told not in notes(ReturnRules(landing_counts=True), *lines[:3])
+    assert told not in notes(ReturnRules(), *lines)
