@@ -94,6 +94,13 @@ def test_where_one_has_no_data_another_may(tmp_path: Path) -> None:
         assert np.abs(read_window(folder).height(0.0, 0.0) - whole.height(0.0, 0.0)) < 0.01
 
 
+def test_where_two_have_data_the_first_by_name_counts(tmp_path: Path) -> None:
+    write_geotiff(tmp_path / "a.tif")
+    write_geotiff(tmp_path / "b.tif", made_tile() + 50.0)
+    raster = open_raster(str(tmp_path))
+    assert raster.read(10, 11, 10, 11) == open_raster(str(tmp_path / "a.tif")).read(10, 11, 10, 11)
+
+
 def test_the_gap_between_tiles_is_a_gap(tmp_path: Path) -> None:
     folder = tmp_path / "dem"
     cut(folder, "west.tif", slice(0, ROWS), slice(0, COLS // 2 - 20))

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from world.airspace.openair import ARC_BEND, NAUTICAL_MILE, openair_zones
+from world.airspace.openair import NAUTICAL_MILE, openair_zones
 from world.airspace.zone_files import is_zone_file, read_zone_file
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_map
@@ -79,9 +79,9 @@ def test_an_arc_by_bearings_runs_the_way_it_is_told(turn: str, quarter: tuple[in
     assert arc[-1] == pytest.approx((radius, 0.0), abs=2.0)
     middle = arc[len(arc) // 2]
     assert (math.copysign(1, middle[0]), math.copysign(1, middle[1])) == quarter
-    # No chord leaves the circle by more than it may.
+    # No chord leaves the circle by more than the metre that is promised.
     for (x0, y0), (x1, y1) in itertools.pairwise(arc):
-        assert radius - math.hypot(0.5 * (x0 + x1), 0.5 * (y0 + y1)) < 1.05 * ARC_BEND
+        assert radius - math.hypot(0.5 * (x0 + x1), 0.5 * (y0 + y1)) < 1.05
 
 
 def test_an_arc_by_points_keeps_its_ends_and_the_centre_it_was_told() -> None:

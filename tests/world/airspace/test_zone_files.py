@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from planfly.open_mission import read_named_fences
 from tests.soak import at_most
 from tests.world.made.made_scenario import SMALL
 from world.airspace import zone_files
@@ -491,3 +492,56 @@ def test_a_placemark_of_google_earth_with_its_styles() -> None:
     text = f"<kml {NAMESPACE}><Document>{style}<Placemark>{inside}</Placemark></Document></kml>"
     ((_, entries),) = kml_zones(text, "z.kml")
     assert entries == {"name": "lake", "kind": "exclusion", "rings_deg": [[*OUTLINE, OUTLINE[0]]]}
+
+
+# ----------------------------------------------------------------------
+# Zones of a file of a whole country: those far from the area are left out, and what is not taken as it stands is said.
+
+
+def square_at(name: str, lat: float, lon: float, **more: Any) -> dict[str, Any]:
+    """A square of 0.01 degrees with its south-west corner here."""
+    ring = [[lon, lat], [lon + 0.01, lat], [lon + 0.01, lat + 0.01], [lon, lat + 0.01], [lon, lat]]
+    return feature("Polygon", [ring]) | {"properties": {"name": name, **more}}
+
+
+def test_zones_far_from_the_area_are_left_out(tmp_path: Path) -> None:
+    """The small area reaches some km from 46 N, 8 E: 0.2 degrees of latitude are 22.2 km, 0.15 are 16.7 km."""
+    country = [
+        square_at("near", 46.15, 8.0), square_at("far", 46.4, 8.0), square_at("farther", 46.0, 9.0),
+        feature("Point", [9.0, 46.0], radius_m=60_000) | {"properties": {"name": "wide", "radius_m": 60_000}},
+        square_at("antipode", -46.0, -171.0),
+        # An inclusion of the whole country counts wherever it is.
+        feature("Polygon", [[[5.0, 44.0], [11.0, 44.0], [11.0, 48.0], [5.0, 48.0]]], kind="inclusion", name="town"),
+    ]  # fmt: skip
+    (tmp_path / "all.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": country}))
+    file = tmp_path / "small.toml"
+    file.write_text(f'zones_file = "all.geojson"\n{SMALL}', encoding="utf-8")
+    scenario = load_scenario(str(file))
+    # The edge of "wide" is 17 km from the origin, its centre 77 km.
+    assert [zone.name for zone in scenario.zones] == ["near", "wide", "town"]
+    assert scenario.notes[0].endswith("3 of 6 zones lie more than 20 km from the area: left out")
+    # A log of it is as large as what is near.
+    assert len(scenario.to_json()["zones"]) == 3
+    assert from_spec(scenario.to_json(), "a log").notes == scenario.notes
+
+
+def test_an_inclusion_counts_however_far_it_is(tmp_path: Path) -> None:
+    away = square_at("away", 46.4, 8.0, kind="inclusion")
+    (tmp_path / "away.geojson").write_text(json.dumps(away), encoding="utf-8")
+    (tmp_path / "small.toml").write_text(f'zones_file = "away.geojson"\n{SMALL}', encoding="utf-8")
+    with pytest.raises(ScenarioError, match="start lies outside the inclusion"):
+        load_scenario(str(tmp_path / "small.toml"))
+
+
+def test_a_fence_of_openair_beside_a_scenario(tmp_path: Path) -> None:
+    path = tmp_path / "fence.txt"
+    ring = "AC D\nAN CTR\nAL GND\nAH 2200ft AMSL\nV X=46:01:00N 008:00:00E\nDC 0.1\n"
+    path.write_text(f"{ring}AC G\nAN F\nDP 46:00:00N", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=f"^{path}: line 9: DP"):
+        read_named_fences([str(path)])
+    text = path.read_text(encoding="utf-8").replace("DP 46:00:00N", "V X=46:01:00N 008:00:00E\nDC 1")
+    path.write_text(text, encoding="utf-8")
+    (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")
+    scenario = read_named_fences([str(path)]).on_scenario(load_scenario(str(tmp_path / "small.toml")))
+    assert [zone.name for zone in scenario.zones] == ["CTR (D)"]
+    assert scenario.notes == (f"{path}: 1 zone keeps nobody out: class G, open to all",)
