@@ -179,7 +179,7 @@ def _outcome(one: ReturnFlown, found: ReturnRange, returns: Returns, scenario: S
         case "unsure":
             return f"{worst}{low} by the point mass, and JSBSim has it or one like it too far from there"
     if one.floor < returns.limit:
-        low += " (taking off: it begins lower than the least height)"
+        low += " (taking off or landing: it begins lower than the least height)"
     left = "" if math.isnan(one.left) else f", {one.left:.0f} Wh left"
     outside = "" if math.isinf(one.outside) else f", {one.outside:.0f} m outside every missile's sphere"
     return f"{worst}{low} at the least{outside}{left}"
