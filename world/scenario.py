@@ -335,7 +335,7 @@ def _with_file_zones(
     """A scenario's file with the zones of other files beside its own, those that are near."""
     if not found.zones and not found.notes:
         return spec
-    near = near_zones(found.zones, origin, bounds)
+    near = near_zones(found.zones, source, origin, bounds)
     notes = [*(spec.zone_notes or ()), *found.notes]
     if far := len(found.zones) - len(near):
         notes.append(

@@ -82,14 +82,35 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
 
 # m.  No flight that stays in its area comes near a zone beyond this.
 FAR = 20_000.0
+# m.  A degree of latitude.
+_METRES = 111_000.0
 
 
-def near_zones(tables: Sequence[ZoneTable], origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
+def near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
     """The zones of a file that a flight may meet: inclusions, and exclusions within `FAR` of the area.
 
-    bounds: ((2, 2)) m, west and east, south and north of the area.
+    source: names the file in messages.  bounds: (2, 2) m, west and east, south and north of the area.
+    Raises ScenarioError for a shape that is none among those that are left out; `make_zones` looks at the others.
     """
-    return [table for table in tables if table.kind == "inclusion" or _is_near(table, origin, bounds)]
+    near = []
+    for k, table in enumerate(tables):
+        if table.kind == "inclusion" or _is_near(table, origin, bounds):
+            near.append(table)
+            continue
+        try:
+            _check_far(table)
+        except ValueError as error:
+            raise ScenarioError(f"{source}: zones[{k}] ({table.name}): {error}", file=source, field="zones") from error
+    return near
+
+
+def _check_far(table: ZoneTable) -> None:
+    """Raise ValueError for rings in degrees that are no polygon; their shape on the map is not asked for."""
+    rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
+    if rings and rings[0]:
+        middle = rings[0][0][1]
+        about = [[(lat, (lon - middle + 180.0) % 360.0 - 180.0) for lat, lon in ring] for ring in rings]
+        make_polygon([[(lon * _METRES, lat * _METRES) for lat, lon in ring] for ring in about])
 
 
 def _is_near(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
