@@ -104,6 +104,8 @@ def test_every_default() -> None:
         "threats": [],
         "zones": None,
         "zones_file": None,
+        "zone_notes": None,
+        "at": None,
         "limits": {
             "max_turn_deg": "aircraft",
             "max_climb_deg": "aircraft",
@@ -125,6 +127,7 @@ def test_every_default() -> None:
         },
         "flight": {
             "aircraft": "aerosonde",
+            "aircraft_by_default": None,
             "airspeed_mps": None,
             "max_bank_deg": 30.0,
             "autopilot": None,
