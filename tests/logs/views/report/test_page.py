@@ -207,6 +207,14 @@ def test_verdict_comes_first_then_what_fails() -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(("line", "times"), [("flyable", 1), ("flyable; take-off not judged", 2)])
+def test_an_answer_that_the_badge_gives_is_not_repeated(line: str, times: int) -> None:
+    verdict = Verdict((), True, True, (line, "Start: in the air"), "flown")
+    text = Page(report_html(make_setup(), make_track(), verdict, **ARGUMENTS)).text()
+    assert text[text.index("✓") : text.index("Start: in the air")].lower().count("flyable") == times
+
+
+@pytest.mark.usefixtures("undrawn")
 def test_hostile_names_stay_text() -> None:
     setup = make_setup(name=EVIL, description=EVIL)
     setup = replace(setup, mission=replace(setup.mission, source=EVIL, warnings=(EVIL,)), aircraft=EVIL)
