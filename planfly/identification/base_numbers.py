@@ -27,7 +27,7 @@ def base_model(aircraft: Aircraft) -> BaseModel:
     """Numbers of an aircraft.
 
     Raises FlightError for one without steady flight at cruise, and for one whose motor is not in the form of the
-    Aerosonde's, which cannot be told from logs.
+    Aerosonde's, which cannot be found from logs.
 
     >>> from aircraft.catalog import load_aircraft
     >>> numbers = base_model(load_aircraft("aerosonde")).coefficients

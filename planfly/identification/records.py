@@ -70,7 +70,7 @@ def flight_records(
         controls = _shares_as_angles(_held(log.controls, grid), aircraft)
     else:
         controls = _controls(servos or log_outputs(log, aircraft), pulses)
-    # A surface is told to move beyond its stop, and stays there.
+    # A surface that is commanded beyond its stop stays at the stop.
     stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     controls = np.clip(controls, -stops, stops)
     ratio = _at(log.ratio, grid)[:, 0] if len(log.ratio.time) else _ratio_of_height(_at(log.height, grid)[:, 0])
@@ -168,7 +168,7 @@ def _refuse(log: MotionLog) -> None:
 
 
 def slowest_rows(log: MotionLog) -> float:
-    """Rows a second of inertial sensors or of what was told to the surfaces, whichever are fewer."""
+    """Rows a second of inertial sensors or of the commands to the surfaces, whichever are fewer."""
     return min(log.inertial.rate, log.moved.rate)
 
 

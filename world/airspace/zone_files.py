@@ -266,9 +266,13 @@ def _extended(placemark: _Element, source: str) -> dict[str, Any]:
 # Of a text, and of its name in messages.
 Reader = Callable[[str, str], Iterator[Found]]
 # All suffixes but that of a GeoPackage, which is no text.
-FORMATS: dict[str, Reader] = dict(
-    zip(SUFFIXES, (geojson_zones, geojson_zones, kml_zones, openair_zones, openair_zones), strict=False)
-)
+FORMATS: dict[str, Reader] = {
+    ".geojson": geojson_zones,
+    ".json": geojson_zones,
+    ".kml": kml_zones,
+    ".openair": openair_zones,
+    ".txt": openair_zones,
+}
 # Bytes of a file at most.
 MAX_BYTES = 64 * 2**20
 

@@ -465,7 +465,7 @@ def _judged(
         target=target,
         kind=kind_of(world, flown, zone, left, floor),
         clearance=float(flown["clearance"]),
-        clearance_at=tuple(float(flown[f"clearance_{axis}"]) for axis in ("east", "north", "up")),  # type: ignore[arg-type]
+        clearance_at=(float(flown["clearance_east"]), float(flown["clearance_north"]), float(flown["clearance_up"])),
         outside=float(flown["outside"]),
         threat=int(flown["threat"]),
         zone=zone,

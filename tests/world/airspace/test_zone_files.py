@@ -498,6 +498,10 @@ def test_a_placemark_of_google_earth_with_its_styles() -> None:
 # Zones of a file of a whole country: those far from the area are left out, and what is not taken as it stands is said.
 
 
+def test_every_suffix_that_help_names_has_a_reader() -> None:
+    assert {*zone_files.FORMATS, ".gpkg"} == set(zone_files.SUFFIXES)
+
+
 def square_at(name: str, lat: float, lon: float, **more: Any) -> dict[str, Any]:
     """A square of 0.01 degrees with its south-west corner here."""
     ring = [[lon, lat], [lon + 0.01, lat], [lon + 0.01, lat + 0.01], [lon, lat + 0.01], [lon, lat]]
