@@ -8,10 +8,10 @@ import stat
 import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from world import file_locks
 from world.errors import PlanflyError
 from world.interruption import unfinished, uninterrupted
 
@@ -151,11 +151,6 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 # ----------------------------------------------------------------------
 # Files that are written whole or not at all, folders that do not outlive their use, targets kept to one process.
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-
 
 def write_whole(path: Path, data: str | bytes) -> None:
     """Write a file under a temporary name beside its target and rename it: whole, or not at all.
@@ -247,38 +242,14 @@ def hold(path: Path) -> Iterator[None]:
     ...         print("held")
     held
     """
-    with contextlib.ExitStack() as held:
-        try:
-            held.enter_context(_locked(path))
-        except (BlockingIOError, PermissionError) as error:
-            if isinstance(error, PermissionError) and fcntl is not None:
-                raise
-            raise PlanflyError(f"{path}: another planfly is writing there; name another target", file=path) from error
-        yield
-
-
-@contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """The system's lock on a file or folder.
-
-    Raises BlockingIOError, on Windows PermissionError, where another has it.
-    """
-    if fcntl is not None:
-        handle = os.open(path, os.O_RDONLY)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            yield
-        finally:
-            os.close(handle)
-        return
-    # Windows locks bytes of files, for readers too, and opens no folder: a file beside stands for either.
-    beside = path.with_name(f".{path.name}.planfly-lock")
-    handle = os.open(beside, os.O_RDWR | os.O_CREAT)
+    beside = path if file_locks.LOCKS_FOLDERS else path.with_name(f".{path.name}.planfly-lock")
+    handle = os.open(beside, os.O_RDONLY if file_locks.LOCKS_FOLDERS else os.O_RDWR | os.O_CREAT)
     try:
-        windows: Any = import_module("msvcrt")
-        windows.locking(handle, windows.LK_NBLCK, 1)
+        if not file_locks.lock_now(handle):
+            raise PlanflyError(f"{path}: another planfly is writing there; name another target", file=path)
         yield
     finally:
         os.close(handle)
-        with contextlib.suppress(OSError):
-            beside.unlink()
+        if not file_locks.LOCKS_FOLDERS:
+            with contextlib.suppress(OSError):
+                beside.unlink()

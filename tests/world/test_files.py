@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from world import files
+from world import file_locks
 from world.errors import MissionError, PlanflyError, ScenarioError
 from world.files import (
     did_you_mean,
@@ -217,7 +217,7 @@ class _Windows:
 
 @pytest.fixture
 def on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(files, "fcntl", None)
+    monkeypatch.setattr(file_locks, "LOCKS_FOLDERS", False)
     monkeypatch.setitem(sys.modules, "msvcrt", _Windows)
 
 

@@ -30,7 +30,7 @@ LINUX_ALONE = {
     "signal.SIGALRM": {"planfly/campaigns/fork_server.py"},
     "signal.SIGKILL": {"flight/autopilots/arduplane_sitl/process.py"},
     "select.select": set(),
-    "import fcntl": {"world/files.py"},
+    "import fcntl": {"world/file_locks.py"},
     "import resource": {"planfly/campaigns/worker_pool.py", "planfly/process_setup.py"},
     "import select": set(),
     "import pwd": set(),
