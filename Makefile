@@ -1,5 +1,6 @@
 # make demo: set up, then plan over real terrain, export, fly, log, check, report
-# make test: set up, then run every check and test
+# make test: set up, then run every test
+# make lint: set up, then check style, types and the pages of docs/
 # make dev: set up what a developer needs, and nothing more
 PYTHON ?= python3
 VENV := .venv
@@ -34,22 +35,24 @@ TESTED := $(VENV)/.ready-test
 BUILD_PAGES := $(BIN)/python -m sphinx -W -q -b html -d build/docs-trees docs build/docs
 
 # make low, make newest: the tests with the lowest versions supported, and with the newest there are
-.PHONY: demo test bench soak wheels low newest dev docs setup clients clean
+.PHONY: demo test lint bench soak wheels low newest dev docs setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
 
-test: $(TESTED) clients
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-# Types are checked and the pages made beside the rest, in silence unless they fail: pytest's summary comes last.
 # Kernels are compiled once, before the tests: each of pytest's processes would compile for itself.
-	@mkdir -p build; { $(BIN)/mypy && $(BUILD_PAGES); } >build/checks.log 2>&1 & checked=$$!; \
-	$(BIN)/python -m tests.kernels >/dev/null; \
+test: $(TESTED) clients
+	@$(BIN)/python -m tests.kernels >/dev/null; \
 	echo "tested with the versions of constraints.txt:"; \
 	$(BIN)/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"; \
-	$(BIN)/python -m pytest $(SPREAD); tested=$$?; \
-	wait $$checked || { cat build/checks.log; exit 1; }; exit $$tested
+	$(BIN)/python -m pytest $(SPREAD)
+
+# What is seen without running anything: style, types, and the pages of docs/.
+lint: $(TESTED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BUILD_PAGES)
 
 bench: $(TESTED)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true

@@ -73,7 +73,7 @@ class ScenarioTable(BaseModel):
 # [[zones]] of a scenario file as a pydantic model.
 
 # Corners of a ring, and rings of a zone, at most.
-MAX_CORNERS, MAX_RINGS = 20_000, 1_000
+MAX_CORNERS, MAX_RINGS = 100_000, 1_000
 # Zones of a scenario at most, those of its files included.
 MAX_ZONES = 20_000
 

@@ -11,7 +11,7 @@ from tests.docs.page_blocks import PAGES, ROOT
 from tests.soak import SOAK
 
 
-@pytest.mark.skipif(not SOAK, reason="`make test` builds them beforehand; set PLANFLY_SOAK=1")
+@pytest.mark.skipif(not SOAK, reason="`make lint` builds them, in CI too; set PLANFLY_SOAK=1")
 def test_pages_build_without_a_warning(tmp_path: Path) -> None:
     # No proxy leads anywhere: what would fetch something fails.
     nowhere = dict.fromkeys(("http_proxy", "https_proxy"), "http://127.0.0.1:9")

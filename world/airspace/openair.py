@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from world.airspace.zone_entries import PUBLISHED, zone_entries
+from world.airspace.zone_entries import published_entries
 from world.airspace.zone_times import BY_NOTAM, OPEN, parse_period
 from world.airspace.zones import band_outline
 from world.errors import ScenarioError
@@ -107,7 +107,7 @@ def _finished(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
     if block.airspace_class in _FREE_CLASSES and block.kind in _FREE_TYPES:
         return where, f"class {label}, open to all"
     entries: dict[str, Any] = {"name": f"{name or f'line {block.line}'} ({label})"[:100]}
-    entries |= zone_entries(block.limits, f"{source}: {where}")
+    entries |= published_entries(block.limits, f"{source}: {where}")
     if block.times:
         entries["times"] = block.times
     shapes = [bool(block.corners), bool(block.airway), block.circle is not None]
@@ -118,7 +118,7 @@ def _finished(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
         (lat, lon), radius = block.circle
         return where, entries | {"lat_deg": lat, "lon_deg": lon, "radius_m": radius}
     rings = [block.corners] if block.corners else _airway_rings(block, f"{source}: {where}")
-    return where, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings], PUBLISHED: True}
+    return where, entries | {"rings_deg": [[list(corner) for corner in ring] for ring in rings]}
 
 
 def _airway_rings(block: _Block, source: str) -> list[list[_Place]]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
-from world.airspace.zone_entries import PUBLISHED, zone_entries
+from world.airspace.zone_entries import published_entries
 from world.airspace.zone_times import WEEKDAYS, Period, parse_time
 from world.errors import ScenarioError
 
@@ -80,10 +80,10 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
         f"{side}Limit": _limit(volume.get(f"{side}Limit"), unit, volume.get(f"{side}VerticalReference"), side, source)
         for side in ("lower", "upper")
     }
-    entries = zone_entries(limits, source)
+    entries = published_entries(limits, source)
     kind = _word(shape.get("type"))
     if kind == "POLYGON":
-        return entries | {PUBLISHED: True, "rings_deg": _rings(shape.get("coordinates"), source)}
+        return entries | {"rings_deg": _rings(shape.get("coordinates"), source)}
     if kind == "CIRCLE":
         return entries | _circle(shape.get("center"), shape.get("radius"), source)
     raise _refused(source, "", "horizontalProjection.type", "allowed Polygon, Circle")
@@ -128,13 +128,13 @@ def _ed318_layer(geometry: Any, source: str) -> Iterator[dict[str, Any]]:
         f"{side}Limit": _limit(layer.get(side), unit, layer.get(f"{side}Reference"), side, source)
         for side in ("lower", "upper")
     }
-    entries = zone_entries(limits, source)
+    entries = published_entries(limits, source)
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     if kind == "Polygon":
-        yield entries | {PUBLISHED: True, "rings_deg": _rings(coordinates, source)}
+        yield entries | {"rings_deg": _rings(coordinates, source)}
     elif kind == "MultiPolygon" and isinstance(coordinates, list):
         for part in coordinates:
-            yield entries | {PUBLISHED: True, "rings_deg": _rings(part, source)}
+            yield entries | {"rings_deg": _rings(part, source)}
     elif kind == "Point":
         extent = geometry.get("extent")
         extent = extent if isinstance(extent, dict) else {}

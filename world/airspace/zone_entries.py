@@ -8,6 +8,8 @@ from world.errors import ScenarioError
 # An entry that is none of a table: the zone is of a file that its reader cannot correct, an authority's, so that an
 # outline that crosses itself is taken as the area it encloses.
 PUBLISHED = "published"
+# Another: its limits stand the wrong way round in the file.
+UPSIDE_DOWN = "upside_down"
 # Keys that mean what they mean in a scenario file.
 _OWN = ("kind", "floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
 # A property that begins so and is none of ours, nor another's that is read, may be one of ours misspelt.
@@ -63,6 +65,34 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
         # All of it is above every flight.
         entries.pop("ceiling_amsl_m", None)
     return entries
+
+
+def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """As `zone_entries`, of limits that an authority states, marked `PUBLISHED`.
+
+    A lower limit above the upper one (both above the sea, or both above ground) is taken for the upper, and the other
+    way round, and marked `UPSIDE_DOWN`: in authorities' files some stand so.
+
+    >>> high, low = ({"value": feet, "unit": "FT", "referenceDatum": "MSL"} for feet in (1000, 500))
+    >>> published_entries({"lowerLimit": high, "upperLimit": low}, "a file")["ceiling_amsl_m"]
+    304.8
+    """
+    lower, upper = limits.get("lowerLimit"), limits.get("upperLimit")
+    heights = [_compared(limit) for limit in (lower, upper)]
+    if heights[0] is None or heights[1] is None or heights[0][0] != heights[1][0] or heights[0] <= heights[1]:
+        return {**zone_entries(limits, source), PUBLISHED: True}
+    turned = {**limits, "lowerLimit": upper, "upperLimit": lower}
+    return {**zone_entries(turned, source), PUBLISHED: True, UPSIDE_DOWN: True}
+
+
+def _compared(limit: Any) -> tuple[bool, float] | None:
+    """Whether a limit counts from the ground, and its height, m; None where `_limit` refuses it, or there is none."""
+    if not isinstance(limit, dict):
+        return None
+    try:
+        return _DATUMS[limit["referenceDatum"]] == "agl", limit["value"] * _UNITS[limit["unit"]]
+    except (KeyError, TypeError):
+        return None
 
 
 def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from world.airspace.geopackage import geopackage_features
 from world.airspace.openair import is_openair, openair_zones
 from world.airspace.uas_zones import ed269_zones, ed318_zones, is_ed269, is_ed318
-from world.airspace.zone_entries import PUBLISHED, zone_entries
+from world.airspace.zone_entries import PUBLISHED, UPSIDE_DOWN, zone_entries
 from world.airspace.zone_suffixes import GEOPACKAGE, SUFFIXES
 from world.airspace.zones import holes_lie_inside, mended_rings
 from world.errors import ScenarioError
@@ -87,6 +87,9 @@ def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[s
     properties, geometry = feature.get("properties"), feature.get("geometry")
     properties = properties if isinstance(properties, dict) else {}
     name = properties.get("name") or f"zone {number + 1}"
+    if isinstance(name, str):
+        # Latvia's file has a tab before one.
+        name = " ".join(name.split())
     label = f"{where} ({name})" if isinstance(name, str) and name.isprintable() else where
     geometry = geometry if isinstance(geometry, dict) else {}
     kind = geometry.get("type")
@@ -273,6 +276,10 @@ FORMATS: dict[str, Reader] = {
     ".openair": openair_zones,
     ".txt": openair_zones,
 }
+# What is mended in files of authorities, in notes.
+_CROSSED = "outlines that cross themselves are taken as the area they enclose"
+_EMPTY = "outlines that enclose no area are left out"
+_TURNED = "lower and upper limits that stand the wrong way round are swapped"
 # Bytes of a file at most.
 MAX_BYTES = 64 * 2**20
 
@@ -331,7 +338,8 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         allowed = f"a file of zones is {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
         message = f"{source}: suffix {path.suffix!r}: {allowed}"
         raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
-    read, free, mended = FileZones(), Counter[str](), list[str]()
+    read, free = FileZones(), Counter[str]()
+    mended: dict[str, list[str]] = {_CROSSED: [], _TURNED: [], _EMPTY: []}
     for where, entries in _found(path, suffix, source):
         if isinstance(entries, str):
             free[entries] += 1
@@ -339,20 +347,26 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         if len(read.zones) >= most:
             message = f"{source}: more zones than may be: at most {MAX_ZONES:,} in all files"
             raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
-        if entries.pop(PUBLISHED, False) and (rings := mended_rings(entries["rings_deg"])) is not None:
-            mended.append(str(entries["name"]))
+        published = entries.pop(PUBLISHED, False)
+        if entries.pop(UPSIDE_DOWN, False):
+            mended[_TURNED].append(str(entries["name"]))
+        if published and "rings_deg" in entries and (rings := mended_rings(entries["rings_deg"])) is not None:
+            mended[_CROSSED if rings else _EMPTY].append(str(entries["name"]))
+            if not rings:
+                continue
             entries["rings_deg"] = rings
         if entries.get("rings_deg") == []:
             raise ScenarioError(f"{source}: {where}: its outline encloses no area", file=source, field="rings_deg")
         read.zones.append(_table(entries, f"{source}: {where}"))
-    if not read.zones and not free:
+    if not read.zones and not free and not mended[_EMPTY]:
         raise ScenarioError(f"{source}: there is no zone in it", file=source)
     for reason, count in free.items():
         keep = "1 zone keeps" if count == 1 else f"{count:,} zones keep"
         read.notes.append(f"{source}: {keep} nobody out: {reason}")
-    if mended:
-        names = ", ".join(mended[:5]) + (f", {len(mended) - 5:,} more" if len(mended) > 5 else "")
-        read.notes.append(f"{source}: outlines that cross themselves are taken as the area they enclose: {names}")
+    for words, names in mended.items():
+        if names:
+            more = f", {len(names) - 5:,} more" if len(names) > 5 else ""
+            read.notes.append(f"{source}: {words}: {', '.join(names[:5])}{more}")
     return read
 
 

@@ -170,13 +170,19 @@ def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[t
     return [(float(east), float(north)) for east, north in band.exterior.coords[:-1]]
 
 
+# Degrees, a tenth of a metre.  An area that an outline encloses where it crosses itself grows by this: its parts, which
+# may touch each other in points, have a way between them, however they are rounded on a map.
+MENDED_BY = 1e-6
+
+
 def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[float]]] | None:
     """Rings of the area that an outline with its holes encloses, where they cross; none for an outline of no area.
 
-    rings: the outline first.  Returns None where nothing is to be mended.
+    rings: of [latitude, longitude], the outline first.  The area is larger by `MENDED_BY` on all sides.  Returns None
+    where nothing is to be mended.
 
-    >>> len(mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]]))  # a bow tie has two halves
-    2
+    >>> len(mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]]))  # both halves of a bow tie, joined in the middle
+    1
     >>> mended_rings([[[0, 0], [2, 0], [2, 2]]]) is None
     True
     """
@@ -186,7 +192,8 @@ def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[f
     if shape.is_valid:
         return None
     made = shapely.make_valid(shape, method="structure", keep_collapsed=False)
-    parts = [one for one in shapely.get_parts(made) if isinstance(one, shapely.Polygon) and not one.is_empty]
+    grown = made.buffer(MENDED_BY, join_style="mitre") if made.area > 0.0 else made
+    parts = [one for one in shapely.get_parts(grown) if isinstance(one, shapely.Polygon) and not one.is_empty]
     return [
         [list(corner) for corner in ring.coords[:-1]] for part in parts for ring in (part.exterior, *part.interiors)
     ]

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import shapely
 
 from world.airspace.openair import NAUTICAL_MILE, openair_zones
 from world.airspace.zone_files import is_zone_file, read_zone_file
@@ -50,7 +51,7 @@ def test_places(text: str, wanted: list[float]) -> None:
     [
         ("GND", "2500ft AMSL", {"ceiling_amsl_m": 762.0}),
         ("SFC", "3000 MSL", {"ceiling_amsl_m": 914.4}),
-        ("1000ft AGL", "300m AGL", {"floor_agl_m": 304.8, "ceiling_agl_m": 300.0}),
+        ("500ft AGL", "300m AGL", {"floor_agl_m": 152.4, "ceiling_agl_m": 300.0}),
         ("1500 GND", "UNL", {"floor_agl_m": 457.2}),
         # 9,500 ft are 2,895.6 m, and 400 m are kept for the pressure of the day.
         ("FL 95", "UNLIMITED", {"floor_amsl_m": 2495.6}),
@@ -61,6 +62,25 @@ def test_places(text: str, wanted: list[float]) -> None:
 def test_limits(low: str, high: str, wanted: dict[str, float]) -> None:
     entries = entries_of(f"AC R\nAN LAKE\nAL {low}\nAH {high}\n{SQUARE}")
     assert {key: value for key, value in entries.items() if "_m" in key} == pytest.approx(wanted)
+
+
+def test_limits_the_wrong_way_round_are_swapped_and_said(tmp_path: Path) -> None:
+    """As a zone of France's file of 2011 has them; the level's 400 m for the pressure of the day go upwards then.
+
+    Above ground and above the sea are not compared: a hill of 400 m lies between these.
+    """
+    path = tmp_path / "zones.openair"
+    upside_down = f"AC P\nAN R9B\nAH 1700F AMSL\nAL FL195\n{SQUARE}"
+    circle = "AC D\nAN LOW\nAH 300m AGL\nAL 1000m AGL\nV X=46:00:00N 008:00:00E\nDC 5\n"
+    path.write_text(f"{upside_down}{circle}AC D\nAN HILL\nAL 500m AMSL\nAH 300m AGL\n{SQUARE}", encoding="utf-8")
+    found = read_zone_file(path, "z.openair")
+    swapped, low, hill = found.zones
+    assert (swapped.floor_amsl_m, swapped.ceiling_amsl_m) == pytest.approx((1700 * 0.3048, 19500 * 0.3048 + 400))
+    assert (low.floor_agl_m, low.ceiling_agl_m) == (300.0, 1000.0)
+    assert (hill.floor_amsl_m, hill.ceiling_agl_m) == (500.0, 300.0)
+    assert found.notes == [
+        "z.openair: lower and upper limits that stand the wrong way round are swapped: R9B (P), LOW (D)"
+    ]
 
 
 def test_a_circle_is_a_cylinder() -> None:
@@ -155,6 +175,17 @@ def test_a_line_that_is_none_is_named(text: str, tmp_path: Path) -> None:
     assert str(caught.value).isprintable()
 
 
+def test_an_outline_of_no_area_is_left_out_and_said(tmp_path: Path) -> None:
+    """A way there and back, as France's file of 2011 has one; a file of nothing else has no zone, and says why."""
+    way = "DP 46:00:00N 008:00:00E\nDP 46:06:00N 008:06:00E\nDP 46:12:00N 008:06:00E\nDP 46:06:00N 008:06:00E\n"
+    path = tmp_path / "z.openair"
+    for more, count in (("", 0), (f"AC R\nAN LAKE\n{SQUARE}", 1)):
+        path.write_text(f"AC Q\nAN RUN\n{way}{more}", encoding="utf-8")
+        found = read_zone_file(path, "z.openair")
+        assert len(found.zones) == count
+        assert found.notes == ["z.openair: outlines that enclose no area are left out: RUN (Q)"]
+
+
 def test_what_a_file_does_not_hold_as_it_stands_is_said(tmp_path: Path) -> None:
     """Latin letters of one byte; a bow tie, of which both halves count; and a class that is open to all, twice."""
     bow = "DP 46:00:00N 008:00:00E\nDP 46:06:00N 008:06:00E\nDP 46:06:00N 008:00:00E\nDP 46:00:00N 008:06:00E\n"
@@ -168,8 +199,11 @@ def test_what_a_file_does_not_hold_as_it_stands_is_said(tmp_path: Path) -> None:
         "zones.txt: outlines that cross themselves are taken as the area they enclose: ZÜRICH (R)",
     ]
     (zone,) = found.zones
-    halves = zone.rings_deg or []
-    assert sorted(len(ring) for ring in halves) == [3, 3]
-    assert all([46.05, 8.05] in [[round(x, 9) for x in corner] for corner in ring] for ring in halves)
+    # Each of the bow's corners, grown by a tenth of a metre, and its middle with a way through.
+    (ring,) = zone.rings_deg or []
+    corners = [[46.0, 8.0], [46.1, 8.1], [46.1, 8.0], [46.0, 8.1]]
+    assert all(any(math.dist(at, corner) < 1e-5 for at in ring) for corner in [*corners, [46.05, 8.05]])
+    assert shapely.Polygon(ring).area == pytest.approx(0.1 * 0.1 / 2, rel=1e-4)
+    assert all(shapely.Polygon(ring).covers(shapely.Point(corner)) for corner in corners)
     (tmp_path / "mission.txt").write_text("QGC WPL 110\n", encoding="utf-8")
     assert not is_zone_file(tmp_path / "mission.txt")

@@ -200,3 +200,12 @@ def test_other_geojson_with_a_type_of_its_own_stays_what_it_was() -> None:
     assert where == "feature (lake)"
     assert isinstance(entries, dict)
     assert entries["ceiling_agl_m"] == 90
+
+
+def test_limits_the_wrong_way_round_are_swapped_and_said(tmp_path: Path) -> None:
+    found = read(ed269(volume(CIRCLE, 120, 50), volume(low=10)), tmp_path)
+    assert [limits_of(zone) for zone in found.zones] == [
+        {"floor_agl_m": 50.0, "ceiling_agl_m": 120.0},
+        {"floor_agl_m": 10.0, "ceiling_agl_m": 120.0},
+    ]
+    assert found.notes == ["z.json: lower and upper limits that stand the wrong way round are swapped: lake 1/2"]
