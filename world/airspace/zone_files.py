@@ -347,14 +347,11 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         if len(read.zones) >= most:
             message = f"{source}: more zones than may be: at most {MAX_ZONES:,} in all files"
             raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
-        published = entries.pop(PUBLISHED, False)
-        if entries.pop(UPSIDE_DOWN, False):
-            mended[_TURNED].append(str(entries["name"]))
-        if published and "rings_deg" in entries and (rings := mended_rings(entries["rings_deg"])) is not None:
-            mended[_CROSSED if rings else _EMPTY].append(str(entries["name"]))
-            if not rings:
-                continue
-            entries["rings_deg"] = rings
+        words = _mend(entries)
+        for one in words:
+            mended[one].append(str(entries["name"]))
+        if _EMPTY in words:
+            continue
         if entries.get("rings_deg") == []:
             raise ScenarioError(f"{source}: {where}: its outline encloses no area", file=source, field="rings_deg")
         read.zones.append(_table(entries, f"{source}: {where}"))
@@ -368,6 +365,16 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
             more = f", {len(names) - 5:,} more" if len(names) > 5 else ""
             read.notes.append(f"{source}: {words}: {', '.join(names[:5])}{more}")
     return read
+
+
+def _mend(entries: dict[str, Any]) -> list[str]:
+    """Mend the outline of an authority's zone; what was mended, in words: nothing of anyone else's zone."""
+    published, turned = entries.pop(PUBLISHED, False), entries.pop(UPSIDE_DOWN, False)
+    words = [_TURNED] if turned else []
+    if published and "rings_deg" in entries and (rings := mended_rings(entries["rings_deg"])) is not None:
+        words.append(_CROSSED if rings else _EMPTY)
+        entries["rings_deg"] = rings
+    return words
 
 
 def _found(path: Path, suffix: str, source: str) -> Iterator[Found]:
