@@ -347,10 +347,10 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         if len(read.zones) >= most:
             message = f"{source}: more zones than may be: at most {MAX_ZONES:,} in all files"
             raise ScenarioError(message, file=source, field="zones", allowed=f"at most {MAX_ZONES:,}")
-        words = _mend(entries)
-        for one in words:
+        done = _mend(entries)
+        for one in done:
             mended[one].append(str(entries["name"]))
-        if _EMPTY in words:
+        if _EMPTY in done:
             continue
         if entries.get("rings_deg") == []:
             raise ScenarioError(f"{source}: {where}: its outline encloses no area", file=source, field="rings_deg")
