@@ -149,6 +149,23 @@ def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None)
     return tuple(found)
 
 
+def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:
+    """Where a mission lands on the map: item number, east and north (m) of each landing that states a place.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> land = MissionItem(2, Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 10.0)
+    >>> landing_places(Mission(None, (land,)), GeoOrigin(36.5, 8.0))
+    ((2, 0.0, 0.0),)
+    """
+    found = []
+    for item in mission.items:
+        if item.command in LANDINGS and item.has_position:
+            stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
+            east, north = on_map(mission.source, (stop,), origin)[0].tolist()
+            found.append((item.seq, float(east), float(north)))
+    return tuple(found)
+
+
 def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
     """A mission's rally points as places to fly to; one at 0, 0 is none, as in ArduPlane.
 

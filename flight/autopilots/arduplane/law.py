@@ -51,6 +51,8 @@ ARDUPILOT_MEMORY = record_dtype(
     "climb_share",  # 0..1, of the greatest rates that are demanded
     "sink_share",
     ("held", np.int64),  # 1 with throttle or pitch at its upper limit, -1 at its lower
+    ("under", np.bool_),  # whether it is too slow, and speed comes before height until its height is reached
+    "since_slow",  # s since it was as slow as that begins at
     # Airspeed.
     ("flown", np.bool_),  # whether there is a velocity of before
     "last_velocity_east",  # m/s, when it navigated last
@@ -319,6 +321,8 @@ _SPEED_CHANGE_SHARE = 0.5
 _NEARLY = 0.003
 # Below this share of AIRSPEED_MIN, with the throttle all but full, speed comes before height.
 _UNDERSPEED, _ALL_BUT_FULL = 0.9, 0.95
+# Until the height is reached, or the airspeed is above this share of AIRSPEED_MIN, s after it was so low.
+_FAST_AGAIN, _AFTER = 1.15, 3.0
 
 
 @inner
@@ -425,6 +429,25 @@ def _estimate_airspeed(
 
 
 @inner
+def is_underspeed(
+    estimated: Record, parameters: Record, own: Record, slowest: float, dt: float
+) -> bool:  # pragma: no cover - compiled
+    """Whether speed comes before height (`AP_TECS::_detect_underspeed`).  slowest: AIRSPEED_MIN, true, m/s.
+
+    An aircraft whose engine has stopped is so until it meets a slope that leads down: it glides at AIRSPEED_MIN, and
+    does not come to be as slow again (seen in 14 flights).
+    """
+    slow = own.airspeed < _UNDERSPEED * slowest
+    own.since_slow = 0.0 if slow else own.since_slow + dt
+    if own.under and own.airspeed >= _FAST_AGAIN * slowest and own.since_slow > _AFTER:
+        own.under = False
+    full = own.throttle_demand >= _ALL_BUT_FULL * parameters.throttle_max
+    own.under = (slow and full) or (own.under and estimated.up < own.height_demand)
+    under: bool = own.under
+    return under
+
+
+@inner
 def update_tecs(
     state: Record, estimated: Record, parameters: Record, own: Record, airspeed: float, factor: float, dt: float
 ) -> None:  # pragma: no cover - compiled
@@ -439,8 +462,7 @@ def update_tecs(
     # What it cannot climb now, full throttle does not give.
     max_rate = GRAVITY * parameters.tecs_climb_max * own.climb_share
     min_rate = -GRAVITY * parameters.tecs_sink_min
-    full = own.throttle_demand >= _ALL_BUT_FULL * parameters.throttle_max
-    under = speed < _UNDERSPEED * slowest and full
+    under = is_underspeed(estimated, parameters, own, slowest, dt)
     wanted = slowest if under else max(slowest, airspeed)
     change = wanted - own.airspeed_demand
     max_change = _SPEED_CHANGE_SHARE * max_rate / speed * dt

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +20,14 @@ from aircraft.catalog import Aircraft, find_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane.point_mass import PointMass, point_mass
 from flight.autopilots.arduplane.swift_return import (
     CIRCLED,
     HIT,
     NEVER,
     OFF_GROUND,
-    PointMass,
     Surroundings,
     fly_returns,
-    point_mass,
     surroundings,
 )
 from flight.mission.items import LANDINGS, Command
@@ -94,6 +93,7 @@ class ReturnFlown:
     energy: that it takes, Wh; left: what is left then, Wh; NaN where it is not known.
     seconds: to its circle, NaN where it does not get there.
     floor: height above ground that is asked of it, m: the least height, or what it begins with where that is less.
+    used: energy that was used before it begins, Wh; NaN where it is not known.
     """
 
     time: float
@@ -109,6 +109,7 @@ class ReturnFlown:
     left: float
     seconds: float
     floor: float = math.nan
+    used: float = math.nan
 
     @property
     def safe(self) -> bool:
@@ -127,6 +128,26 @@ class ReturnRange:
     last: float
     count: int
     worst: ReturnFlown
+
+
+# Whether there is a point of no return by energy: nowhere; behind some place; before the first; or it is not known,
+# because the battery or what was used of it is not, or because no return arrives.
+NoReturn = Literal["never", "later", "at once", "battery", "used", "arrives"]
+
+
+class PointOfNoReturn(NamedTuple):
+    """The last place from which a return leaves the reserve, in the wind that there is.
+
+    kind: whether there is one, or why it is not known.
+    time: s, of the last place with the reserve; NaN where there is no point of no return, or none is known.
+    left: Wh that the return from there leaves, or the least that any does where there is no such point.
+    skipped: how many returns before it do not arrive, so that what they take is not known.
+    """
+
+    kind: NoReturn
+    time: float = math.nan
+    left: float = math.nan
+    skipped: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,6 +204,26 @@ class Returns:
     def count(self, kind: Kind) -> int:
         """How many come to this."""
         return sum(one.kind == kind for one in self.each)
+
+    @property
+    def point_of_no_return(self) -> PointOfNoReturn:
+        """By energy, of the returns as RTL flies them; those that do not arrive are left out."""
+        last, least, skipped = math.nan, math.inf, 0
+        if not self.each or all(math.isnan(one.left) for one in self.each):
+            return PointOfNoReturn("battery")
+        for k, one in enumerate(self.each):
+            if k and one.time <= self.each[k - 1].time:
+                # From here on returns by another way.
+                break
+            if math.isnan(one.used):
+                return PointOfNoReturn("used")
+            if math.isnan(one.seconds) or math.isnan(one.left):
+                skipped += 1
+            elif one.left < self.reserve:
+                return PointOfNoReturn("at once" if math.isnan(last) else "later", last, least, skipped)
+            else:
+                last, least = one.time, min(least, one.left)
+        return PointOfNoReturn("arrives" if math.isnan(last) else "never", math.nan, least, skipped)
 
     @property
     def ranges(self) -> tuple[ReturnRange, ...]:
@@ -473,6 +514,7 @@ def _judged(
         left=left,
         seconds=float(flown["to_circle"]),
         floor=floor,
+        used=float(starts.used[k]),
     )
 
 

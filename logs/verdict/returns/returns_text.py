@@ -89,6 +89,31 @@ def _judged(returns: Returns) -> str:
     return f"all {total} returns are safe{until}: never lower than {lowest.clearance:.0f} m above ground{energy}"
 
 
+def no_return_text(returns: Returns) -> str:
+    """From where on the battery no longer brings the aircraft back with its reserve, a line.
+
+    >>> no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
+    'point of no return: not judged, for the energy in the battery is not known'
+    """
+    point, name = returns.point_of_no_return, "point of no return"
+    reserve = f"the reserve of {returns.reserve:.0f} Wh"
+    match point.kind:
+        case "battery":
+            return f"{name}: not judged, for the energy in the battery is not known"
+        case "used":
+            return f"{name}: not judged, for the energy used before is not known"
+        case "arrives":
+            return f"{name}: not judged, for no return arrives"
+        case "at once":
+            told = f"{name}: before the start, for no return leaves {reserve}"
+        case "later":
+            told = f"{name}: {point.time:.0f} s; a return from later on does not leave {reserve}"
+        case "never":
+            told = f"{name}: none, for every return leaves {reserve} ({point.left:.0f} Wh at the least)"
+    does = "does" if point.skipped == 1 else "do"
+    return told + (f"; {point.skipped} that {does} not arrive left out" if point.skipped else "")
+
+
 def causes_text(causes: tuple[Cause, ...]) -> list[str]:
     """What makes the aircraft return, and what does not, two lines.
 

@@ -45,7 +45,7 @@ def test_counts_are_whole_and_all_else_are_numbers() -> None:
     kinds = {name: ARDUPILOT_MEMORY[name] for name in field_names(ARDUPILOT_MEMORY)}
     assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held"}
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
-    assert truths == {"begun", "flown", "on_circle", "returning", "climbed"}
+    assert truths == {"begun", "flown", "on_circle", "returning", "climbed", "under"}
     assert all(kind == np.float64 for kind in kinds.values() if kind not in (np.int64, np.bool_))
 
 

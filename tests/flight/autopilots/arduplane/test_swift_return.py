@@ -8,17 +8,16 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane.point_mass import PointMass, point_mass
 from flight.autopilots.arduplane.swift_return import (
     CIRCLED,
     HIT,
     NEVER,
     OFF_GROUND,
     RETURN_START,
-    PointMass,
     Surroundings,
     SwiftReturns,
     fly_returns,
-    point_mass,
     surroundings,
 )
 from flight.mission.return_path import ReturnCircle, ReturnPlace, choose_target

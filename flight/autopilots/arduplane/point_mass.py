@@ -1,0 +1,215 @@
+"""An aircraft as a point mass, for compiled code: what its trims say of drag, thrust and power, and how it moves.
+
+Bank and pitch are given; the flight path is below the pitch by the angle of attack, which grows with the load, and
+specific excess power is that of trims at this throttle, airspeed and height, less the induced drag of the bank.
+"""
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from aircraft.envelope import GRAVITY, Envelope
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import trim
+from world.kernels import Record, inner, record_dtype
+from world.wind import Wind, mean_wind_speed
+
+Floats = NDArray[np.float64]
+
+# Grid of the trims: throttles from 0 to 1, airspeeds from the aircraft's slowest to its fastest, heights AMSL (m).
+_THROTTLES, _SPEEDS, _HEIGHTS = 21, 7, (0.0, 2000.0, 4000.0)
+
+# The aircraft as a point mass, for compiled code.  Its tables have a row for each airspeed and a column for each height
+# of the grid.
+POINT_MASS = record_dtype(
+    "airspeed",  # m/s, commanded, equivalent
+    "slowest",  # m/s, true, of the first row
+    "speed_step",
+    "height_step",
+    "alpha",  # rad, angle of attack without lift
+    "alpha_lift",  # rad m^2/s^2, the rest of it in straight flight, times the airspeed's square
+    "induced",  # m^2/s^2, induced drag by weight in straight flight, times the airspeed's square
+    "wind_speed",  # m/s at the reference height
+    "wind_east",  # unit vector that it blows to
+    "wind_north",
+    "wind_gradient",
+    "wind_reference",
+    ("has_power", np.bool_),
+)
+
+
+class PointMass(NamedTuple):
+    """What a return is flown with.
+
+    record: of `POINT_MASS`.
+    excess: (t, v, h) specific excess power, by throttle, m/s.
+    power: (3, v, h) electric power at idle, in level flight and at full throttle, W.
+    """
+
+    record: Record
+    excess: Floats
+    power: Floats
+
+
+def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
+    """An aircraft by its trims, in a wind.
+
+    airspeed: commanded, m/s, equivalent.  Beyond the grid of the trims its edge counts.
+    """
+    speeds, excess, alpha, lift = _trimmed(aircraft)
+    has_power = bool(envelope.power_level.size)
+    power = np.full((3, len(speeds), len(_HEIGHTS)), np.nan)
+    if has_power:
+        named = (envelope.power_idle, envelope.power_level, envelope.power_full)
+        power = np.stack([_resampled(envelope, table, speeds) for table in named])
+    record: Record = np.zeros(1, POINT_MASS)[0]
+    record.airspeed, record.slowest, record.has_power = airspeed, speeds[0], has_power
+    record.speed_step, record.height_step = speeds[1] - speeds[0], _HEIGHTS[1] - _HEIGHTS[0]
+    record.alpha, record.alpha_lift = alpha, lift
+    record.induced = _induced_drag(speeds, excess[0, :, 0])
+    record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
+    record.wind_east, record.wind_north = -math.sin(wind.from_course), -math.cos(wind.from_course)
+    return PointMass(record, excess, power)
+
+
+@functools.lru_cache(maxsize=8)
+def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
+    """Airspeeds (v,), specific excess power (t, v, h) and the angle of attack, without lift and times V^2 with it.
+
+    Where there is no trim the nearest throttle's counts.
+    """
+    simulator = Fdm(aircraft)
+    speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _SPEEDS)
+    excess = np.full((_THROTTLES, _SPEEDS, len(_HEIGHTS)), np.nan)
+    alphas = np.full(_SPEEDS, np.nan)
+    for h, amsl in enumerate(_HEIGHTS):
+        for v, speed in enumerate(speeds):
+            near = None
+            for t in reversed(range(_THROTTLES)):
+                found = trim(simulator, amsl, {"airspeed": float(speed), "throttle": t / (_THROTTLES - 1.0)}, near)
+                if found is None:
+                    continue
+                near = found
+                excess[t, v, h] = speed * math.sin(found.climb)
+                if h == 0:
+                    alphas[v] = found.alpha
+            _fill(excess[:, v, h])
+        for row in excess[:, :, h]:
+            _fill(row)
+    _fill(alphas)
+    terms = np.stack([np.ones(_SPEEDS), speeds**-2.0], axis=1)
+    alpha, lift = np.linalg.lstsq(terms, np.nan_to_num(alphas), rcond=None)[0]
+    return speeds, excess, float(alpha), float(lift)
+
+
+def _fill(values: Floats) -> None:
+    """Put between and beyond known values what is nearest to them."""
+    good = ~np.isnan(values)
+    if good.any():
+        values[:] = np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+
+
+def _resampled(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
+    """A table of the envelope at airspeeds (v,) and the grid's heights, its edges extended."""
+    filled = np.array(table)
+    for column in filled.T:
+        _fill(column)
+    by_speed = np.stack([np.interp(speeds, envelope.airspeed, column) for column in filled.T], axis=1)
+    return np.stack([np.interp(_HEIGHTS, envelope.amsl, row) for row in by_speed])
+
+
+def _induced_drag(speeds: Floats, excess: Floats) -> float:
+    """Induced drag by weight times the square of airspeed, of the drag polar through the glides with closed throttle.
+
+    Drag by weight is a V^2 + b / V^2 in straight flight; b is what bank adds to, as the square of the load.
+    """
+    terms = np.stack([speeds**2, speeds**-2.0], axis=1)
+    return max(0.0, float(np.linalg.lstsq(terms, -excess / speeds, rcond=None)[0][1]))
+
+
+@inner
+def angle_of_attack(state: Record, aircraft: Record) -> float:  # pragma: no cover - compiled
+    """Angle of attack at an airspeed in a bank, rad."""
+    load = 1.0 / max(0.3, math.cos(state.roll))
+    attack: float = aircraft.alpha + aircraft.alpha_lift * load / (state.airspeed * state.airspeed)
+    return attack
+
+
+@inner
+def move_on(
+    motion: Record,
+    state: Record,
+    angle: float,
+    throttle: float,
+    aircraft: Record,
+    excess: Floats,
+    power: Floats,
+    dt: float,
+) -> float:  # pragma: no cover - compiled
+    """Move a point mass on by ``dt`` s on a path angle (rad, to the air); returns the power that it takes, W."""
+    thrust = excess_power(excess, throttle, state.airspeed, motion.up, aircraft)
+    tilt = math.tan(min(1.2, abs(state.roll)))
+    gain = thrust - aircraft.induced / state.airspeed * tilt * tilt
+    taken = _power(thrust, excess, power, state.airspeed, motion.up, aircraft)
+    state.yaw += GRAVITY * math.tan(state.roll) / state.airspeed * dt
+    state.airspeed = max(3.0, state.airspeed + (GRAVITY * gain / state.airspeed - GRAVITY * math.sin(angle)) * dt)
+    wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, motion.up)
+    level = state.airspeed * math.cos(angle)
+    motion.velocity_east = level * math.sin(state.yaw) + wind * aircraft.wind_east
+    motion.velocity_north = level * math.cos(state.yaw) + wind * aircraft.wind_north
+    motion.velocity_up = state.airspeed * math.sin(angle)
+    motion.east += motion.velocity_east * dt
+    motion.north += motion.velocity_north * dt
+    motion.up += motion.velocity_up * dt
+    return taken
+
+
+@inner
+def _power(
+    thrust: float, excess: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
+) -> float:  # pragma: no cover - compiled
+    """Electric power at a specific excess power, by the parabola of `aircraft.envelope.Envelope.power`, W."""
+    if not aircraft.has_power:
+        return 0.0
+    low = _at(power[0], airspeed, amsl, aircraft)
+    middle = _at(power[1], airspeed, amsl, aircraft)
+    high = _at(power[2], airspeed, amsl, aircraft)
+    full, idle = _at(excess[excess.shape[0] - 1], airspeed, amsl, aircraft), _at(excess[0], airspeed, amsl, aircraft)
+    if thrust >= full or not idle < 0.0 < full:
+        return high
+    if thrust <= idle:
+        return low
+    return (
+        low * thrust * (thrust - full) / (idle * (idle - full))
+        + middle * (thrust - idle) * (thrust - full) / (-idle * -full)
+        + high * thrust * (thrust - idle) / (full * (full - idle))
+    )
+
+
+@inner
+def excess_power(
+    excess: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record
+) -> float:  # pragma: no cover - compiled
+    """Specific excess power in straight flight at a throttle, an airspeed and a height, m/s."""
+    x = min(1.0, max(0.0, throttle)) * (excess.shape[0] - 1)
+    i = min(excess.shape[0] - 2, int(x))
+    low, high = _at(excess[i], airspeed, amsl, aircraft), _at(excess[i + 1], airspeed, amsl, aircraft)
+    value: float = low + (x - i) * (high - low)
+    return value
+
+
+@inner
+def _at(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:  # pragma: no cover - compiled
+    """A table (v, h) at an airspeed and a height, bilinear, its edges extended."""
+    x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.slowest) / aircraft.speed_step))
+    y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.height_step))
+    i, j = min(table.shape[0] - 2, int(x)), min(table.shape[1] - 2, int(y))
+    p, q = x - i, y - j
+    low = (1.0 - q) * table[i, j] + q * table[i, j + 1]
+    high = (1.0 - q) * table[i + 1, j] + q * table[i + 1, j + 1]
+    value: float = (1.0 - p) * low + p * high
+    return value
