@@ -35,6 +35,7 @@ class Envelope:
     volts: battery voltage, 0 without one.
     source: what the model was made from where its slopes are not known for certain: "a data sheet"; "" where they are.
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
+    fastest_sd: of the fastest level flight, m/s.
     power_sd: standard deviation of power, as a share.
     battery_guessed: whether nobody stated what the battery holds.
     """
@@ -56,6 +57,7 @@ class Envelope:
     source: str = ""
     climb_sd: float = 0.0
     descent_sd: float = 0.0
+    fastest_sd: float = 0.0
     power_sd: float = 0.0
     battery_guessed: bool = False
 
@@ -80,7 +82,9 @@ class Envelope:
         )
 
     def surely(self) -> "Envelope":
-        """The slopes that the aircraft can for certain, as far as is known: `UNDECIDED` deviations less, 0 at least.
+        """What the aircraft can for certain, as far as is known: `UNDECIDED` deviations less than it may.
+
+        Slopes are 0 at least, and the fastest level flight is no slower than the slowest.
 
         >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
         >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
@@ -88,7 +92,7 @@ class Envelope:
         >>> round(float(made.surely().climb[0, 0]), 4), float(made.surely().descent[0, 0]), made.surely().climb_sd
         (0.0355, 0.0, 0.0)
         """
-        if not (self.climb_sd or self.descent_sd):
+        if not (self.climb_sd or self.descent_sd or self.fastest_sd):
             return self
         less = {name: UNDECIDED * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
         # What loses height stays as it is.
@@ -96,7 +100,10 @@ class Envelope:
             np.where(table > 0.0, np.maximum(0.0, table - less[name]), table)
             for name, table in (("climb", self.climb), ("descent", self.descent))
         )
-        return replace(self, climb=climb, descent=descent, climb_sd=0.0, descent_sd=0.0)
+        fastest = np.fmax(self.level_speed_min, self.level_speed_max - UNDECIDED * self.fastest_sd)
+        return replace(
+            self, climb=climb, descent=descent, level_speed_max=fastest, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0
+        )
 
     def slope_limits(
         self, airspeed: float, amsl: float, tailwind: float = 0.0, crosswind: float = 0.0

@@ -29,7 +29,7 @@ MAX_BYTES = 4 * 2**20
 _PREFIX = "ident/"
 # Keys that must be there, those that may, and those of what else `posterior.toml` says of the logs.
 _NEEDED = frozenset({"climb_sd_deg", "descent_sd_deg"})
-_OPTIONAL = frozenset({"source", "quantity", "battery_guessed", "power_sd"})
+_OPTIONAL = frozenset({"source", "quantity", "battery_guessed", "fastest_sd_mps", "power_sd"})
 _OF_LOGS = frozenset({
     "base", "mass_kg", "seconds", "battery_current", "airspeed_factor", "airspeed_factor_sd", "dynamics", "held_fixed",
     "log", "correlation",
@@ -59,6 +59,7 @@ class Uncertainty:
     climb, descent: standard deviations of the steepest climb and descent at cruise, rad.
     quantities: of the model.
     power: standard deviation of the power that flight takes, as a share.
+    fastest: standard deviation of the fastest level flight, m/s.
     battery_guessed: whether nobody stated what its battery holds.
     """
 
@@ -68,6 +69,7 @@ class Uncertainty:
     quantities: tuple[UncertainQuantity, ...] = ()
     power: float = 0.0
     battery_guessed: bool = False
+    fastest: float = 0.0
 
 
 def read_uncertainty(folder: Path) -> Uncertainty | None:
@@ -105,7 +107,9 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     power = POWER_SD if file.name == FILES[1] else 0.0
     if "power_sd" in table:
         power = _number(table, "power_sd", file, 0.0, 1.0)
-    return Uncertainty(source, climb, descent, quantities, power, guessed)
+    # A folder of before it was judged says nothing of it.
+    fastest = _number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
+    return Uncertainty(source, climb, descent, quantities, power, guessed, fastest)
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
@@ -150,6 +154,7 @@ def uncertainty_text(known: Uncertainty) -> str:
         f'source = "{known.source}"',
         f"climb_sd_deg = {math.degrees(known.climb):.2f}    # of the steepest climb at cruise, one standard deviation",
         f"descent_sd_deg = {math.degrees(known.descent):.2f}  # of the steepest descent",
+        f"fastest_sd_mps = {known.fastest:.2f}  # of the fastest level flight",
         f"power_sd = {known.power:.3g}  # of the power that flight takes, as a share",
     ]
     if known.battery_guessed:

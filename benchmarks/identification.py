@@ -46,6 +46,7 @@ from tests.instrumented_flights import (
     fly_identification,
     sensed,
 )
+from world.errors import FlightError, LogError
 
 Floats = NDArray[np.float64]
 
@@ -239,17 +240,25 @@ def main() -> None:
         except NotFlown as error:
             # The next seed takes its place.
             print(error, flush=True)
-        else:
-            rows.append(row)
-            print(json.dumps(row), flush=True)
-            Path(args.out).write_text(json.dumps(rows, indent=1), encoding="utf-8")
+            seed += 1
+            continue
+        except (LogError, FlightError) as error:
+            # An answer of its own: it counts, and no other seed takes its place.
+            row = {"seed": seed, "refused": str(error)}
+        rows.append(row)
+        print(json.dumps(row), flush=True)
+        Path(args.out).write_text(json.dumps(rows, indent=1), encoding="utf-8")
         seed += 1
     print(json.dumps(summary(rows), indent=1))
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """The rows of the table."""
-    made: dict[str, Any] = {}
+    """The rows of the table; of variants whose log was refused, how many."""
+    refused = [row["seed"] for row in rows if "refused" in row]
+    made: dict[str, Any] = {"refused": refused}
+    rows = [row for row in rows if "refused" not in row]
+    if not rows:
+        return made
     for kind in ("without_battery", "with_battery"):
         chosen = [row[kind] for row in rows]
         for name in ("climb_deg", "sink_percent", "power_percent"):

@@ -19,7 +19,7 @@ from aircraft.data_sheet import (
     check_sheet,
     size_aircraft,
 )
-from aircraft.envelope import GRAVITY, turn_radius
+from aircraft.envelope import GRAVITY, UNDECIDED, turn_radius
 from aircraft.model_writer import FACTORS, Layout, model_xml
 from aircraft.uncertainty import (
     DRAWS,
@@ -194,47 +194,54 @@ def _uncertainty(made: SizedAircraft, aircraft: Aircraft, flown: "Performance", 
 
     flown: by the aircraft as estimated.
     """
-    middle = np.array([flown.climb.climb, flown.idle.climb])
+    middle = np.array([flown.climb.climb, flown.idle.climb, flown.fastest.airspeed])
     spreads = {name: sd for name, (sd, _) in _SPREADS.items()}
     if made.sheet.sink:
         spreads["zero-lift-drag"] = STATED_DRAG
     moved = {name: _moved(aircraft, middle, name, spreads[name]) for name in spreads}
     driven = math.hypot(*(moved[name][0] for name in _PROPULSION))
-    other = math.hypot(*(change for name, (change, _) in moved.items() if name not in _PROPULSION))
+    other = math.hypot(*(change for name, (change, *_) in moved.items() if name not in _PROPULSION))
     wanted = math.sqrt(max((0.3 * climb) ** 2, climb**2 - other**2))
     share = min(2.0, max(0.1, wanted / driven if driven > 0.0 else 1.0))
     spreads |= {name: share * spreads[name] for name in _PROPULSION}
-    descent = math.hypot(*(change for _, change in moved.values()))
+    descent = math.hypot(*(change for _, change, _ in moved.values()))
+    faster = math.hypot(*(change * (share if name in _PROPULSION else 1.0) for name, (*_, change) in moved.items()))
+    # The aircraft is known to fly level at the cruise speed that its sheet states.
+    faster = min(faster, max(0.0, flown.fastest.airspeed - aircraft.airspeed) / UNDECIDED)
     quantities = tuple(
         UncertainQuantity(f"ident/{name}", "factor", 1.0, sd, _SPREADS[name][1]) for name, sd in spreads.items()
     )
     # The factors of motor and propeller go only so far; what is said of the climb does not shrink with them.
     deviation = max(climb, math.hypot(other, share * driven))
-    return Uncertainty("a data sheet", deviation, descent, quantities, POWER_SD, "energy" in made.guessed)
+    guessed = "energy" in made.guessed
+    return Uncertainty("a data sheet", deviation, descent, quantities, POWER_SD, guessed, faster)
 
 
-def _moved(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float]:
-    """How far one standard deviation of a factor moves the steepest climb and descent at cruise, rad.
+def _moved(aircraft: Aircraft, middle: Floats, name: str, sd: float) -> tuple[float, float, float]:
+    """How far one standard deviation of a factor moves the steepest climb and descent at cruise, rad, and the top, m/s.
 
-    middle: (2,) both path angles of the aircraft as estimated.
+    middle: (3,) both path angles and the fastest level flight of the aircraft as estimated.
     """
-    angles = []
+    found = []
     for sign in (1.0, -1.0):
         fdm = Fdm(aircraft, tried=True, variation=Variation(properties=((f"ident/{name}", 1.0 + sign * sd),)))
-        found = (steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle))
-        angles.append([math.nan if trim is None else trim.climb for trim in found])
-    climb, descent = angle_change(np.array(angles[0]), np.array(angles[1]), middle).tolist()
-    return climb, descent
+        angles = [steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle)]
+        top = fastest(fdm, AMSL)
+        found.append([
+            *(math.nan if trim is None else trim.climb for trim in angles), math.nan if top is None else top.airspeed,
+        ])  # fmt: skip
+    climb, descent, faster = change_of(np.array(found[0]), np.array(found[1]), middle).tolist()
+    return climb, descent, faster
 
 
-def angle_change(more: Floats, less: Floats, middle: Floats) -> Floats:
-    """(n,) how far a factor moves path angles, from those with more and with less of it, rad.
+def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
+    """(n,) how far a factor moves path angles and speeds, from those with more and with less of it.
 
-    An angle is NaN where the aircraft does not trim: the change to the one that there is then counts, and the whole
-    angle if there is neither.  middle: (n,) angles as estimated.
+    One is NaN where the aircraft does not trim: the change to the one that there is then counts, and the whole of it if
+    there is neither.  middle: (n,) as estimated.
 
     >>> more, less = np.array([0.3, math.nan, math.nan]), np.array([0.1, 0.05, math.nan])
-    >>> angle_change(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
+    >>> change_of(more, less, np.array([0.2, 0.2, -0.2])).round(2).tolist()
     [0.1, 0.15, 0.2]
     """
     one_sided = np.fmax(np.abs(more - middle), np.abs(less - middle))
@@ -520,7 +527,7 @@ def _readme(
         "## What is not known",
         "",
         f"Standard deviations; the steepest climb's is {math.degrees(known.climb):.1f} degrees, the steepest descent's"
-        f" {math.degrees(known.descent):.1f} degrees.",
+        f" {math.degrees(known.descent):.1f} degrees, the fastest level flight's {known.fastest:.1f} m/s.",
         "",
         "| property of the model | factor on | deviation | because |",
         "|---|---|---|---|",

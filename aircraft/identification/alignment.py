@@ -98,8 +98,9 @@ _SAMPLED = (
     "acceleration", "rates", "rate_changes", "attitude", "velocity", "wind", "airspeed", "density", "surfaces",
     "throttle", "current", "voltage",
 )  # fmt: skip
-# Length of a block of time within which residuals may be autocorrelated, s.
-BLOCK_SECONDS = 20.0
+# Length of flight through the air within which residuals may be autocorrelated, m: gusts have lengths, and a slower
+# aircraft is longer in each.
+BLOCK_METRES = 500.0
 # Airspeed sensors are read 10 times a second; faster than this, Hz, is their noise.
 _AIRSPEED_BAND = 2.0
 
@@ -131,11 +132,21 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
         for name, values in made.items():
             parts.setdefault(name, []).append(values)
         edges.append(edges[-1] + len(record.time))
-        own = ((record.time - record.time[0]) // BLOCK_SECONDS).astype(np.int64)
+        seconds = BLOCK_METRES / float(record.airspeed.mean())
+        own = ((record.time - record.time[0]) // seconds).astype(np.int64)
         blocks.append(own + number)
         number += int(own[-1]) + 1
     joined: dict[str, Any] = {name: np.concatenate(values) for name, values in parts.items()}
     return Signals(**joined, edges=tuple(edges), block=np.concatenate(blocks))
+
+
+def led(values: Floats, lag: float, hertz: float) -> Floats:
+    """(n,) as it was before a first-order lag (s), a sample at a time: values and so much of their rate of change.
+
+    >>> led(np.arange(4.0), 0.5, 10.0)
+    array([5., 6., 7., 8.])
+    """
+    return np.asarray(values + lag * hertz * np.gradient(values))
 
 
 # The grid that the search begins on, and its limits, s: lag and delay of the accelerometers, lag of the servos.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.identification.electric_motor import ElectricMotor
+from aircraft.identification.motor import Motor
 
 Floats = NDArray[np.float64]
 
@@ -15,7 +15,8 @@ class Coefficients:
     """Dimensionless coefficients about steady flight, per rad and per rad of rate x length / (2 V).
 
     Signs of the controls: trailing edge down, roll to the right, yaw to the left are positive.
-    drag_zero, drag_induced: CD = drag_zero + drag_induced CL^2 + drag_elevator elevator, CL of the angle of attack.
+    drag_zero, drag_induced: CD = drag_zero + drag_induced (CL - lift_least_drag)^2 + drag_elevator elevator, CL of the
+        angle of attack alone.
     lift_...: of lift.  side_...: of side force.  roll_..., pitch_..., yaw_...: of the moments.
     """
 
@@ -43,6 +44,9 @@ class Coefficients:
     yaw_yaw: float
     yaw_aileron: float
     yaw_rudder: float
+    lift_least_drag: float = 0.0
+    side_roll: float = 0.0
+    side_yaw: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +68,6 @@ class BaseModel:
     servo_lag: float
     motor_lag: float
     coefficients: Coefficients
-    motor: ElectricMotor
+    motor: Motor
     reacts: bool = True
     induced_factor: float = 1.0

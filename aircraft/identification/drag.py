@@ -40,7 +40,7 @@ _FOLDING_STEPS = 3
 # Where the battery's voltage is logged, it is known this much better.
 _LOGGED_VOLTAGE = 0.25
 # What no model gets right, m/s^2 and A, and over how long it stays the same, s: a climb, a glide, a level run.
-_FORCE_FLOOR, _CURRENT_FLOOR, _FLOOR_SECONDS = 0.015, 0.3, 25.0
+FORCE_FLOOR, _CURRENT_FLOOR, FLOOR_SECONDS = 0.015, 0.3, 25.0
 _OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
 _STEP = 1e-3
 # Steps of a search at most, and how short the last is, as a share of the prior's standard deviations.
@@ -60,7 +60,7 @@ class AlphaDoubt:
 
 
 @dataclass(frozen=True, slots=True)
-class _Forces:
+class ForwardForces:
     """Thinned signals, and what of the forward force each unknown makes.
 
     known: (n,) N, of lift.  tilts: (2, n) N, of a standard deviation of each doubt about the angle of attack.
@@ -108,7 +108,7 @@ def fit_drag(
 
     values: (n,) of all parameters, of which those of lift count.  doubt: about the lift curve.
     """
-    forces = _forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)
+    forces = forward_forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)
     thin = forces.signals
     with_current = bool(np.isfinite(thin.current).all())
     nuisances = np.array(list(NUISANCES.values()))
@@ -126,14 +126,14 @@ def fit_drag(
     return Fit(fit.estimate, fit.covariance, force, goal - force, explained), five, turn @ fit.covariance @ turn.T
 
 
-def _folded(forces: _Forces, unknown: Floats) -> tuple[Floats, Floats]:
+def _folded(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
     """Parameters (5,) that do alone what they and the aircraft's nuisances do together, and their slopes (5, p).
 
     Least squares over the log's own flow and throttle.  unknown: (p,) as fitted.
     """
     own = int(_OWN.sum())
     folded = own + np.flatnonzero(_OF_AIRCRAFT)
-    scale = _FORCE_FLOOR / _CURRENT_FLOOR
+    scale = FORCE_FLOOR / _CURRENT_FLOOR
 
     def joined(force: Floats, current: Floats) -> Floats:
         return np.concatenate([force, scale * current])
@@ -157,10 +157,10 @@ class _Goal:
     def __init__(self, signals: Signals, *, with_current: bool) -> None:
         self.force = signals.smooth(signals.acceleration[:, 0], FORCE_BAND)
         self.current = signals.smooth(signals.current, FORCE_BAND) if with_current else None
-        self.block, self.floor = signals.block, _FORCE_FLOOR**2 * _FLOOR_SECONDS * signals.hertz
+        self.block, self.floor = signals.block, FORCE_FLOOR**2 * FLOOR_SECONDS * signals.hertz
 
 
-def _search(forces: _Forces, goal: _Goal, means: Floats, sds: Floats, start: Floats | None = None) -> Fit:
+def _search(forces: ForwardForces, goal: _Goal, means: Floats, sds: Floats, start: Floats | None = None) -> Fit:
     """Steps of Gauss and Newton from a start, none longer than a standard deviation of the prior."""
     now = means.copy() if start is None else start.copy()
     for _ in range(_MOST_STEPS):
@@ -171,7 +171,7 @@ def _search(forces: _Forces, goal: _Goal, means: Floats, sds: Floats, start: Flo
         if goal.current is not None:
             # Both count by the scatter of their residuals.
             off = max(_CURRENT_FLOOR, float((goal.current - current).std()))
-            scale = max(_FORCE_FLOOR, float(left.std())) / off
+            scale = max(FORCE_FLOOR, float(left.std())) / off
             rows = np.vstack([rows, scale * second])
             goals = np.concatenate([goals, scale * (goal.current - current + second @ now)])
             blocks = np.concatenate([blocks, blocks])
@@ -183,19 +183,20 @@ def _search(forces: _Forces, goal: _Goal, means: Floats, sds: Floats, start: Flo
     return Fit(now, fit.covariance, fit.predicted, fit.residual, fit.explained)
 
 
-def _forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt) -> _Forces:
+def forward_forces(signals: Signals, base: BaseModel, values: Floats, flow: Flow, doubt: AlphaDoubt) -> ForwardForces:
+    """What each unknown makes of the forward force, over the thinned signals; values, doubt: as of `fit_drag`."""
     c, (slope, zero) = base.coefficients, lift_curve(base, values)
     thin = signals.thinned(FORCE_THINNING, {"alpha": flow.alpha})
     alpha, pressure = thin.extra["alpha"], pressure_of(thin, base)
     lift = slope * alpha + zero
-    ahead = -pressure * np.cos(alpha)
+    ahead, rise = -pressure * np.cos(alpha), lift - c.lift_least_drag
     tilt = pressure * lift * np.cos(alpha)
-    return _Forces(
+    return ForwardForces(
         signals=thin,
         base=base,
         known=pressure * (lift + other_lift(thin, base)) * np.sin(alpha),
         tilts=tilt * np.vstack([np.full(len(alpha), doubt.angle), doubt.by_lift * (lift - doubt.middle)]),
-        drags=ahead * np.vstack([np.full(len(alpha), c.drag_zero), c.drag_induced * np.square(lift)]),
+        drags=ahead * np.vstack([np.full(len(alpha), c.drag_zero), c.drag_induced * np.square(rise)]),
         elevator=ahead * c.drag_elevator * thin.surfaces[:, 0],
         volts=voltage_of(thin, base),
     )

@@ -44,6 +44,14 @@ class ElectricMotor:
             idle_current=self.idle_current * idle,
         )
 
+    def for_voltage(self, volts: float) -> "ElectricMotor":
+        """A motor wound for another voltage: the same torque and power at the same speed."""
+        ratio = volts / self.voltage
+        return replace(
+            self, voltage=volts, back_voltage=self.back_voltage * ratio, resistance=self.resistance * ratio * ratio,
+            idle_current=self.idle_current / ratio,
+        )  # fmt: skip
+
     def speed(self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float) -> Floats:
         """Speed of the propeller (n,), rad/s; throttle 0..1, voltage of the battery, V."""
         q2, q1, q0 = self._torques(airspeed, density)

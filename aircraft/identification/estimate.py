@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.identification.airspeed import SCALE_SD, with_airspeed_scale
-from aircraft.identification.alignment import Clocks, Signals, align, find_clocks
+from aircraft.identification.alignment import Clocks, Signals, align, find_clocks, led
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.drag import FORCE_THINNING, AlphaDoubt, fit_drag
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import motor_of, vane
-from aircraft.identification.held_fixed import HELD_FIXED
+from aircraft.identification.held_fixed import HELD_FIXED, NOISE
 from aircraft.identification.level import LEVEL_SD, levelled
 from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
@@ -119,20 +119,38 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
     clocks = align_clocks(records, base) if dynamics else tuple(slow for _ in records)
     signals = aligned_signals(records, clocks, base)
     nominal = fit_all(signals, base, dynamics=dynamics)
-    shifts = {}
+    shifts, hidden = {}, np.zeros(len(PARAMETERS))
     for held in HELD_FIXED:
         if held.applies(with_current=nominal.with_current):
             changed, model = held.change(signals, base)
-            shifts[held.name] = fit_all(changed, model, level=held.level, dynamics=dynamics).values - nominal.values
+            other = fit_all(changed, model, level=held.tilt(changed), dynamics=dynamics)
+            shifts[held.name] = other.values - nominal.values
+            hidden += _hidden_by_noise(nominal, other) if held.name == NOISE else 0.0
     shifts |= _lift_shifts(signals, base, nominal)
     return replace(
         nominal,
+        values=nominal.values - hidden,
         covariance=total_covariance(nominal.covariance, shifts),
         clocks=clocks,
         shifts=shifts,
         airspeed=(signals.airspeed_factor, signals.airspeed_sd),
         seconds=sum(record.seconds for record in records),
     )
+
+
+def _hidden_by_noise(nominal: Estimate, noisier: Estimate) -> Floats:
+    """(n,) by how much the noise that there is draws the moments' parameters away: as far as as much again does.
+
+    Noise in a regressor flattens its slope (Cook and Stefanski 1994, with the straight line of their extrapolants).  An
+    axis that the noise leaves to the prior tells nothing.
+    """
+    made = np.zeros(len(PARAMETERS))
+    explained = {one.name: one.explained for one in noisier.equations}
+    for axis in AXES if nominal.dynamics else ():
+        if explained[_EQUATIONS[axis][0]] >= LEAST_EXPLAINED:
+            own = np.array([parameter.group == axis for parameter in PARAMETERS])
+            made[own] = noisier.values[own] - nominal.values[own]
+    return made
 
 
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
@@ -170,10 +188,21 @@ def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Cloc
             alpha, beta, _ = vane(signals, base, prior_means())
             # The clocks are to fit, not the prior.
             fits = fit_moments(signals, base, alpha, beta, spread=10.0)
-            return sum(float(np.log(1.0 - fits[axis].explained + 1e-6)) for axis in AXES)
+            return sum(_left(fits[axis], clock.lag) for axis in AXES)
 
         found[source] = find_clocks(misfit)
     return tuple(found[record.source] for record in records)
+
+
+def _left(fit: Fit, lag: float) -> float:
+    """Logarithm of the share that a fit leaves unexplained of moments that were made late by a lag, s.
+
+    The lag smooths: what is fast and explained badly goes away with it, and the longest would always seem best.  So
+    both are taken as they were before it.
+    """
+    hertz = GRID_HZ / MOMENT_THINNING
+    left, all_of_it = (led(values, lag, hertz) for values in (fit.residual, fit.predicted + fit.residual))
+    return float(np.log(left.var() / (all_of_it.var() + 1e-300) + 1e-6))
 
 
 def fit_all(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.electric_motor import ElectricMotor
+from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import INDEX
 
 Floats = NDArray[np.float64]
@@ -34,7 +34,7 @@ def lift_curve(base: BaseModel, values: Floats) -> tuple[float, float]:
     return c.lift_alpha * float(values[INDEX["lift-slope"]]), c.lift_zero + float(values[INDEX["lift-offset"]])
 
 
-def motor_of(base: BaseModel, values: Floats) -> ElectricMotor:
+def motor_of(base: BaseModel, values: Floats) -> Motor:
     """The motor with one set of values (n,)."""
     thrust, speed, torque = (float(values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
     return base.motor.changed(thrust, speed, torque)
@@ -74,7 +74,9 @@ def vane(signals: Signals, base: BaseModel, values: Floats) -> Flow:
         lift = (x * np.sin(alpha) - z * np.cos(alpha)) / pressure - other
         alpha = (lift - zero) / slope
     _, aileron, rudder = signals.surfaces.T
-    side = base.mass * signals.acceleration[:, 1] / pressure
+    across = base.span / (2.0 * signals.airspeed)
+    turning = c.side_roll * signals.rates[:, 0] * across + c.side_yaw * signals.rates[:, 2] * across
+    side = base.mass * signals.acceleration[:, 1] / pressure - turning
     beta = (side - c.side_aileron * aileron - c.side_rudder * rudder) / c.side_beta
     return Flow(*(signals.smooth(values, VANE_BAND) for values in (alpha, beta, lift)))
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
+from aircraft.identification.flow import VANE_BAND
 
 Floats = NDArray[np.float64]
 Changed = tuple[Signals, BaseModel]
@@ -20,13 +21,19 @@ class Held:
     name: for people, with its standard deviation.
     change: signals and model with it one standard deviation further.
     level: rad, by which the autopilot's level is changed.
+    air: m/s, by which air that rises is changed.
     of_current: whether it only counts where the battery's current was logged.
     """
 
     name: str
     change: Callable[[Signals, BaseModel], Changed]
     level: float = 0.0
+    air: float = 0.0
     of_current: bool = False
+
+    def tilt(self, signals: Signals) -> float:
+        """By how much the flow's angle to the level is changed, rad."""
+        return self.level + (self.air / float(signals.airspeed.mean()) if self.air else 0.0)
 
     def applies(self, *, with_current: bool) -> bool:
         """Whether it counts for logs with or without the battery's current."""
@@ -72,6 +79,26 @@ def _acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel], Chan
     return change
 
 
+def _noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Changed]:
+    """As much noise of the accelerometers again as there is: what it hides of a slope, more of it hides as much again.
+
+    Cook and Stefanski 1994 (SIMEX).  The noise is what is faster than the vane, taken as white.
+    """
+
+    def change(signals: Signals, base: BaseModel) -> Changed:
+        made, draw = signals.acceleration.copy(), np.random.default_rng(1)
+
+        def fast(values: Floats) -> float:
+            return float((values - signals.smooth(values, VANE_BAND)).std())
+
+        for axis in axes:
+            white = draw.standard_normal(len(made))
+            made[:, axis] += fast(made[:, axis]) / fast(white) * white
+        return replace(signals, acceleration=made), base
+
+    return change
+
+
 def _late_force(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (
         replace(signals, acceleration=signals.delayed(signals.acceleration, seconds)),
@@ -83,17 +110,6 @@ def _late_surfaces(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (replace(signals, surfaces=signals.delayed(signals.surfaces, seconds)), base)
 
 
-def _motor(**factors: float) -> Callable[[Signals, BaseModel], Changed]:
-    return lambda signals, base: (signals, replace(base, motor=base.motor.changed(**factors)))
-
-
-def _volts(factor: float) -> Callable[[Signals, BaseModel], Changed]:
-    return lambda signals, base: (
-        signals,
-        replace(base, motor=replace(base.motor, voltage=base.motor.voltage * factor)),
-    )
-
-
 def _current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (replace(signals, current=signals.current * factor), base)
 
@@ -102,6 +118,7 @@ def _same(signals: Signals, base: BaseModel) -> Changed:
     return signals, base
 
 
+NOISE = "noise of the accelerometers"
 _LEVEL = float(np.radians(0.2))
 # Doubts are shares of the base's value.  Bases leave out what is small, and a value of 0 is no more certain than the
 # Aerosonde's (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2): its doubt is the least.
@@ -118,7 +135,8 @@ HELD_FIXED = (
     Held("airspeed (as the wind triangle has it)", _airspeed),
     # A level that is off shows as a bias of the forward accelerometer as well, which is taken off.
     Held("level of the autopilot (0.2 deg)", _acceleration(0, _LEVEL * 9.80665), level=_LEVEL),
-    Held("mean vertical air (0.1 deg)", _same, level=0.5 * _LEVEL),
+    Held("mean vertical air (0.04 m/s)", _same, air=0.04),
     Held("downward accelerometer (0.03 m/s2)", _acceleration(2, 0.03)),
+    Held(NOISE, _noise((1, 2))),
     Held("scale of the current (2 %)", _current(1.02), of_current=True),
 )

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.electric_motor import ElectricMotor
 from aircraft.identification.flow import pressure_of
+from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import PARAMETERS, Group
 from aircraft.identification.regression import Fit, fit_with_prior
 
@@ -28,7 +28,7 @@ def fit_moments(
     base: BaseModel,
     alpha: Floats,
     beta: Floats,
-    motor: ElectricMotor | None = None,
+    motor: Motor | None = None,
     spread: float = 1.0,
 ) -> dict[Group, Fit]:
     """The three fits by their axis; roll and yaw have a constant behind their parameters that is not kept.
@@ -54,7 +54,7 @@ def fit_moments(
     return fits
 
 
-def _turning(signals: Signals, base: BaseModel, motor: ElectricMotor) -> dict[Group, Floats]:
+def _turning(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Floats]:
     """Aerodynamic moments (n,), N m, that the motion needs; the propeller's torque rolls to the left."""
     ixx, iyy, izz, ixz = base.inertia
     p, q, r = signals.rates.T

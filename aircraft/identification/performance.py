@@ -52,6 +52,37 @@ def performance(base: BaseModel, values: Floats, airspeed: float, density: float
     )
 
 
+# Between which the fastest level flight is looked for, m/s.
+_SPEEDS = (3.0, 150.0)
+
+
+def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
+    """(m,) fastest level flight, at full throttle, m/s, of parameter values (m, n); density: kg/m^3."""
+    values = np.atleast_2d(values)
+    count = len(values)
+    full, level = np.ones(count), np.zeros(count)
+
+    def spare(speed: Floats) -> Floats:
+        thrust, _ = _thrust(base, values, speed, full, density)
+        alpha, drag = _flow(base, values, speed, density, thrust, level)
+        return np.asarray(thrust * np.cos(alpha) - drag)
+
+    # From above: there is a slower speed at which thrust is drag again, on the back side of the power curve.
+    high = np.full(count, _SPEEDS[1])
+    low = high.copy()
+    for _ in range(200):
+        short = (spare(low) < 0.0) & (low > _SPEEDS[0])
+        if not short.any():
+            break
+        high = np.where(short, low, high)
+        low = np.where(short, 0.97 * low, low)
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        short = spare(middle) < 0.0
+        low, high = np.where(short, low, middle), np.where(short, middle, high)
+    return np.asarray(0.5 * (low + high))
+
+
 def _steady(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
     """Path angle (m,), rad, at a throttle."""
     thrust, _ = _thrust(base, values, airspeed, throttle, density)
@@ -63,7 +94,7 @@ def _steady(base: BaseModel, values: Floats, airspeed: float, density: float, th
 
 
 def _flow(
-    base: BaseModel, values: Floats, airspeed: float, density: float, thrust: Floats, angle: Floats
+    base: BaseModel, values: Floats, airspeed: Floats | float, density: float, thrust: Floats, angle: Floats
 ) -> tuple[Floats, Floats]:
     """Angle of attack and drag (m,) of flight at a path angle, with the elevator that balances it."""
     c = base.coefficients
@@ -82,15 +113,16 @@ def _flow(
         alpha = (lift / pressure - zero - c.lift_elevator * at_zero) / (slope + c.lift_elevator * per_alpha)
     elevator = at_zero + per_alpha * alpha
     lifting = zero + slope * alpha
-    drag = c.drag_zero * column["zero-lift-drag"] + c.drag_induced * column["induced-drag"] * np.square(lifting)
+    induced = c.drag_induced * column["induced-drag"] * np.square(lifting - c.lift_least_drag)
+    drag = c.drag_zero * column["zero-lift-drag"] + induced
     return alpha, pressure * (drag + c.drag_elevator * elevator)
 
 
 def _thrust(
-    base: BaseModel, values: Floats, airspeed: float, throttle: Floats, density: float
+    base: BaseModel, values: Floats, airspeed: Floats | float, throttle: Floats, density: float
 ) -> tuple[Floats, Floats]:
     """Thrust, N, and the battery's current, A, (m,)."""
     # Arrays over the draws in place of the motor's constants: its formulas take them as they are.
     thrust, speed, torque = (values[:, INDEX[name]] for name in ("thrust", "motor-speed", "propeller-torque"))
     many = base.motor.changed(thrust, speed, torque)  # type: ignore[arg-type]
-    return many.thrust_and_current(np.full(len(values), airspeed), throttle, np.full(len(values), density))
+    return many.thrust_and_current(np.zeros(len(values)) + airspeed, throttle, np.full(len(values), density))

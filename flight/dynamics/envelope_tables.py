@@ -46,6 +46,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         source="" if known is None else known.source,
         climb_sd=0.0 if known is None else known.climb,
         descent_sd=0.0 if known is None else known.descent,
+        fastest_sd=0.0 if known is None else known.fastest,
         power_sd=0.0 if known is None else known.power,
         battery_guessed=known is not None and known.battery_guessed,
         aircraft=aircraft.name,

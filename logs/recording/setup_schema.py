@@ -153,6 +153,7 @@ class EnvelopeTable(SetupModel):
     source: str = ""
     climb_sd: Annotated[Finite, Field(alias="climb_sd_rad", ge=0.0)] = 0.0
     descent_sd: Annotated[Finite, Field(alias="descent_sd_rad", ge=0.0)] = 0.0
+    fastest_sd: Annotated[Finite, Field(alias="fastest_sd_mps", ge=0.0)] = 0.0
     power_sd: Annotated[Finite, Field(ge=0.0)] = 0.0
     battery_guessed: bool = False
 

@@ -369,13 +369,15 @@ def fly_faster(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
 def fly_level_speed(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
 ) -> tuple[Suggestion, ...]:
-    """An airspeed of level flight at the leg's height."""
+    """An airspeed of level flight at the leg's height; one that is sure, where the aircraft's fastest is not known."""
     leg = item.place.index
     if leg is None or item.limit is None or item.margin is None:
         return ()
     commanded = float(requirements.setup.route.airspeed[leg])
     up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
-    low, high = (speed / _true(requirements, leg) for speed in requirements.setup.envelope.level_speeds(up))
+    envelope = requirements.setup.envelope
+    known = envelope.surely() if item.check == UNKNOWN_AIRCRAFT else envelope
+    low, high = (speed / _true(requirements, leg) for speed in known.level_speeds(up))
     if low <= commanded <= high:
         return ()
     low = math.ceil(10.0 * low * (1.0 + BUFFER_SPEED)) / 10.0

@@ -52,8 +52,17 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     every = left_open(findings)
     found = [item for item in every if item.rule == "slope"]
     if len(found) < len(every):
-        slopes = f"slopes on {len(found)} legs and energy are" if found else "energy is"
-        return f"{slopes} within what is not known of the aircraft"
+        speeds = sum(item.rule == "speed" for item in every)
+        subjects = [
+            f"{name}{'s' if count > 1 or name == 'slope' else ''} on {count} leg{'s' if count > 1 else ''}"
+            for name, count in (("slope", len(found)), ("airspeed", speeds))
+            if count
+        ]
+        subjects += ["energy"] if len(found) + speeds < len(every) else []
+        one = len(subjects) == 1 and (subjects == ["energy"] or speeds == 1)
+        are = "is" if one else "are"
+        listed = " and ".join(filter(None, [", ".join(subjects[:-1]), subjects[-1]]))
+        return f"{listed} {are} within what is not known of the aircraft"
     if not found:
         return ""
     if len(found) > _NAMED:

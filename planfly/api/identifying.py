@@ -29,6 +29,7 @@ from planfly.identification.records import (
 )
 from planfly.identification.replay import QUANTITIES, UNITS, Replay, replay_log
 from planfly.identification.servos import ServoOutput, read_servos
+from planfly.identification.wide_numbers import WideNumber, wide_numbers
 from planfly.stages import stage
 from world.errors import FlightError, LogError, PlanflyError
 from world.files import whole_path, write_folder
@@ -65,6 +66,7 @@ class IdentifiedAircraft:
     replays: of the check log, by the base and by the identified model; none without one.
     without_current: logs without the battery's current where others have it: it is used of none then.
     slow: logs with few rows a second.
+    wide: numbers that the logs leave wide, each with the flight that would narrow it.
     """
 
     aircraft: Aircraft
@@ -75,6 +77,7 @@ class IdentifiedAircraft:
     replays: tuple[Replay, ...] = ()
     without_current: tuple[str, ...] = ()
     slow: tuple[SlowLog, ...] = ()
+    wide: tuple[WideNumber, ...] = ()
 
 
 @with_warm_up()
@@ -136,7 +139,7 @@ def identify_aircraft(
     write_folder(target, {name: text.encode() for name, text in files.items()})
     slow = slow_logs([one for one, _, _ in read])
     return IdentifiedAircraft(
-        read_aircraft(target), estimate, *_intervals(found), replays, without_current(records), slow
+        read_aircraft(target), estimate, *_intervals(found), replays, without_current(records), slow, _wide(found)
     )
 
 
@@ -231,7 +234,13 @@ def _page(found: Identified, replays: tuple[Replay, ...], checked: str | None, n
         )
         replay = ReplayedLog(checked, after.windows, rows, logged, flown, GRID_HZ)
     logs = tuple((Path(log.source).name, log.sha256) for log in found.logs)
-    return identification_page(IdentificationFacts(name, found.estimate, logs, numbers, replay))
+    wide = tuple(one.text for one in _wide(found))
+    return identification_page(IdentificationFacts(name, found.estimate, logs, numbers, replay, wide))
+
+
+def _wide(found: Identified) -> tuple[WideNumber, ...]:
+    _, sink, power = _intervals(found)
+    return wide_numbers(sink, power, with_current=found.estimate.with_current)
 
 
 Interval = tuple[float, float, float]

@@ -256,6 +256,7 @@ def _limits(airframe: Airframe, scenario: Scenario, *, drawn: bool) -> Limits:
     """The airframe's limits in another wind; drawn: whether the flight's aircraft is one of several draws."""
     old = airframe.limits
     # A drawn aircraft is one that is known: each of its flights is decided.
-    envelope = replace(old.envelope, climb_sd=0.0, descent_sd=0.0, power_sd=0.0) if drawn else old.envelope
+    known = replace(old.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
+    envelope = known if drawn else old.envelope
     limits = make_limits(scenario, envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
     return with_tracking(limits, airframe.autopilot, scenario)

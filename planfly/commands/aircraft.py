@@ -200,6 +200,8 @@ def _print_unknown(found: "planfly.IdentifiedAircraft") -> None:
         print("  performance only: under 10 rows of inertial sensors or outputs a second tell nothing of the moments")
     for log in found.slow:
         print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs: {log.setting} records more")
+    for number in found.wide:
+        print(f"  wide     {number.text}")
     for line in found.estimate.silent():
         print(f"  not seen {line}")
     for lacking in found.without_current:

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from aircraft.identification.base_model import BaseModel, Coefficients
 from aircraft.identification.electric_motor import ElectricMotor
+from aircraft.identification.motor import Motor
+from aircraft.identification.propeller_disc import PropellerDisc
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
 from world.errors import FlightError
@@ -26,8 +28,8 @@ _SLUG_FT2 = 1.3558179483314004
 def base_model(aircraft: Aircraft) -> BaseModel:
     """Numbers of an aircraft.
 
-    Raises FlightError for one without steady flight at cruise, and for one whose motor is not in the form of the
-    Aerosonde's, which cannot be found from logs.
+    Raises FlightError for one without steady flight at cruise, and for one whose motor is neither in the form of the
+    Aerosonde's nor in that of the Zagi's or the X8's.
 
     >>> from aircraft.catalog import load_aircraft
     >>> numbers = base_model(load_aircraft("aerosonde")).coefficients
@@ -75,7 +77,8 @@ class _Probe:
         # Drag against lift over the straight part of the curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])
         table = np.array([self._at(angle)[:2] for angle in angles])
-        induced, drag = np.polyfit(np.square(table[:, 1]), table[:, 0], 1)
+        induced, linear, constant = np.polyfit(table[:, 1], table[:, 0], 2)
+        least = -0.5 * linear / induced
         alpha = self._slope(self._at, _ANGLE)
         beta = self._slope(lambda step: self._at(0.0, beta=step), _ANGLE)
         elevator, aileron, rudder = (self._slope(partial(self._surface, k), _SURFACE) for k in range(3))
@@ -84,14 +87,15 @@ class _Probe:
             self._slope(partial(self._rate, k), _RATE) / size for k, size in enumerate((across, along, across))
         )
         return Coefficients(
-            drag_zero=float(drag), drag_induced=float(induced), drag_elevator=float(elevator[0]),
+            drag_zero=float(constant - induced * least * least), drag_induced=float(induced),
+            drag_elevator=float(elevator[0]),
             lift_zero=float(zero[1]), lift_alpha=float(alpha[1]), lift_rate=float(pitch[1]),
             lift_elevator=float(elevator[1]), side_beta=float(beta[2]), side_aileron=float(aileron[2]),
             side_rudder=float(rudder[2]), roll_beta=float(beta[3]), roll_roll=float(roll[3]), roll_yaw=float(yaw[3]),
             roll_aileron=float(aileron[3]), roll_rudder=float(rudder[3]), pitch_zero=float(zero[4]),
             pitch_alpha=float(alpha[4]), pitch_rate=float(pitch[4]), pitch_elevator=float(elevator[4]),
             yaw_beta=float(beta[5]), yaw_roll=float(roll[5]), yaw_yaw=float(yaw[5]), yaw_aileron=float(aileron[5]),
-            yaw_rudder=float(rudder[5]),
+            yaw_rudder=float(rudder[5]), lift_least_drag=float(least), side_roll=float(roll[2]), side_yaw=float(yaw[2]),
         )  # fmt: skip
 
     def _surface(self, k: int, step: float) -> Floats:
@@ -143,41 +147,59 @@ def _model(aircraft: Aircraft) -> ElementTree.Element | None:
         return None
 
 
-def read_motor(aircraft: Aircraft) -> ElectricMotor:
-    """Constants of a motor in the Aerosonde's form, from its model.  Raises FlightError for any other."""
+def read_motor(aircraft: Aircraft) -> Motor:
+    """Constants of a model's motor, or of its propeller as a disc.  Raises FlightError for any other form."""
     try:
         root = ElementTree.parse(aircraft.model_file).getroot()
         functions = {one.get("name", ""): one for one in root.iter("function")}
-
-        def numbers(name: str) -> list[float]:
-            return [float(one.text or "nan") for one in functions[name].iter("v")]
-
-        (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))
-        (damping,) = numbers("motor/b")
-        driven = numbers("motor/driven-rad_sec")
-        per_volt = -next(value for value in driven if value < 0.0)
-        # The no-load torque stands there, or in a function of its own.
-        own = functions.get("motor/loss-n_m")
-        idle = numbers("motor/loss-n_m")[0] if own is not None else next(v for v in driven if 0.0 < v < 2.0)
-        back = damping / per_volt
-        pull = "motor/pull-n" if "motor/pull-n" in functions else "motor/thrust-n"
-        thrust = numbers(pull)
-        windmill = numbers("motor/thrust-n")[1] if pull == "motor/pull-n" else 1.0
+        if "motor/exit-mps" in functions:
+            return _disc(functions, aircraft.battery_voltage)
+        return _electric_motor(functions, aircraft.battery_voltage)
     except (KeyError, ValueError, IndexError, StopIteration, OSError, ElementTree.ParseError):
-        allowed = "a motor in the form of aircraft/aerosonde/aerosonde.xml is expected"
+        allowed = "a motor in the form of aircraft/aerosonde/aerosonde.xml or aircraft/x8/x8.xml is expected"
         raise FlightError(
             f"{aircraft.model_file}: its motor cannot be identified: {allowed}",
             file=aircraft.model_file,
             allowed=allowed,
         ) from None
+
+
+def _numbers(function: ElementTree.Element) -> list[float]:
+    return [float(one.text or "nan") for one in function.iter("v")]
+
+
+def _disc(functions: dict[str, ElementTree.Element], volts: float) -> PropellerDisc:
+    behind, pull, power = (functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w"))
+    (exit_speed,) = _numbers(behind)
+    (area,) = (value for value in _numbers(pull) if value != 0.0)
+    # Half of the air's power by the efficiency.
+    (half,) = _numbers(power)
+    ducted = any((one.text or "").strip() == "motor/airspeed-mps" for one in behind.iter("p"))
+    return PropellerDisc(area, exit_speed, ducted, losses=2.0 * half - 1.0, voltage=volts, nominal=volts)
+
+
+def _electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> ElectricMotor:
+    def numbers(name: str) -> list[float]:
+        return _numbers(functions[name])
+
+    (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))
+    (damping,) = numbers("motor/b")
+    driven = numbers("motor/driven-rad_sec")
+    per_volt = -next(value for value in driven if value < 0.0)
+    # The no-load torque stands there, or in a function of its own.
+    own = functions.get("motor/loss-n_m")
+    idle = numbers("motor/loss-n_m")[0] if own is not None else next(v for v in driven if 0.0 < v < 2.0)
+    back = damping / per_volt
+    pull = "motor/pull-n" if "motor/pull-n" in functions else "motor/thrust-n"
+    thrust = numbers(pull)
     return ElectricMotor(
         torque=(q2, q1, q0),
         thrust=(thrust[0], thrust[1], thrust[2]),
         back_voltage=back,
         resistance=back / per_volt,
         idle_current=idle / back,
-        voltage=aircraft.battery_voltage,
-        windmill=windmill,
+        voltage=volts,
+        windmill=numbers("motor/thrust-n")[1] if pull == "motor/pull-n" else 1.0,
     )
 
 
@@ -199,14 +221,5 @@ def scaled(base: BaseModel, mass: float, span: float, area: float, volts: float 
         base, coefficients=replace(base.coefficients, drag_induced=induced),
         induced_factor=base.induced_factor / slender, mass=mass, span=span, area=area, chord=chord,
         inertia=(ixx * factor, iyy * factor, izz * factor, ixz * factor),
-        motor=base.motor if volts is None else _for_voltage(base.motor, volts),
-    )  # fmt: skip
-
-
-def _for_voltage(motor: ElectricMotor, volts: float) -> ElectricMotor:
-    """A motor wound for another voltage: the same torque and power at the same speed."""
-    ratio = volts / motor.voltage
-    return replace(
-        motor, voltage=volts, back_voltage=motor.back_voltage * ratio, resistance=motor.resistance * ratio * ratio,
-        idle_current=motor.idle_current / ratio,
+        motor=base.motor if volts is None else base.motor.for_voltage(volts),
     )  # fmt: skip

@@ -14,7 +14,7 @@ from aircraft.identification.drag import NUISANCES
 from aircraft.identification.draws import draw_aircraft
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
-from aircraft.identification.performance import Performance, performance
+from aircraft.identification.performance import Performance, fastest_level, performance
 from aircraft.uncertainty import Draws, draws_text
 from flight.autopilots.arduplane.parameters import DEFINITIONS, logged_parameters
 from flight.dynamics.envelope_tables import load_envelope
@@ -197,6 +197,7 @@ def posterior_text(found: Identified) -> str:
     # As a share; more than the whole of it is as good as nothing known.
     power = min(1.0, float(np.std(drawn.power) / best.power[0]))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (drawn.climb, drawn.sink))
+    fastest = fastest_level(found.numbers, found.draws, DENSITY)
     shares = estimate.of_log()
     lines = [
         "# What flight logs say of this aircraft.  Each property is one of the model's: a factor on the base's",
@@ -205,6 +206,7 @@ def posterior_text(found: Identified) -> str:
         'source = "flight logs"',
         f"climb_sd_deg = {climb:.3f}    # of the steepest climb at cruise, one standard deviation",
         f"descent_sd_deg = {sink:.3f}  # of the steepest descent",
+        f"fastest_sd_mps = {np.std(fastest):.3f}  # of the fastest level flight",
         f"power_sd = {power:.4f}        # of the power in level flight, as a share of it",
         f'base = "{found.base.name}"',
         f"mass_kg = {found.numbers.mass:.6g}",

@@ -1,7 +1,7 @@
 """The identified aircraft's JSBSim model: the base's text with what was estimated as properties ``ident/NAME``.
 
 The base's own coefficients stay.  Beside each function of forces and moments stands another, of what the estimate adds
-to them; motor and propeller are written anew, in the form of the Aerosonde's.  The properties' defaults are the
+to them; motor and propeller are written anew, in the form that the base has them in.  The properties' defaults are the
 estimate: a draw of the aircraft is another set of them.
 """
 
@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.electric_motor import ElectricMotor
+from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import INDEX, PARAMETERS
+from aircraft.identification.propeller_disc import PropellerDisc
 from aircraft.xml_text import number
 from world.errors import FlightError
 
@@ -144,7 +146,11 @@ def _additions(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control
     elevator, aileron, rudder = surfaces
     roll, pitch, yaw = (f"<p> velocities/{letter}-aero-rad_sec </p>" for letter in "pqr")
     wide, long, beta = "<p> aero/bi2vel </p>", "<p> aero/ci2vel </p>", "<p> aero/beta-rad </p>"
-    before, after = ("<product>" + 2 * f" <p> ident/lift-{when} </p>" + " </product>" for when in ("before", "after"))
+    above = [
+        f" <difference> <p> ident/lift-{when} </p> <v> {number(c.lift_least_drag)} </v> </difference>"
+        for when in ("before", "after")
+    ]
+    before, after = (f"<product>{2 * lift} </product>" for lift in above)
     sums = {
         "X": (
             f"{drag} ",
@@ -218,8 +224,41 @@ def _reactions(numbers: BaseModel, values: Floats, kept: list[ElementTree.Elemen
 </external_reactions>"""
 
 
-def _motor_functions(motor: ElectricMotor) -> dict[str, str]:
+def _motor_functions(motor: Motor) -> dict[str, str]:
     """The inside of each JSBSim function ``motor/NAME``, in the order in which they are computed."""
+    shared = {
+        "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
+        "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",
+    }
+    match motor:
+        case ElectricMotor():
+            return shared | _electric_functions(motor)
+        case PropellerDisc():
+            return shared | _disc_functions(motor)
+    raise TypeError(type(motor).__name__)
+
+
+def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
+    behind = "<p> motor/exit-mps </p>"
+    full = f"<product> <v> {number(disc.exit_speed)} </v> <p> ident/motor-speed </p> </product>"
+    exit_speed = f"<product> <p> motor/throttle-norm </p> {full} </product>"
+    first = f"<sum> {behind} {_AIR} </sum>"
+    if disc.ducted:
+        gained = f"<product> <p> motor/throttle-norm </p> <difference> {full} {_AIR} </difference> </product>"
+        exit_speed, first = f"<sum> {_AIR} {gained} </sum>", behind
+    pull = f"<v> {number(disc.pull)} </v> <p> ident/thrust </p> {_RHO} {first}"
+    # Power of the air, T (V + v_e) / 2, and what is lost beside it.
+    power = f"<v> {number(0.5 * disc.power * (1.0 + disc.losses))} </v> <p> ident/propeller-torque </p>"
+    return {
+        "exit-mps": exit_speed,
+        "thrust-n": f"<max> <v> 0 </v> <product> {pull} <difference> {behind} {_AIR} </difference> </product> </max>",
+        "torque-n_m": "<product> <v> 0 </v> <p> motor/throttle-norm </p> </product>",
+        "battery-power-w": f"<product> {power} <p> motor/thrust-n </p> <sum> {behind} {_AIR} </sum> </product>",
+        "battery-current-a": "<quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>",
+    }
+
+
+def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
     q2, q1, q0 = (number(value) for value in motor.torque)
     kv, r = motor.back_voltage, motor.resistance
     # Over the factor on motor speed: KV is divided by it, and its square is KQ KV.
@@ -242,8 +281,6 @@ def _motor_functions(motor: ElectricMotor) -> dict[str, str]:
     torque = "<p> ident/propeller-torque </p>"
     back = f"<quotient> <product> <v> {number(kv)} </v> {_SPEED} </product> {speed} </quotient>"
     return {
-        "rho-kg_m3": "<product> <p> atmosphere/rho-slugs_ft3 </p> <v> 515.3788183931961 </v> </product>",
-        "airspeed-mps": "<product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>",
         "input-v": "<product> <p> motor/battery-v </p> <p> motor/throttle-norm </p> </product>",
         "q2": f"<product> <v> {q2} </v> {torque} {_RHO} </product>",
         "q1": f"<product> <v> {q1} </v> {torque} {_RHO} {_AIR} </product>",

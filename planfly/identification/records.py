@@ -246,7 +246,7 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
 
 def _refuse_base_of_elevons(log: MotionLog, aircraft: Aircraft) -> None:
     if not is_flying_wing(aircraft):
-        advice = "a flying wing is expected as base: planfly aircraft --new FOLDER --layout wing makes one"
+        advice = "a flying wing is expected as base: x8, zagi, or one of planfly aircraft --new FOLDER --layout wing"
         message = f"flown with elevons, and the base {aircraft.name} has a tail: {advice}"
         raise LogError(f"{log.source}: {message}", file=log.source)
 

@@ -123,3 +123,11 @@ def test_the_verdict_publishes_what_decides(monkeypatch: pytest.MonkeyPatch) -> 
     assert known.surely().climb == pytest.approx(0.1)
     monkeypatch.undo()
     assert tolerances.UNDECIDED == UNDECIDED == 1.645
+
+
+def test_the_fastest_that_is_sure_is_1_645_deviations_less_and_no_slower_than_the_slowest() -> None:
+    known = replace(falling_envelope(), fastest_sd=2.0)
+    assert known.surely().level_speed_max == pytest.approx(falling_envelope().level_speed_max - 3.29)
+    assert known.surely().fastest_sd == 0.0
+    none = replace(falling_envelope(), fastest_sd=50.0).surely()
+    assert none.level_speed_max.tolist() == none.level_speed_min.tolist()

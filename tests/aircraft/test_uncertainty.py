@@ -24,7 +24,13 @@ LEVEL = UncertainQuantity("ident/level", "rad", -0.1, 0.02)
 
 def test_it_is_read_as_written(tmp_path: Path) -> None:
     known = Uncertainty(
-        "a data sheet", math.radians(5.0), math.radians(1.25), (THRUST, LEVEL), power=0.3, battery_guessed=True
+        "a data sheet",
+        math.radians(5.0),
+        math.radians(1.25),
+        (THRUST, LEVEL),
+        power=0.3,
+        battery_guessed=True,
+        fastest=1.25,
     )
     (tmp_path / "uncertainty.toml").write_text(uncertainty_text(known), encoding="utf-8")
     found = read_uncertainty(tmp_path)
@@ -33,7 +39,7 @@ def test_it_is_read_as_written(tmp_path: Path) -> None:
     assert (found.climb, found.descent) == pytest.approx((known.climb, known.descent))
     assert found.quantities == (THRUST, LEVEL)
     assert found.battery_guessed
-    assert found.power == 0.3
+    assert (found.power, found.fastest) == (0.3, 1.25)
     assert read_uncertainty(tmp_path.parent) is None
 
 
@@ -89,6 +95,7 @@ def test_bad_draws_are_refused(tmp_path: Path, text: str, told: str) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
+        (KNOWN + "fastest_sd_mps = -1", "fastest_sd_mps: -1: a number from 0 to 100 is expected"),
         ("climb_sd_deg = -1\ndescent_sd_deg = 1", "climb_sd_deg: -1: a number from 0 to 45 is expected"),
         ("source = 3", "source: 3: a text is expected"),
         (KNOWN + '[[quantity]]\nproperty = "x"\n', "a property ident/NAME is expected"),

@@ -18,7 +18,7 @@ from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest, full_throttle, slowest, straight
 from flight.simulation.simulate import simulate
 from planfly import data_sheets
-from planfly.data_sheets import angle_change, make_data_sheet_folder, stated_parameters, with_parameters
+from planfly.data_sheets import change_of, make_data_sheet_folder, stated_parameters, with_parameters
 from tests.setups import setup_maker
 from world.errors import FlightError
 
@@ -73,12 +73,18 @@ def test_its_intervals_are_those_of_its_draws(foam: Aircraft) -> None:
     # A guessed climb is known to 4.8 / sqrt(2 / pi) = 6.0 degrees; the draws give what is stated.
     assert math.degrees(known.climb) == pytest.approx(6.0, abs=0.1)
     draws = read_draws(foam.folder / "draws.csv")
-    angles = []
+    angles, tops = [], []
     for seed in range(40):
         fdm = Fdm(foam, tried=True, variation=Variation(properties=draws.properties(seed)))
         climb = full_throttle(fdm, 15.0, 500.0)
         assert climb is not None
         angles.append(math.degrees(climb.climb))
+        top = fastest(fdm, 500.0)
+        assert top is not None
+        tops.append(top.airspeed)
+    # The fastest level flight is 21 m/s, give or take what the same draws do.
+    assert np.std(tops) == pytest.approx(known.fastest, rel=0.4)
+    assert load_envelope(foam).fastest_sd == known.fastest > 0.5
     # 40 draws give a deviation to about 11 % (one standard deviation).
     assert np.std(angles) == pytest.approx(6.0, rel=0.4)
 
@@ -92,6 +98,14 @@ def test_what_is_said_of_the_climb_is_not_capped_with_the_propulsion(
     # Thrust goes to twice its 20 %, which comes to less than 30 degrees.
     assert {one.name: one.sd for one in known.quantities}["ident/thrust"] == pytest.approx(0.4)
     assert math.degrees(known.climb) == pytest.approx(30.0, abs=0.01)
+
+
+def test_it_surely_flies_as_fast_as_it_cruises(tmp_path: Path) -> None:
+    """The cruise speed is stated, not guessed: a sheet whose top is 1 m/s above it is sure of that much."""
+    made = make_data_sheet_folder(tmp_path / "foam", replace(FOAM, top=16.0, climb=math.radians(4.0)))
+    table = load_envelope(made)
+    assert table.level_speeds(500.0)[1] == pytest.approx(16.0, abs=0.3)
+    assert table.surely().level_speeds(500.0)[1] == pytest.approx(15.0, abs=0.1)
 
 
 @pytest.mark.parametrize("energy", [0.0, 74.0 * 3600.0])
@@ -122,7 +136,7 @@ def test_parameters_are_data(tmp_path: Path) -> None:
 def test_an_angle_that_is_not_flown_is_no_small_change() -> None:
     nan = math.nan
     more, less = np.array([0.3, nan, 0.3, nan]), np.array([0.1, 0.05, nan, nan])
-    found = angle_change(more, less, np.array([0.2, 0.2, 0.2, -0.2]))
+    found = change_of(more, less, np.array([0.2, 0.2, 0.2, -0.2]))
     # Half of what is between them; to the one; to the other; the whole angle.
     assert found == pytest.approx([0.1, 0.15, 0.1, 0.2])
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -65,6 +65,10 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
                 faults += [] if requirements.envelope else [message(text)]
         facts.append(Fact("speed error", mean - commanded, "m/s"))
     ok: bool | None = not faults
+    check = ""
+    if not faults and (doubt := _in_doubt(requirements, leg, commanded, fastest)):
+        ok, check = None, UNKNOWN_AIRCRAFT
+        said.insert(0, doubt)
     return make_finding(
         "speed",
         requirements.leg(leg),
@@ -79,8 +83,20 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
         margin=margin,
         unit="m/s",
         method="commanded airspeed in the envelope",
+        check=check,
         facts=facts,
     )
+
+
+def _in_doubt(requirements: RouteRequirements, leg: int, commanded: float, fastest: float) -> str:
+    """Why a speed of level flight is undecided, where the aircraft's fastest is not certain; "" if it is decided."""
+    envelope = requirements.setup.envelope
+    sure = envelope.surely()
+    heights = requirements.points[leg : leg + 2, 2].tolist()
+    if commanded <= min(sure.level_speeds(up)[1] for up in heights):
+        return ""
+    says = f"what {envelope.source} says of the fastest level flight is {fastest:.1f} m/s"
+    return f"{commanded:.1f} m/s commanded, and {says} give or take {envelope.fastest_sd:.1f} m/s"
 
 
 def _not_taken(requirements: RouteRequirements, asked: float) -> list[str]:
@@ -175,7 +191,7 @@ RULE = Rule(
     margin=Margin("airspeed", "m/s", 1.0),
     tolerances=(
         *("ACCELERATION", "GUST_SHARE", "GUST_SIGMAS", "GUST_TIME", "LEVEL", "MEASURED_SHARE", "OFF_MEAN"),
-        *("SATURATED", "SLOWEST", "TAKE_UP"),
+        *("SATURATED", "SLOWEST", "TAKE_UP", "UNDECIDED"),
     ),
     judge=speed_findings,
     suggest=fly_level_speed,

@@ -45,6 +45,7 @@ class IdentificationFacts:
     title: the aircraft's.  logs: name and SHA-256 of each.
     numbers: what it can do: name, unit, lower end, estimate and upper end (95 %).
     replay: of a check log; None without one.
+    wide: which of the numbers the logs leave wide, and what would narrow each, a line each.
     """
 
     title: str
@@ -52,6 +53,7 @@ class IdentificationFacts:
     logs: tuple[tuple[str, str], ...]
     numbers: tuple[tuple[str, str, float, float, float], ...]
     replay: ReplayedLog | None = None
+    wide: tuple[str, ...] = ()
 
 
 class ParameterRow(NamedTuple):

@@ -1,9 +1,11 @@
+import math
+
 import numpy as np
 import pytest
 
-from aircraft.identification.alignment import align
+from aircraft.identification.alignment import align, led
 from aircraft.identification.estimate import align_clocks
-from aircraft.identification.flight_record import GRID_HZ
+from aircraft.identification.flight_record import GRID_HZ, lagged
 from tests.aircraft.identification.flown_truth import flown_truth
 from tests.instrumented_flights import drawn_sensors
 
@@ -24,7 +26,9 @@ def test_stretches_stand_behind_each_other_and_are_smoothed_apart() -> None:
     assert signals.edges == (0, half, 2 * half)
     steps = np.where(np.arange(2 * half) < half, 0.0, 1.0)
     assert signals.smooth(steps, 0.1) == pytest.approx(steps)
-    assert len(set(signals.block.tolist())) == 4
+    # 500 m of flight through the air are a block.
+    way = float(record.airspeed.mean()) * 40.0
+    assert len(set(signals.block.tolist())) == 2 * math.ceil(way / 500.0)
     assert len(signals.thinned(10, {}).airspeed) == 2 * half // 10
 
 
@@ -33,3 +37,20 @@ def test_the_clocks_of_one_log_are_one() -> None:
     part = flown.records[0].part(60.0)
     first, second = align_clocks([part, part], flown.base)
     assert first == second
+
+
+def test_what_a_lag_took_is_put_back() -> None:
+    """A swing of 1 Hz behind 0.05 s is smaller by the root of 1 + (2 pi 0.05)^2, and led it is itself again."""
+    time = np.arange(0.0, 20.0, 1.0 / GRID_HZ)
+    swing = np.sin(2.0 * np.pi * time)
+    late = lagged(swing, 0.05)
+    middle = slice(200, -200)
+    assert np.abs(late[middle]).max() == pytest.approx(1.0 / np.hypot(1.0, 2.0 * np.pi * 0.05), rel=0.01)
+    assert led(late, 0.05, GRID_HZ)[middle] == pytest.approx(swing[middle], abs=0.02)
+
+
+def test_the_lag_is_not_taken_for_a_smoother() -> None:
+    """Where the motion is as fast as the noise, the longest lag would explain most of what is left."""
+    sensors = drawn_sensors(3)
+    (clock, *_) = flown_truth().estimate.clocks
+    assert clock.lag == pytest.approx(sensors.lag, abs=0.02)

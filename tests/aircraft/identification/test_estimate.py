@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 
 from aircraft.identification.draws import draw_aircraft
-from aircraft.identification.estimate import aligned_signals, fit_all, total_covariance
+from aircraft.identification.estimate import (
+    LEAST_EXPLAINED,
+    Equation,
+    Estimate,
+    _hidden_by_noise,
+    aligned_signals,
+    fit_all,
+    total_covariance,
+)
 from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS
 from aircraft.identification.performance import performance
 from planfly.identification.base_numbers import scaled
@@ -77,8 +85,9 @@ REFITTED = {
     "lift of the elevator (50 %)", "lift of the pitch rate (50 %)", "side force of sideslip (30 %)",
     "side force of the rudder (50 %)", "side force of the ailerons (100 %)", "roll of the rudder (100 %)",
     "product of inertia (50 %)", "clock of the accelerometers (15 ms)", "clock of the servos (15 ms)",
-    "airspeed (as the wind triangle has it)", "level of the autopilot (0.2 deg)", "mean vertical air (0.1 deg)",
-    "downward accelerometer (0.03 m/s2)", "scale of the current (2 %)", "lift curve, axis 1", "lift curve, axis 2",
+    "airspeed (as the wind triangle has it)", "level of the autopilot (0.2 deg)", "mean vertical air (0.04 m/s)",
+    "downward accelerometer (0.03 m/s2)", "noise of the accelerometers", "scale of the current (2 %)",
+    "lift curve, axis 1", "lift curve, axis 2",
 }  # fmt: skip
 
 
@@ -100,6 +109,20 @@ def test_refits_shift_by_what_plain_sums_say() -> None:
     assert faster[INDEX["aileron-power"]] == pytest.approx(-2.0 * sd * value[INDEX["aileron-power"]], rel=0.5)
     for name in ("dihedral-effect", "weathercock"):
         assert estimate.sds[INDEX[name]] > 0.25 * value[INDEX[name]]
+
+
+def test_what_noise_hides_is_what_as_much_again_hides_where_the_axis_is_still_explained() -> None:
+    n, flat = len(PARAMETERS), np.zeros(2)
+
+    def made(value: float, roll: float) -> Estimate:
+        names = (("pitch acceleration", 0.9), ("roll acceleration", roll), ("yaw acceleration", 0.9))
+        equations = tuple(Equation(name, "rad/s2", 25.0, flat, flat, share, 1.0) for name, share in names)
+        return Estimate(np.full(n, value), np.eye(n), (), equations)
+
+    hidden = _hidden_by_noise(made(1.0, 0.7), made(0.8, LEAST_EXPLAINED - 0.01))
+    expected = {"pitch": -0.2, "yaw": -0.2, "roll": 0.0, "lift": 0.0, "drag": 0.0}
+    assert hidden == pytest.approx([expected[parameter.group] for parameter in PARAMETERS])
+    assert not _hidden_by_noise(replace(made(1.0, 0.7), dynamics=False), made(0.8, 0.9)).any()
 
 
 def test_an_interval_is_of_fit_and_shifts_and_none_wider_than_the_prior() -> None:

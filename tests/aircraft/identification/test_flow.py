@@ -5,7 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aircraft.identification.flow import attitude_alpha
+from aircraft.catalog import load_aircraft
+from aircraft.identification.flow import attitude_alpha, vane
+from aircraft.identification.parameters import prior_means
+from planfly.identification.base_numbers import base_model
 
 
 def signals(
@@ -35,3 +38,18 @@ def test_a_climb_takes_its_slope_off_and_wind_does_not_count() -> None:
 def test_on_its_side_the_flow_from_below_is_the_flow_from_aside() -> None:
     """Banked 90 degrees to the right and yawed 4 to the right of its way: the wing meets the air at 4 degrees."""
     assert degrees(signals(90.0, 0.0, 4.0, (25.0, 0.0, 0.0))) == pytest.approx(4.0)
+
+
+def test_a_wing_that_rolls_has_side_force_without_sideslip() -> None:
+    """Gryte et al. 2018, the X8: CY of the roll and yaw rates -0.1374 and 0.0839, times rate b / 2 V."""
+    base = base_model(load_aircraft("x8"))
+    p, r, speed, density = 0.6, -0.2, 18.0, 1.225
+    pressure = 0.5 * density * speed**2 * base.area
+    side = (-0.1374 * p + 0.0839 * r) * base.span / (2.0 * speed)
+    one = np.ones(4)
+    turning: Any = SimpleNamespace(
+        acceleration=np.outer(one, [0.0, side * pressure / base.mass, -9.81]), rates=np.outer(one, [p, 0.0, r]),
+        surfaces=np.zeros((4, 3)), airspeed=speed * one, density=density * one, throttle=0.5 * one,
+        voltage=np.nan * one, smooth=lambda values, band: values,
+    )  # fmt: skip
+    assert vane(turning, base, prior_means()).beta == pytest.approx(np.zeros(4), abs=1e-4)

@@ -3,12 +3,15 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
+from aircraft.identification.alignment import align
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.held_fixed import HELD_FIXED
+from aircraft.identification.held_fixed import HELD_FIXED, NOISE
 from planfly.identification.base_numbers import base_model
+from tests.aircraft.identification.flown_truth import flown_truth
 
 # Half, or all, of what Beard and McLain have for the Aerosonde (table E.2).
 LEAST = {
@@ -40,3 +43,25 @@ def test_a_coefficient_of_0_is_in_doubt(title: str) -> None:
 def test_no_product_of_inertia_is_in_doubt() -> None:
     base = replace(base_model(load_aircraft("aerosonde")), inertia=(1.0, 2.0, 4.0, 0.0))
     assert changed("product of inertia", base).inertia == pytest.approx((1.0, 2.0, 4.0, 0.1))
+
+
+def test_of_noise_there_is_as_much_again() -> None:
+    """White noise of 0.2 m/s^2 on a still accelerometer: as much is added to right and down, and none ahead."""
+    flown = flown_truth()
+    still = align(flown.records, flown.estimate.clocks, flown.base.motor_lag)
+    noise = 0.2 * np.random.default_rng(7).standard_normal(still.acceleration.shape)
+    (held,) = (held for held in HELD_FIXED if held.name == NOISE)
+    noisier, base = held.change(replace(still, acceleration=noise), flown.base)
+    added = noisier.acceleration - noise
+    assert added.std(axis=0) == pytest.approx([0.0, 0.2, 0.2], rel=0.05)
+    assert base is flown.base
+
+
+def test_rising_air_tilts_a_slow_aircrafts_flow_more() -> None:
+    """0.04 m/s are 0.09 degrees of the flow at 25 m/s, and 0.15 at 15."""
+    flown = flown_truth()
+    signals = align(flown.records, flown.estimate.clocks, flown.base.motor_lag)
+    (held,) = (held for held in HELD_FIXED if held.name.startswith("mean vertical air"))
+    for speed, degrees in ((25.0, 0.0917), (15.0, 0.1528)):
+        at = replace(signals, airspeed=np.full_like(signals.airspeed, speed))
+        assert np.degrees(held.tilt(at)) == pytest.approx(degrees, abs=1e-3)

@@ -102,7 +102,13 @@ def test_the_setup_comes_back_whole(tmp_path: Path, track: Track, with_plan: boo
 def test_what_is_not_known_of_an_aircraft_comes_back(tmp_path: Path, track: Track) -> None:
     made = make_setup()
     envelope = dataclasses.replace(
-        made.envelope, source="a data sheet", climb_sd=0.1, descent_sd=0.02, power_sd=0.25, battery_guessed=True
+        made.envelope,
+        source="a data sheet",
+        climb_sd=0.1,
+        descent_sd=0.02,
+        fastest_sd=1.5,
+        power_sd=0.25,
+        battery_guessed=True,
     )
     limits = dataclasses.replace(made.limits, envelope=envelope)
     setup = dataclasses.replace(made, limits=limits)
@@ -127,7 +133,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     assert len(names[Limits]) == 9
     assert len(names[Mission]) == 7
     assert len(names[Route]) == 13
-    assert len(names[Envelope]) == 19
+    assert len(names[Envelope]) == 20
     assert len(dataclasses.fields(MissionItem)) == 8
 
 

@@ -159,6 +159,7 @@ def test_an_aircraft_brings_its_draws(sheet: Path) -> None:
     # Each flight's aircraft is one that is known.
     varied = vary(made, Draw(0, 1, nominal))
     assert (varied.setup.envelope.climb_sd, varied.setup.envelope.descent_sd) == (0.0, 0.0)
+    assert varied.setup.envelope.fastest_sd == 0.0 < made.airframe.limits.envelope.fastest_sd
     assert varied.setup.envelope.power_sd == 0.0 < made.airframe.limits.envelope.power_sd
 
 

@@ -1,12 +1,15 @@
 """Numbers off a JSBSim model are those of the book that it was written from."""
 
+import math
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import planfly
 from aircraft.catalog import load_aircraft, read_aircraft
+from aircraft.identification.electric_motor import ElectricMotor
 from aircraft.identification.parameters import prior_means
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
@@ -31,6 +34,7 @@ def test_the_aerosondes_are_the_books() -> None:
         assert getattr(numbers.coefficients, name) == pytest.approx(value, rel=1e-4), name
     assert numbers.inertia == pytest.approx((0.8244, 1.135, 1.759, 0.1204), rel=1e-4)
     motor = numbers.motor
+    assert isinstance(motor, ElectricMotor)
     assert (motor.resistance, motor.idle_current) == (pytest.approx(0.042), pytest.approx(1.5))
     assert motor.back_voltage == pytest.approx(60.0 / (2.0 * 3.14159265 * 145.0), rel=1e-6)
 
@@ -41,6 +45,7 @@ def test_a_changed_aircraft_gives_changed_numbers(tmp_path: Path) -> None:
     c = numbers.coefficients
     assert (c.lift_alpha, c.lift_zero) == (pytest.approx(5.049, rel=1e-3), pytest.approx(0.28, rel=1e-3))
     assert (c.drag_zero, c.pitch_zero) == (pytest.approx(0.0645, rel=1e-3), pytest.approx(0.0235, rel=1e-3))
+    assert isinstance(numbers.motor, ElectricMotor)
     assert numbers.motor.back_voltage == pytest.approx(0.0658572 / 1.1, rel=1e-5)
     assert (numbers.motor.resistance, numbers.motor.idle_current) == (pytest.approx(0.042), pytest.approx(1.5))
 
@@ -67,11 +72,34 @@ def test_an_engine_that_burns_fuel_is_refused_in_one_line() -> None:
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("name", ["x8", "zagi"])
-def test_a_wing_with_another_motor_is_refused_in_one_line(name: str) -> None:
-    with pytest.raises(FlightError, match="its motor cannot be identified") as refused:
-        base_model(load_aircraft(name))
-    assert "\n" not in str(refused.value)
+# Beard and McLain, first edition, appendix E.1, with a span efficiency of 0.9, and Gryte et al. 2018 (x8_param.mat).
+WINGS = {
+    "zagi": {
+        "drag_zero": 0.0254, "drag_induced": 1.0 / (math.pi * 0.9 * 1.4224**2 / 0.2589), "lift_least_drag": 0.0,
+        "lift_zero": 0.09167, "lift_alpha": 3.5016, "lift_rate": 2.8932, "lift_elevator": 0.2724,
+        "pitch_zero": -0.02338, "pitch_alpha": -0.5675, "pitch_rate": -1.399, "pitch_elevator": -0.3254,
+        "roll_roll": -0.3209, "roll_aileron": 0.1682, "side_beta": -0.07359, "side_roll": 0.0,
+    },
+    "x8": {
+        "lift_zero": 0.0867, "lift_alpha": 4.0203, "lift_rate": 3.87, "lift_elevator": 0.2781,
+        "pitch_zero": 0.0227, "pitch_alpha": -0.4629, "pitch_rate": -1.3012, "pitch_elevator": -0.2292,
+        "side_beta": -0.2239, "side_roll": -0.1374, "side_yaw": 0.0839, "roll_roll": -0.4042, "roll_aileron": 0.1202,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WINGS)
+def test_the_published_wings_are_bases_with_their_sources_numbers(name: str) -> None:
+    aircraft = load_aircraft(name)
+    numbers = base_model(aircraft)
+    for field, value in WINGS[name].items():
+        assert getattr(numbers.coefficients, field) == pytest.approx(value, rel=3e-3, abs=1e-6), field
+    assert is_flying_wing(aircraft)
+    assert not numbers.reacts
+    # Full throttle at cruise and sea level, N: 0.5 rho S C (20^2 - 15^2), and 0.5 rho S C 37.42 (37.42 - 18).
+    disc = {"zagi": 0.0314 * 175.0, "x8": 0.1017876 * 0.248 * 37.42 * 19.42}[name]
+    thrust, _ = numbers.motor.thrust_and_current(np.full(1, aircraft.airspeed), np.ones(1), np.full(1, 1.225))
+    assert thrust[0] == pytest.approx(0.5 * 1.225 * disc, rel=1e-5)
 
 
 def test_a_flying_wing_from_a_data_sheet_is_a_base_without_the_propellers_torque(tmp_path: Path) -> None:

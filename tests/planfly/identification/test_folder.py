@@ -4,6 +4,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,13 @@ import pytest
 from aircraft.catalog import load_aircraft
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import INDEX, prior_means, prior_sds
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import fastest
 from logs.importers.motion_log import MotionLog
 from planfly.identification.base_numbers import base_model
 from planfly.identification.folder import Identified, flown_parameters, folder_files, make_identified, posterior_text
 from planfly.identification.records import log_outputs
-from tests.instrumented_flights import PARAMETERS, short_motion
+from tests.instrumented_flights import PARAMETERS, Truth, changed_aerosonde, short_motion
 
 BASE = load_aircraft("aerosonde")
 # As ArduPlane 4.4 and older call them, in their units.
@@ -84,3 +87,21 @@ def test_power_is_as_sure_as_the_torque_that_it_overcomes() -> None:
     )
     assert table["power_sd"] == pytest.approx(0.05, rel=0.3)
     assert (table["airspeed_factor"], table["airspeed_factor_sd"]) == (1.02, 0.003)
+
+
+def test_the_fastest_is_as_sure_as_the_drag(tmp_path: Path) -> None:
+    """A tenth of zero-lift drag either way, as JSBSim flies two Aerosondes that were edited by hand."""
+    tops = []
+    for factor in (0.9, 1.1):
+        edited = changed_aerosonde(tmp_path / f"v{factor:g}", Truth(zero_lift_drag=factor))
+        found = fastest(Fdm(edited), 480.0)
+        assert found is not None
+        tops.append(found.airspeed)
+    sds = np.full(len(prior_sds()), 1e-6)
+    sds[INDEX["zero-lift-drag"]] = 0.1
+    estimate = Estimate(prior_means(), np.diag(np.square(sds)), (), ())
+    log = flown({})
+    table = tomllib.loads(
+        posterior_text(make_identified(BASE, base_model(BASE), estimate, [log], log_outputs(log, BASE)))
+    )
+    assert table["fastest_sd_mps"] == pytest.approx(0.5 * (tops[0] - tops[1]), rel=0.15)

@@ -13,6 +13,7 @@ from flight.dynamics.trim import straight
 from planfly.identification.base_numbers import _Probe, base_model, scaled
 from planfly.identification.model_text import check_base, identified_xml
 from tests.instrumented_flights import Truth, changed_aerosonde
+from tests.instrumented_wings import MASS, changed_wing
 from world.errors import FlightError
 
 BASE = load_aircraft("aerosonde")
@@ -75,6 +76,34 @@ def test_motor_and_propeller_are_those_of_a_model_edited_by_hand(tmp_path: Path)
     assert one is not None
     assert other is not None
     assert one.vector() == pytest.approx(other.vector(), abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["x8", "zagi"])
+def test_a_wing_is_the_wing_edited_by_hand(tmp_path: Path, name: str) -> None:
+    base = load_aircraft(name)
+    truth = {
+        "zero-lift-drag": 1.2, "induced-drag": 0.8, "thrust": 1.1, "motor-speed": 1.05, "propeller-torque": 1.15,
+        "lift-slope": 1.1, "pitch-stiffness": 0.9, "elevator-power": 1.2, MASS: 1.1,
+    }  # fmt: skip
+    edited = changed_wing(base, tmp_path / "edited", truth)
+    values = prior_means()
+    for key, value in truth.items():
+        if key != MASS:
+            values[INDEX[key]] = value
+    numbers = scaled(base_model(base), edited.mass, base.wing_span, base.wing_area)
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "mine.xml").write_text(identified_xml(base, "mine", numbers, values), encoding="utf-8")
+    (folder / "mine.toml").write_text((edited.folder / "edited.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    for climb in (0.0, 0.05):
+        trims = []
+        for aircraft in (edited, read_aircraft(folder)):
+            fdm = Fdm(aircraft)
+            found = straight(fdm, base.airspeed, 500.0, climb)
+            assert found is not None
+            fdm.balance(found.vector())
+            trims.append([*found.vector(), fdm.read().power])
+        assert trims[1] == pytest.approx(trims[0], rel=1e-4, abs=1e-5)
 
 
 def test_a_draw_is_a_set_of_properties(tmp_path: Path) -> None:

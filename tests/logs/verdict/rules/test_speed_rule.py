@@ -11,6 +11,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
 from tests.synthetic import (
+    envelope,
     fly_path,
     make_setup,
 )
@@ -41,6 +42,26 @@ def test_a_speed_off_its_command_is_told_and_no_fault(off: float, shown: bool) -
     assert ("off the commanded 25.0 m/s" in item.reason) is shown
     # It shows a limit only where the aircraft's are left out.
     assert (("speed", leg(0)) in failing(judge(setup, track, envelope=False))) is shown
+
+
+@pytest.mark.parametrize(("speed", "ok"), [(28.0, True), (30.0, None), (32.5, False), (16.5, True)])
+def test_a_speed_within_what_is_not_known_is_undecided(speed: float, ok: bool | None) -> None:
+    """32 m/s at most, give or take 2: 1.645 of those less is 28.7."""
+    unsure = replace(envelope(), source="a data sheet", fastest_sd=2.0)
+    setup = make_setup(STRAIGHT, airspeed=speed, table=unsure)
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        item = of(verdict, "speed", leg(0))
+        assert (item.ok, item.check) == (ok, "unknown aircraft" if ok is None else "")
+        assert verdict.undecided is (ok is None)
+        if ok is None:
+            told = "what a data sheet says of the fastest level flight is 32.0 m/s give or take 2.0 m/s"
+            assert item.reason.startswith(f"30.0 m/s commanded, and {told}")
+            assert "airspeeds on 2 legs are within what is not known of the aircraft" in verdict.headline
+            # What is suggested is sure: below 28.71 m/s by what suggestions keep clear of limits.
+            ((change,),) = item.suggestions
+            assert change.what == "airspeed"
+            assert change.most is not None
+            assert 27.5 < change.most < 28.71
 
 
 def test_arduplane_takes_a_command_for_equivalent_airspeed() -> None:

@@ -28,7 +28,8 @@ def facts() -> IdentificationFacts:
     table = np.column_stack([WAVE, 25.0 + WAVE])
     replay = ReplayedLog("C<1>.BIN", 40, rows, table, 1.02 * table, 50.0)
     numbers = (("climb at full throttle", "°", 5.8, 7.7, 9.6), ("power in level flight", "W", 380.0, 485.0, 624.0))
-    return IdentificationFacts("mine", estimate, (("A.BIN", "ab" * 32),), numbers, replay)
+    wide = ("sink at idle: known to ±23 % only; fly glides",)
+    return IdentificationFacts("mine", estimate, (("A.BIN", "ab" * 32),), numbers, replay, wide)
 
 
 def test_the_share_of_the_log_is_what_it_takes_off_the_priors_variance() -> None:
@@ -47,6 +48,7 @@ def test_the_page_says_what_was_found_and_what_was_not() -> None:
         "battery current (BAT)", "0.041", "R² 0.990", "airspeed (1 %)", "thrust +0.010", "ab" * 32, "C&lt;1&gt;.BIN",
     ):  # fmt: skip
         assert said in page, said
+    assert "sink at idle: known to ±23 % only; fly glides" in page
     assert "<1>" not in page
     # Nothing is asked of a network.
     assert "http" not in page.partition('<script type="application/json"')[0].replace("http-equiv", "")

@@ -1,12 +1,14 @@
 """What gusts and a new slope may add to a leg's mean airspeed, and how long it takes to have one."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from logs.verdict.findings import Finding
+from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import judge, leg, of
-from tests.synthetic import fly_path, make_setup
+from tests.synthetic import envelope, fly_path, make_setup
 
 
 def middle_leg(
@@ -59,3 +61,11 @@ def test_or_half_of_the_time_that_a_shorter_leg_takes_at_the_slowest(run: float,
     """From 25 to 24.5 m/s takes one second; run / 24.5 - 1 is half of run / 15 at 134 m."""
     item = middle_leg(straight(run), [25.0, 24.5, 24.5])
     assert ("on average" in item.reason) is measured
+
+
+@pytest.mark.parametrize(("speed", "ok"), [(29.5, True), (29.6, None), (32.0, None), (32.1, False)])
+def test_a_speed_is_decided_up_to_1_645_deviations_from_the_fastest(speed: float, ok: bool | None) -> None:
+    """32 less 1.645 x 1.5 is 29.53 m/s."""
+    table = replace(envelope(), source="a data sheet", fastest_sd=1.5)
+    setup = make_setup(straight(2000.0), airspeed=speed, table=table)
+    assert of(judge_geometry(setup), "speed", leg(1)).ok is ok

@@ -1,0 +1,201 @@
+"""What logs of missions A and B hold of sink and power at most without the battery's current, and what would add to it.
+
+    python -m benchmarks.identification_information --seeds 7001 7002 7003
+
+The bound of Cramer and Rao with the priors that identification has (van Trees 1968, section 2.4.3): no estimate that
+begins with them can be surer, whatever its method.  It is taken at the truth, of the forward force over each log's own
+airspeeds and throttles, for three kinds of noise: that of the accelerometers alone, with airspeed and angle of attack
+known exactly; that with the airspeed sensor's; and what identification assumes that no model gets right.  Then with
+glides at idle at cruise speed added, and with the battery's current.
+"""
+
+import argparse
+import json
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import load_aircraft
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.drag import (
+    FLOOR_SECONDS,
+    FORCE_FLOOR,
+    FORCE_THINNING,
+    NUISANCES,
+    AlphaDoubt,
+    ForwardForces,
+    forward_forces,
+)
+from aircraft.identification.draws import draw_aircraft
+from aircraft.identification.estimate import Estimate, aligned_signals, estimate_model
+from aircraft.identification.flight_record import GRID_HZ
+from aircraft.identification.flow import vane
+from aircraft.identification.parameters import PARAMETERS, prior_means, prior_sds
+from aircraft.identification.performance import GRAVITY, performance
+from benchmarks.identification import drawn_truth, fly_missions, true_values
+from planfly.identification.base_numbers import base_model, scaled
+from planfly.identification.folder import DENSITY
+from planfly.identification.records import flight_records
+from planfly.identification.servos import read_servos
+from tests.instrumented_flights import drawn_sensors, sensed
+
+Floats = NDArray[np.float64]
+
+_CRUISE, _TWO_SIDED = 25.0, 1.96
+_OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
+# Noise of the sensors of `tests.instrumented_flights`: m/s^2 at 50 Hz, and m/s at 10 Hz; of the current, A at 5 Hz.
+_ACCELEROMETER, _AIRSPEED, _CURRENT = 0.05, 0.08, 0.3
+GLIDES = (0, 20, 60, 120, 300)
+
+
+def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
+    """(3,) sink (rad), power (W) and climb (rad) at cruise of an aircraft with these unknowns, nuisances among them."""
+    own = int(_OWN.sum())
+    resistance, idle, voltage, elevator = unknown[own + 1 : own + 5]
+    motor = base.motor.changed(resistance=1.0 + resistance, idle=1.0 + idle)
+    c = base.coefficients
+    changed = replace(base, motor=replace(motor, voltage=motor.voltage * (1.0 + voltage)),
+                      coefficients=replace(c, drag_elevator=c.drag_elevator * (1.0 + elevator)))  # fmt: skip
+    every = values.copy()
+    every[_OWN] = unknown[:own]
+    made = performance(changed, every, _CRUISE, DENSITY)
+    return np.array([made.sink[0], made.power[0], made.climb[0]])
+
+
+def gradients(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
+    """(3, p) of `flown_as`, as shares of sink and power, and the climb in degrees."""
+    step = 1e-4
+    at = flown_as(base, values, unknown)
+    rows = [(flown_as(base, values, unknown + step * one) - at) / step for one in np.eye(len(unknown))]
+    return np.array(rows).T / np.array([at[0], at[1], np.radians(1.0)])[:, np.newaxis]
+
+
+def glide(base: BaseModel, values: Floats, seconds: float) -> ForwardForces:
+    """A steady glide at idle and cruise speed, at as many rows a second as thinned signals have."""
+    count = max(2, round(seconds * GRID_HZ / FORCE_THINNING))
+    flat = np.ones(count)
+    signals: Any = SimpleNamespace(
+        airspeed=_CRUISE * flat, throttle=0.0 * flat, density=DENSITY * flat, smooth=lambda series, band: series
+    )
+    c, pressure = base.coefficients, 0.5 * DENSITY * _CRUISE**2 * base.area
+    lift = base.mass * GRAVITY / pressure * flat
+    doubt = AlphaDoubt()
+    tilts = pressure * lift * np.vstack([doubt.angle * flat, doubt.by_lift * (lift - doubt.middle)])
+    drags = -pressure * np.vstack([c.drag_zero * flat, c.drag_induced * np.square(lift - c.lift_least_drag)])
+    del values
+    return ForwardForces(signals, base, 0.0 * flat, tilts, drags, 0.0 * flat, base.motor.voltage)
+
+
+def information(forces: ForwardForces, unknown: Floats, noise: str, *, current: bool = False) -> Floats:
+    """(p, p) of the forward force, and of the current; noise: "accelerometers", "sensors" or "model"."""
+    rows, amperes = forces.slopes(unknown)
+    step = 0.05
+    signals: Any = forces.signals
+    shifted: Any = SimpleNamespace(
+        airspeed=signals.airspeed + step, throttle=signals.throttle, density=signals.density, smooth=signals.smooth
+    )
+    by_speed = replace(forces, signals=shifted).predicted(unknown)[0] - forces.predicted(unknown)[0]
+    # The drag of a gust, too: twice the share of the speed.
+    drag = np.array(unknown[:2]) @ forces.drags / forces.base.mass
+    by_speed = by_speed / step + 2.0 * drag / signals.airspeed
+    variance = np.full(len(rows), _ACCELEROMETER**2)
+    if noise != "accelerometers":
+        variance += np.square(by_speed * _AIRSPEED) * GRID_HZ / 10.0
+    if noise == "model":
+        variance += FORCE_FLOOR**2 * FLOOR_SECONDS * GRID_HZ
+    made = FORCE_THINNING * (rows / variance[:, np.newaxis]).T @ rows
+    if current:
+        floor = _CURRENT**2 * (FLOOR_SECONDS * GRID_HZ / FORCE_THINNING if noise == "model" else 1.0)
+        made = made + amperes.T @ amperes / floor
+    return np.asarray(made)
+
+
+def halves(precision: Floats, slopes: Floats, known: Floats) -> dict[str, float]:
+    """Half the 95 % interval of sink and power, percent, and of the climb, degrees; known: held at the truth."""
+    inverse = np.zeros_like(precision)
+    free = np.flatnonzero(~known)
+    inverse[np.ix_(free, free)] = np.linalg.inv(precision[np.ix_(free, free)])
+    sink, power, climb = _TWO_SIDED * np.sqrt(np.einsum("ij,jk,ik->i", slopes, inverse, slopes))
+    return {"sink_percent": 100.0 * sink, "power_percent": 100.0 * power, "climb_deg": float(climb)}
+
+
+def stated(base: BaseModel, estimate: Estimate) -> dict[str, float]:
+    """The same of an estimate: half of what it says itself."""
+    best = performance(base, estimate.values, _CRUISE, DENSITY)
+    drawn = performance(base, draw_aircraft(estimate), _CRUISE, DENSITY)
+    ends = [np.percentile(values, [2.5, 97.5]) for values in (drawn.sink, drawn.power, np.degrees(drawn.climb))]
+    sink, power, climb = (0.5 * float(high - low) for low, high in ends)
+    return {
+        "sink_percent": 100.0 * sink / float(best.sink[0]), "power_percent": 100.0 * power / float(best.power[0]),
+        "climb_deg": climb,
+    }  # fmt: skip
+
+
+def one_seed(seed: int) -> dict[str, Any]:
+    truth = drawn_truth(seed)
+    values = true_values(truth)
+    prior = load_aircraft("aerosonde")
+    numbers = base_model(prior)
+    base = scaled(numbers, 11.0 * truth.mass, numbers.span, numbers.area)
+    with tempfile.TemporaryDirectory() as place:
+        tracks, changed = fly_missions(Path(place), truth, seed)
+        logs = [
+            sensed(track, changed, drawn_sensors(seed), seed + 100_000 * k) for k, track in enumerate(tracks)
+        ]  # fmt: skip
+        servos = read_servos(prior.folder / "ardupilot.toml")
+        records = [record for log in logs for record in flight_records(log, prior, servos)]
+    estimate = estimate_model(records, base)
+    signals = aligned_signals(records, estimate.clocks, base)
+    forces = forward_forces(signals, base, values, vane(signals, base, values), AlphaDoubt())
+    sds = np.concatenate([prior_sds()[_OWN], list(NUISANCES.values())])
+    unknown = np.concatenate([values[_OWN], np.zeros(len(NUISANCES))])
+    before, slopes = np.diag(1.0 / np.square(sds)), gradients(base, values, unknown)
+    nothing, nuisances = np.zeros(len(sds), np.bool_), np.arange(len(sds)) >= int(_OWN.sum())
+    throttle = forces.signals.throttle
+    made: dict[str, Any] = {
+        "seed": seed, "minutes": sum(record.seconds for record in records) / 60.0,
+        "throttle_below": {f"{level:g}": float((throttle < level).mean()) for level in (0.2, 0.4, 0.55)},
+        "prior": halves(before, slopes, nothing),
+        "stated": stated(base, estimate),
+    }  # fmt: skip
+    for noise in ("accelerometers", "sensors", "model"):
+        known = before + information(forces, unknown, noise)
+        made[f"bound: {noise}"] = halves(known, slopes, nothing)
+        made[f"bound: {noise}, battery, motor, elevator and angles known"] = halves(known, slopes, nuisances)
+    torque = np.zeros(len(sds), np.bool_)
+    torque[4] = True
+    made["bound: model, propeller's torque known"] = halves(
+        before + information(forces, unknown, "model"), slopes, torque
+    )
+    for seconds in GLIDES:
+        more = information(glide(base, values, seconds), unknown, "model") if seconds else 0.0
+        made[f"bound: model, {seconds} s of glide"] = halves(
+            before + information(forces, unknown, "model") + more, slopes, nothing
+        )
+    made["bound: model, with current"] = halves(
+        before + information(forces, unknown, "model", current=True), slopes, nothing
+    )
+    assert list(prior_means()[_OWN]) == [1.0] * int(_OWN.sum())
+    return made
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[7001, 7002, 7003])
+    parser.add_argument("--out", default="build/information.json")
+    args = parser.parse_args()
+    Path(args.out).parent.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for seed in args.seeds:
+        rows.append(one_seed(seed))
+        print(json.dumps(rows[-1], indent=1), flush=True)
+        Path(args.out).write_text(json.dumps(rows, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
