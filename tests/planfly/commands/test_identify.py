@@ -9,15 +9,18 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft, read_aircraft
+from aircraft.identification.estimate import Estimate
 from aircraft.identification.flight_record import FlightRecord
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.dynamics.fdm import Fdm
 from logs.importers.motion_log import Samples
+from planfly.api import identifying
 from planfly.api.identifying import slow_logs, without_current
 from planfly.cli import main
 from planfly.identification.records import LEAST_HZ, slowest_rows
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_motion, write_px4
+from world.errors import LogError
 
 ARGUMENTS = ["--mass", "13.2", "--span", "2.8956", "--area", "0.55"]
 
@@ -158,3 +161,28 @@ def test_logs_with_few_rows_are_named_with_what_records_more() -> None:
     assert slow.setting == "LOG_BITMASK 65535"
     assert slow.hertz == pytest.approx(6.25)
     assert slowest_rows(thin) < LEAST_HZ
+
+
+@pytest.mark.parametrize(("hertz", "dynamics"), [(50.0, True), (10.0, True), (9.6, True), (9.4, False)])
+def test_moments_are_estimated_from_10_rows_a_second(
+    monkeypatch: pytest.MonkeyPatch, hertz: float, dynamics: bool
+) -> None:
+    """Ten a second exactly are enough, and so is what a clock makes of them; of fewer, lift, drag and thrust alone."""
+    asked: list[bool] = []
+
+    def noted(_records: object, _base: object, *, dynamics: bool) -> Estimate:
+        asked.append(dynamics)
+        raise LogError("far enough")
+
+    monkeypatch.setattr(identifying, "estimate_model", noted)
+    log = flown_truth().log
+    for series in ("inertial", "outputs"):
+        samples: Samples = getattr(log, series)
+        time = np.arange(samples.time[0], samples.time[-1], 1.0 / hertz)
+        values = np.column_stack([np.interp(time, samples.time, column) for column in samples.values.T])
+        if series == "outputs":
+            values = np.round(values)
+        write_motion(Path(f"{series}.BIN"), replace(log, **{series: Samples(time, values)}))
+        assert main(["aircraft", "--identify", f"{series}.BIN", *ARGUMENTS, "--out", "./mine"]) == 2
+    assert asked == [dynamics, dynamics]
+    assert not Path("mine").exists()

@@ -5,15 +5,20 @@ import shutil
 import signal
 import sqlite3
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from aircraft.data_sheet import DataSheet
+from aircraft.uncertainty import draws_text, read_draws
 from planfly.api import campaigns
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.find_winds import WindsGoal
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, WindsStore
 from planfly.cli import main
+from planfly.data_sheets import make_data_sheet_folder
 from tests.planfly.campaigns.made_campaigns import made_flight, table, write_short
 from tests.planfly.terminal.answers.checked_answers import answered
 from world.interruption import Interrupted
@@ -105,3 +110,32 @@ def test_one_line_and_nothing_lost(
     assert words in told[0]
     assert table(Path("out", WINDS_DATABASE)) == before
     assert Path("campaign", "campaign.sqlite").read_bytes() == b"another one's"
+
+
+def test_winds_fly_the_draws_of_an_aircraft(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The whole of it: another aircraft each flight, by its seed, in place of factors on drag and control power."""
+    monkeypatch.chdir(tmp_path)
+    made = make_data_sheet_folder(tmp_path / "foam", DataSheet(2.1, 1.6, 15.0, 10.0))
+    rows = [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{46.0 + 0.002 * k:.6f}\t8.0\t500.0\t1" for k in range(3)]
+    Path("hop.waypoints").write_text("QGC WPL 110\n" + "\n".join(rows) + "\n")
+    line = ["winds", "hop.waypoints", "--aircraft", "./foam", "--workers", "1", "--directions", "4", "--flights", "4"]
+    data = answered(capsys, 0, *line, "--most", "6", "--out", "drawn")
+    assert data["flights"] == 4
+    assert "mass" in data["spread"]
+    assert not {"drag", "control_power"} & set(data["spread"])
+    # With aircraft that hardly have thrust, none of the same flights flies.
+    file = made.folder / "draws.csv"
+    draws = read_draws(file)
+    weak = np.where(np.array(draws.names) == "ident/thrust", 0.05, draws.values)
+    file.write_text(draws_text(replace(draws, values=weak)), encoding="utf-8")
+    assert main([*line, "--most", "6", "--out", "weak"]) == 0
+    assert outcomes(tmp_path / "drawn" / WINDS_DATABASE) == ["flyable"] * 4
+    assert "flyable" not in outcomes(tmp_path / "weak" / WINDS_DATABASE)
+
+
+def outcomes(file: Path) -> list[str]:
+    """Of each flight of a table."""
+    with closing(sqlite3.connect(file)) as connection:
+        return [str(outcome) for (outcome,) in connection.execute("SELECT outcome FROM flights")]
