@@ -176,13 +176,15 @@ def test_moments_are_estimated_from_10_rows_a_second(
 
     monkeypatch.setattr(identifying, "estimate_model", noted)
     log = flown_truth().log
-    for series in ("inertial", "outputs"):
-        samples: Samples = getattr(log, series)
+
+    def at(samples: Samples) -> Samples:
         time = np.arange(samples.time[0], samples.time[-1], 1.0 / hertz)
-        values = np.column_stack([np.interp(time, samples.time, column) for column in samples.values.T])
-        if series == "outputs":
-            values = np.round(values)
-        write_motion(Path(f"{series}.BIN"), replace(log, **{series: Samples(time, values)}))
-        assert main(["aircraft", "--identify", f"{series}.BIN", *ARGUMENTS, "--out", "./mine"]) == 2
+        return Samples(time, np.column_stack([np.interp(time, samples.time, one) for one in samples.values.T]))
+
+    outputs = at(log.outputs)
+    slow = (replace(log, inertial=at(log.inertial)), replace(log, outputs=replace(outputs, values=outputs.values // 1)))
+    for one in slow:
+        write_motion(Path("slow.BIN"), one)
+        assert main(["aircraft", "--identify", "slow.BIN", *ARGUMENTS, "--out", "./mine"]) == 2
     assert asked == [dynamics, dynamics]
     assert not Path("mine").exists()
