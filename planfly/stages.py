@@ -8,6 +8,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 from typing import NamedTuple
 
 # Takes how far a stage is: done, total, a remark.
@@ -58,6 +59,13 @@ def say(line: str) -> None:
     import logging
 
     logging.getLogger("planfly").warning(line)
+
+
+def say_replaced(*files: Path) -> None:
+    """Say of each file that is there that it is replaced: a program's flight may be about to replace a law's."""
+    for file in files:
+        if file.exists():
+            say(f"{file} is there: replaced")
 
 
 def is_received() -> bool:

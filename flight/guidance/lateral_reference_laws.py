@@ -26,6 +26,7 @@ WAYPOINT = record_dtype(
     "centre_north",
     ("item", np.int64),  # seq of the mission item that it belongs to, -1 for none
     "stays",  # s, of a loiter once it is reached: inf without end, NaN for one of so many turns
+    "turns",  # of a loiter of so many, 0 for any other
     ("to_height", np.bool_),  # whether the loiter is one to a height
     ("leaves_on_course", np.bool_),  # whether its item asks to leave it on the course to what follows
     ("leaves_on_tangent", np.bool_),  # whether the line to what follows is to begin on its rim, not in its middle

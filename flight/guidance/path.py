@@ -306,11 +306,14 @@ def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
     for k in np.flatnonzero(waypoints["circle"]).tolist():
         item = items.get(int(waypoints["item"][k]))
         loiter = None if item is None else loiter_of(item)
-        if loiter is not None and not loiter.turns:
+        if loiter is None:
+            continue
+        waypoints["leaves_on_tangent"][k] = loiter.on_tangent
+        waypoints["turns"][k] = loiter.turns
+        if not loiter.turns:
             waypoints["stays"][k] = math.inf if loiter.endless else loiter.seconds
             waypoints["to_height"][k] = loiter.to_height
             waypoints["leaves_on_course"][k] = loiter.on_course
-            waypoints["leaves_on_tangent"][k] = loiter.on_tangent
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:

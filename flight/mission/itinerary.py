@@ -37,8 +37,8 @@ class Loiter:
         tangent to the next position after them.
     to_height: until the item's height is reached.
     endless: whether the item asks for a circle without end, of which ``seconds`` are flown.
-    on_course, on_tangent: whether the item asks to leave it on the course to what follows, and for a line there that
-        begins on its rim: both as PX4 reads them.
+    on_course: whether the item asks to leave it on the course to what follows, as PX4 reads it; ArduPlane always does.
+    on_tangent: whether it asks for a line there that begins on its rim (PX4) or where it is left (ArduPlane).
     """
 
     radius: float
@@ -60,7 +60,7 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     if item.command == Command.NAV_LOITER_UNLIM:
         return Loiter(p3, seconds=UNLIMITED, endless=True)
     if item.command == Command.NAV_LOITER_TURNS:
-        return Loiter(p3, turns=p1)
+        return Loiter(p3, turns=p1, on_tangent=p4 > 0.0)
     if item.command == Command.NAV_LOITER_TIME:
         return Loiter(p3, seconds=p1, on_course=p2 > 0.0, on_tangent=p4 > 0.0)
     if item.command == Command.NAV_LOITER_TO_ALT:

@@ -29,10 +29,25 @@ _CLEAR = 2.0
 # Slope (tangent) of a spiral where no aircraft is known.
 PLAIN_SLOPE = 0.05
 
+# Who leaves a circle heading for what follows does so this much before the tangent, rad; and it turned so far, rad,
+# from its way to the middle to the tangent that the circle is drawn from.
+LINED_UP = math.radians(10.0)
+_TO_TANGENT = 0.5 * math.pi
+
 # Steepest climb and dive (tangents) that a spiral at this airspeed (m/s) and height (m AMSL) is flown with.
 SpiralSlopes = Callable[[float, float], tuple[float, float]]
 # Radius (m) of a loiter that states none, at this airspeed and height.
 OwnRadius = Callable[[float, float], float]
+
+
+def as_stated(loiter: Loiter) -> float:
+    """Radius that a loiter's item states, m, 0 for none."""
+    return abs(loiter.radius)
+
+
+def as_at_sea(up: float) -> float:
+    """By how much a circle is wider at a height (m AMSL) than at sea level: not at all."""
+    return 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +56,12 @@ class LoiterRules:
 
     radius: of a loiter that states none, m, negative to the left; 0 for a radius of the aircraft's own.
     radius_name: the parameter that sets it, "" for none.
+    radius_of: the radius of a loiter's item that is read, m, 0 for none.
+    growth: by how much a circle is wider at a height (m AMSL) than is stated.
     at_middle: whether it flies at the circle's middle until it comes to the rim, and leaves as soon as the loiter is
         over for the line that begins in the middle; else it joins and leaves the circle on tangents.
+    lines_up: whether, flying at the middle, it counts from where it turns away from that, and goes on when the loiter
+        is over until it heads for what follows, within `LINED_UP`.
     holds_height: whether on the way to a loiter to a height it holds the height at which it set out.
     climb, sink: its fastest in circles, m/s.
     short: by how much a height may be missed, m.
@@ -54,7 +73,10 @@ class LoiterRules:
 
     radius: float = 0.0
     radius_name: str = ""
+    radius_of: Callable[[Loiter], float] = as_stated
+    growth: Callable[[float], float] = as_at_sea
     at_middle: bool = False
+    lines_up: bool = False
     holds_height: bool = False
     climb: float = math.inf
     sink: float = math.inf
@@ -141,7 +163,8 @@ def lay_circles(
         into = courses[k - 1] if k else (courses[k] if k < len(courses) else 0.0)
         onward = courses[k] if k < len(courses) else None
         run = math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
-        laid = _around(source, node, into, onward, up, run, slopes, rules)
+        tightest = own_radius(node.stop.airspeed, node.up) if rules.lines_up else 0.0
+        laid = _around(source, node, into, onward, up, run, tightest, slopes, rules)
         if not k:
             laid.insert(0, RoutePoint(node.stop, (*on_rim(node, into), laid[0].position[2])))
         up = laid[-1].position[2]
@@ -184,22 +207,27 @@ def _turn(
     source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius, rules: LoiterRules
 ) -> float:
     """Signed radius of a loiter, m."""
-    radius = abs(loiter.radius)
+    radius, stated = rules.radius_of(loiter), abs(loiter.radius)
     if radius > WIDEST:
         allowed = f"allowed up to {WIDEST:,.0f}"
         message = f"{source}: item {stop.item}: loiter radius {radius:g} m: {allowed}"
         raise MissionError(message, file=source, field="loiter radius", value=radius, allowed=allowed)
+    grows = rules.growth(up)
     if radius == 0.0 and rules.radius != 0.0:
-        side = " to the left" if rules.radius < 0.0 else ""
-        notes.add(f"loiter without a radius: flown with {rules.radius_name}, {abs(rules.radius):g} m{side}", stop.item)
-        return math.copysign(max(TIGHTEST, abs(rules.radius)), rules.radius)
+        left = rules.radius < 0.0 or loiter.radius < 0.0
+        side = " to the left" if left else ""
+        why = f"its radius of {stated:g} m is not read" if stated > 0.0 else "loiter without a radius"
+        notes.add(f"{why}: flown with {rules.radius_name}, {abs(rules.radius):g} m{side}", stop.item)
+        return math.copysign(max(TIGHTEST, abs(rules.radius) * grows), -1.0 if left else 1.0)
     if radius == 0.0:
         radius = own_radius(stop.airspeed, up)
         notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
     elif radius < TIGHTEST:
         notes.add(f"loiter radius below {TIGHTEST:.0f} m: flown with {TIGHTEST:.0f} m", stop.item)
         radius = TIGHTEST
-    return math.copysign(radius, loiter.radius)
+    elif round(radius * grows) != round(stated):
+        notes.add(f"loiter radius {stated:g} m: flown with {radius * grows:.0f} m at this height", stop.item)
+    return math.copysign(radius * grows, loiter.radius)
 
 
 def is_joined(a: Node, b: Node) -> bool:
@@ -239,12 +267,13 @@ def circle_corners(node: Node, into: float, sweep: float) -> list[tuple[float, f
 
 
 def _around(
-    source: str, node: Node, into: float, onward: float | None, up: float, run: float, slopes: SpiralSlopes,
-    rules: LoiterRules,
+    source: str, node: Node, into: float, onward: float | None, up: float, run: float, tightest: float,
+    slopes: SpiralSlopes, rules: LoiterRules,
 ) -> list[RoutePoint]:  # fmt: skip
     """Corners around a circle, joined on one course and left on another (None: the mission ends there).
 
-    up: height where the leg before started, m.  run: its length, m.
+    up: height where the leg before started, m.  run: its length, m.  tightest: radius of the aircraft's own, m, that a
+    smaller circle is flown wider to; 0 where that is not known.
 
     For whoever leaves as soon as its time is over, the circle is drawn to the last tangent before that.
     """
@@ -260,13 +289,16 @@ def _around(
             # Heights are counted between the corners, of which there is one more than spaces between them.
             wanted = missing / (climb if node.up > first else dive) / radius + CORNER
     elif loiter is not None:
-        wanted = loiter.sweep(node.stop.airspeed, radius)
+        wanted = loiter.sweep(node.stop.airspeed, max(radius, tightest))
+        if rules.lines_up:
+            wanted = max(0.0, wanted - _TO_TANGENT)
     sweep = wanted
     if onward is not None:
         part = (side * (onward - into)) % (2.0 * math.pi)
-        more = (wanted - part) / (2.0 * math.pi)
-        timed = loiter is not None and not loiter.to_height
-        more = math.floor(more) if rules.at_middle and timed else math.ceil(more - 1e-9)
+        early = LINED_UP if rules.lines_up else 1e-9
+        more = (wanted - part - early) / (2.0 * math.pi)
+        at_once = rules.at_middle and not rules.lines_up and loiter is not None and not loiter.to_height
+        more = math.floor(more) if at_once else math.ceil(more)
         sweep = part + 2.0 * math.pi * max(0, more)
     if sweep > MAX_STOPS * CORNER:
         turns, allowed = sweep / (2.0 * math.pi), f"at most {MAX_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"

@@ -82,6 +82,9 @@ class Airborne(ABC):
         self._work.settings.middle = self.map.middle
         self._work.settings.battery = setup.battery
         patience = PATIENCE * self.path.length / _slowest_leg(setup, self._airspeeds) + PATIENCE_SECONDS
+        # A loiter for a time lasts as long as its item says, whatever circle is drawn for it.
+        timed = waypoints[(waypoints["stays"] > 0.0) & (waypoints["stays"] < math.inf)]
+        patience += sum(dict(zip(timed["item"].tolist(), timed["stays"].tolist(), strict=True)).values())
         if setup.route.return_to is not None:
             # An autopilot that returns by a law of its own may circle longer than its path does.
             patience += longest_circling(setup.route.return_to.radius)
@@ -141,8 +144,16 @@ class Airborne(ABC):
         if status:
             return rows, ENDS[status]
         if left <= count:
-            return rows, f"time limit: not finished after {self.max_ticks * self.dt:.0f} s"
+            return rows, self._unfinished()
         return rows, ""
+
+    def _unfinished(self) -> str:
+        """What a flight that takes too long was doing: circling at a loiter, or anything else."""
+        route, ahead = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
+        seconds = f"not finished after {self.max_ticks * self.dt:.0f} s"
+        if route.arcs[ahead] > 0.0 and route.return_from < 0:
+            return f"circled: at the loiter of item {route.items[ahead]}, {seconds}"
+        return f"time limit: {seconds}"
 
 
 def _slowest_leg(setup: FlightSetup, airspeeds: Floats) -> float:

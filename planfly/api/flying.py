@@ -33,7 +33,7 @@ from planfly.open_mission import (
 )
 from planfly.pipeline import autopilot_log, fly_and_judge
 from planfly.return_flights import returns_line
-from planfly.stages import say, stage
+from planfly.stages import say_replaced, stage
 from planfly.targets import file_target, refuse_existing
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
@@ -242,8 +242,7 @@ def _log_target(
     if program is not None:
         refuse_existing(autopilot_log(target), overwrite, source)
     target.parent.mkdir(parents=True, exist_ok=True)
-    if target.exists():
-        say(f"{target} is there: replaced")
+    say_replaced(target, *((autopilot_log(target),) if program is not None else ()))
     return target
 
 

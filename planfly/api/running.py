@@ -21,10 +21,10 @@ from planfly.arguments import check_arguments
 from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_text
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
-from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from planfly.pipeline import autopilot_log, fly_and_judge, make_plan, make_setup
 from planfly.refine import refine as refine_rounds
 from planfly.return_flights import returns_line
-from planfly.stages import stage
+from planfly.stages import say_replaced, stage
 from planfly.targets import RUN_FILES, RUN_FOLDER, filled_pattern, prepare_folder, refuse_folder
 from planner.plan import Plan, plan_json
 from world.files import hold, write_whole
@@ -197,6 +197,8 @@ def _rounds(
         if not flown:
             folder.mkdir(parents=True, exist_ok=True)
             held.enter_context(hold(folder))
+            if task.program is not None:
+                say_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap"))
             prepare_folder(folder)
         flown.append(_fly_round(task, plan, len(flown)))
         if on_round is not None:

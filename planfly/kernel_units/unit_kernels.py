@@ -63,7 +63,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "aircraft.path_limits.ground_speed_on",
         "aircraft.path_limits.turn_radius_between",
         "flight.autopilots.arduplane.law.arduplane_tick",
-        "flight.autopilots.arduplane.law.turn_distance",
+        "flight.autopilots.arduplane.navigator.turn_distance",
         "flight.autopilots.arduplane.swift_return._fly_return",
         "flight.autopilots.planfly.law.planfly_tick",
         "flight.guidance.equivalent_airspeed.true_by_equivalent",

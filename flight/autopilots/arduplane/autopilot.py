@@ -9,7 +9,8 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
-from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick, turn_distance
+from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick
+from flight.autopilots.arduplane.navigator import REACHED_HEIGHT, turn_distance
 from flight.autopilots.arduplane.parameters import (
     HEIGHT_CANDIDATES,
     SIDE_CANDIDATES,
@@ -23,6 +24,8 @@ from flight.autopilots.arduplane.parameters import (
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import Autopilot, Floats, SpeedLimits, StoredAutopilot, StoredParameters, Tick
 from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.mission.itinerary import Loiter
+from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Navigation
@@ -132,6 +135,27 @@ class ArduPlane(Autopilot):
         )
 
     @property
+    def loiter_rules(self) -> LoiterRules:
+        """By WP_LOITER_RAD and the air's density, until it is within `REACHED_HEIGHT` of a height.
+
+        >>> rules = ArduPlane(default_parameters().changed(WP_LOITER_RAD=-80.0)).loiter_rules
+        >>> rules.radius, round(rules.growth(1300.0), 3)
+        (-80.0, 1.135)
+        """
+        made = self.parameters
+        return LoiterRules(
+            radius=made.loiter_radius,
+            radius_name="WP_LOITER_RAD",
+            radius_of=radius_read,
+            growth=_growth,
+            at_middle=True,
+            lines_up=True,
+            climb=made.tecs_climb_max,
+            sink=made.tecs_sink_max or math.inf,
+            short=REACHED_HEIGHT,
+        )
+
+    @property
     def speed_limits(self) -> SpeedLimits | None:
         """AIRSPEED_MIN and AIRSPEED_MAX."""
         return SpeedLimits(self.parameters.airspeed_min, self.parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
@@ -160,3 +184,31 @@ class ArduPlane(Autopilot):
     def with_parameters(self, **values: float) -> "ArduPlane":
         """The law, whoever flew before, with other parameters."""
         return ArduPlane(self.parameters.changed(**values))
+
+
+# A radius of so many metres or less is none to ArduPlane.  A mission's item holds that of LOITER_TURNS in a byte: whole
+# metres, or from this on whole tens of them (`AP_Mission::mavlink_int_to_mission_cmd`).
+_NO_RADIUS, _BYTE = 1.0, 255.0
+
+
+def radius_read(loiter: Loiter) -> float:
+    """The radius that ArduPlane reads of a loiter's item, m, 0 for none: that of turns, and to a height.
+
+    For a time, or without end, it flies WP_LOITER_RAD, and takes of the item no more than the side.
+
+    >>> radius_read(Loiter(-250.7, turns=3)), radius_read(Loiter(307.0, turns=3)), radius_read(Loiter(1.0, turns=3))
+    (250.0, 300.0, 0.0)
+    >>> radius_read(Loiter(200.0, to_height=True)), radius_read(Loiter(200.0, seconds=60.0))
+    (200.0, 0.0)
+    """
+    if loiter.seconds or loiter.endless:
+        return 0.0
+    stated = float(math.floor(abs(loiter.radius)))
+    if loiter.turns and stated > _BYTE:
+        stated = 10.0 * min(_BYTE, math.floor(stated / 10.0))
+    return stated if stated > _NO_RADIUS else 0.0
+
+
+def _growth(up: float) -> float:
+    """By how much a circle is wider at a height (m AMSL): as the square of true by equivalent airspeed."""
+    return float(true_by_equivalent(up)) ** 2

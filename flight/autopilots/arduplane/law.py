@@ -1,4 +1,4 @@
-"""ArduPlane's law, compiled: L1, when it turns to the next leg, its height demand, TECS, and one tick of it all."""
+"""ArduPlane's law, compiled: what it keeps, the bank it takes, its height demand, TECS, and one tick of it all."""
 
 import math
 
@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, CLIMB_BEFORE_TURN
+from flight.autopilots.arduplane.navigator import navigate_legs, target_of
+from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
-from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from flight.guidance.path import find_on_path, profile
+from flight.mission.itinerary import UNLIMITED
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
@@ -20,7 +21,6 @@ from flight.simulation.tick import (
     end_return,
     end_tick,
 )
-from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import Heights
 
@@ -39,6 +39,16 @@ ARDUPILOT_MEMORY = record_dtype(
     "from_up",  # m, where its slope begins
     "cross_track_sum",  # rad, L1's integral
     ("on_circle", np.bool_),  # whether a loiter's circle is followed, not just approached
+    ("loitering", np.bool_),  # whether it was, of this loiter: from then on it counts
+    "stayed",  # s since then
+    "circled",  # rad around its middle since then, in its direction
+    "bearing",  # rad, from its middle, the last time
+    ("at_height", np.bool_),  # whether its height was reached, or given up
+    "next_look",  # rad around at which it is looked at whether the height still changes
+    "up_before",  # m, height at the last such look
+    ("over", np.bool_),  # whether its turns, seconds or height are done
+    "waited",  # rad around since then
+    ("left_for", np.int64),  # the leg that the last loiter was left for, 0 for none
     ("returning", np.bool_),  # whether it returns to launch; from_east, from_north and from_up are then where it began
     ("climbed", np.bool_),  # whether it has climbed what it has to before it turns
     "side_acceleration",  # m/s^2 to the right, as last demanded
@@ -79,176 +89,10 @@ ARDUPLANE_NUMBERS = ARDUPLANE.itemsize // 8
 
 
 # ----------------------------------------------------------------------
-# How ArduPlane flies along a mission's legs: the L1 law, when it turns to the next leg, and loiters.
-#
-# The L1 law is that of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900)
-# as ArduPlane's documentation gives its parameters (ardupilot.org, Plane, "Navigation Tuning"), with the formulas of
-# `flight.guidance.lateral_reference_laws`.  ArduPlane navigates ten times a second: what it demands stays until then.
+# The bank that a side acceleration takes, within what the parameters and the airspeed allow.
 
-# An acceptance is sent as whole metres in a byte.
-MAX_ACCEPTANCE = 255.0
 # Least that the roll limit is narrowed to by low airspeed, rad.
 _MIN_ROLL_LIMIT = math.radians(25.0)
-
-
-@compiled
-def turn_distance(
-    acceptance: float, turn: float, radius: float, length: float, air_density_factor: float
-) -> float:  # pragma: no cover - compiled
-    """How far before a waypoint ArduPlane turns to the next leg, m; 0 where it flies on to the waypoint.
-
-    acceptance: that the mission states, m, 0 for none: it is taken as it is, in whole metres.
-    turn: rad, positive.  radius: WP_RADIUS, m.  length: of L1, m.
-    air_density_factor: true by equivalent airspeed; with height a turn takes its square more room.
-    """
-    stated = math.floor(min(MAX_ACCEPTANCE, acceptance))
-    if stated > 0.0:
-        return stated
-    right_angle: float = min(radius * air_density_factor * air_density_factor, length)
-    return right_angle * min(1.0, turn / (0.5 * math.pi))
-
-
-@inner
-def past_line(estimated: Record, from_east: float, from_north: float, b: Record) -> bool:  # pragma: no cover - compiled
-    """Whether the line across the leg at its end is passed; a leg without length is.
-
-    b: the end, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    """
-    leg_e, leg_n = b.east - from_east, b.north - from_north
-    ahead_e, ahead_n = b.east - estimated.east, b.north - estimated.north
-    passed: bool = ahead_e * leg_e + ahead_n * leg_n <= 0.0
-    return passed
-
-
-@inner
-def navigate_legs(
-    estimated: Record,
-    waypoints: Records,
-    parameters: Record,
-    own: Record,
-    air_density_factor: float,
-    dt: float,
-) -> None:  # pragma: no cover - compiled
-    """Demand a side acceleration for the present leg, and then turn to the next one if its time has come.
-
-    estimated: a record of `flight.guidance.navigation_error.MOTION`.
-    waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    parameters: of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
-    own: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
-    air_density_factor: true by equivalent airspeed.
-    dt: s since the last time.
-    """
-    b = waypoints[own.leg + 1]
-    damping = parameters.navl1_damping
-    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
-    length = l1_length(speed, parameters.navl1_period, damping)
-    if b.returns:
-        # A return goes on until the flight ends, in one leg.
-        _return(estimated, b, parameters, own, air_density_factor)
-        return
-    if b.circle != 0.0:
-        own.side_acceleration = _around(estimated, b, abs(b.circle), parameters, own, length, speed)
-        reached = own.on_circle and _past_corner(estimated, b)
-    else:
-        own.on_circle = False
-        angle, aim = l1_angles(estimated, own.from_east, own.from_north, b.east, b.north, length)
-        own.cross_track_sum = l1_integrate(aim, own.cross_track_sum, parameters.navl1_xtrack_i, dt)
-        if not math.isnan(aim):
-            angle += aim + own.cross_track_sum
-        own.side_acceleration = l1_acceleration(angle, speed, length, damping)
-        reached = _reached(estimated, b, parameters, own, length, air_density_factor)
-    if not reached or own.leg + 2 >= waypoints.shape[0]:
-        return
-    own.leg += 1
-    # The next circle is another one, though a return's height is asked for before it is flown to.
-    own.on_circle = False
-    after = waypoints[own.leg + 1]
-    own.from_east, own.from_north, own.from_up = b.east, b.north, b.up
-    if after.circle == 0.0 and past_line(estimated, b.east, b.north, after):
-        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
-
-
-@inner
-def _reached(
-    estimated: Record, b: Record, parameters: Record, own: Record, length: float, air_density_factor: float
-) -> bool:  # pragma: no cover - compiled
-    """Whether the leg to b is over: near enough to b, or past the line across it."""
-    distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
-    passed = past_line(estimated, own.from_east, own.from_north, b)
-    if parameters.wp_max_radius > 0.0 and distance > parameters.wp_max_radius:
-        if passed:
-            # Passed too far away: it turns back to the waypoint.
-            own.from_east, own.from_north = estimated.east, estimated.north
-        return False
-    if b.fly_over:
-        return passed
-    reach = turn_distance(b.acceptance, b.turn, parameters.wp_radius, length, air_density_factor)
-    return passed or distance <= reach
-
-
-@inner
-def _return(
-    estimated: Record, b: Record, parameters: Record, own: Record, air_density_factor: float
-) -> None:  # pragma: no cover - compiled
-    """Demand the side acceleration of a return to launch (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
-
-    It turns to the middle of its circle at once, whatever leg it was on; the circle grows with height as the square of
-    true by equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until it has climbed what it has to, its bank is
-    LEVEL_ROLL_LIMIT, and only then its slope begins.
-    """
-    if not own.returning:
-        own.returning = True
-        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
-    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
-    length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
-    radius = abs(b.circle) * air_density_factor * air_density_factor
-    own.side_acceleration = _around(estimated, b, radius, parameters, own, length, speed)
-    if own.climbed:
-        return
-    if int(parameters.flight_options) & CLIMB_BEFORE_TURN:
-        own.climbed = estimated.up > b.up
-    else:
-        own.climbed = parameters.rtl_climb_min <= 0.0 or estimated.up - own.from_up > parameters.rtl_climb_min
-    if own.climbed:
-        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
-        return
-    most = GRAVITY * math.tan(parameters.level_roll_limit)
-    own.side_acceleration = min(most, max(-most, own.side_acceleration))
-
-
-@inner
-def _around(
-    estimated: Record, b: Record, radius: float, parameters: Record, own: Record, length: float, speed: float
-) -> float:  # pragma: no cover - compiled
-    """Side acceleration for a loiter: straight to its centre until its circle asks for more, then around it, m/s^2."""
-    side = math.copysign(1.0, b.circle)
-    out_e, out_n = estimated.east - b.centre_east, estimated.north - b.centre_north
-    distance = max(0.1, math.hypot(out_e, out_n))
-    course = math.atan2(estimated.velocity_east, estimated.velocity_north)
-    inward = wrap(course - math.atan2(-out_e, -out_n))
-    capture = l1_acceleration(inward, speed, length, parameters.navl1_damping)
-    # Over the ground: outwards, and around the circle in its direction.
-    outwards = -speed * math.cos(inward)
-    around = -side * speed * math.sin(inward)
-    frequency = 2.0 * math.pi / parameters.navl1_period
-    error = distance - radius
-    back = frequency * (frequency * error + 2.0 * parameters.navl1_damping * outwards)
-    if outwards > 0.0 and around < 0.0:
-        # Flying out and the wrong way round, it turns the way that the circle goes.
-        back = max(back, 0.0)
-    circling = side * (back + around * around / max(0.5 * radius, distance))
-    own.on_circle = not (error > 0.0 and side * capture < side * circling)
-    demanded: float = circling if own.on_circle else capture
-    return demanded
-
-
-@inner
-def _past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - compiled
-    """Whether the aircraft on a circle has passed the corner of the route that stands for this part of it."""
-    corner = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
-    here = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
-    turned = wrap(here - corner) * math.copysign(1.0, b.circle)
-    return 0.0 <= turned < 0.5 * math.pi
 
 
 @inner
@@ -333,7 +177,7 @@ def demand_height(
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     b: the leg's end, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    parameters, own: as `flight.autopilots.arduplane.law.navigate_legs` takes them.
+    parameters, own: as `flight.autopilots.arduplane.navigator.navigate_legs` takes them.
     """
     target = _return_height(estimated, b, parameters, own) if b.returns else _leg_height(estimated, b, parameters, own)
     share = dt / (dt + parameters.tecs_height_demand_time)
@@ -356,10 +200,16 @@ def demand_height(
 
 @inner
 def _leg_height(estimated: Record, b: Record, parameters: Record, own: Record) -> float:  # pragma: no cover - compiled
-    """Height on the leg's slope at the aircraft's place along it; that of its end where it is flown as a step."""
+    """Height on the leg's slope at the aircraft's place along it; that of its end where it is flown as a step.
+
+    The slope of a leg to a loiter leads to its middle; on its circle its height counts.
+    """
     end: float = b.up
+    if own.on_circle:
+        return end
     rise = end - own.from_up
-    leg_e, leg_n = b.east - own.from_east, b.north - own.from_north
+    end_e, end_n = target_of(b)
+    leg_e, leg_n = end_e - own.from_east, end_n - own.from_north
     run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
     along = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
     if abs(rise) < parameters.glide_slope_min or rise == 0.0 or along >= 1.0:
@@ -611,6 +461,12 @@ def fly_as_ardupilot(
     and no part of the law.
     """
     find_on_path(estimated, pieces, memory)
+    b = waypoints[own.leg + 1]
+    if b.circle != 0.0 and not b.returns:
+        # A loiter is over by ArduPlane's own account; what circles at a mission's end has not missed it.
+        memory.returning = b.item == waypoints[-1].item
+        stays = b.stays == math.inf and own.stayed > UNLIMITED
+        memory.done = memory.returning and (own.over or stays)
     if own.returning:
         end_return(estimated, waypoints[own.leg + 1], memory, dt)
     memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
@@ -621,6 +477,9 @@ def fly_as_ardupilot(
     if own.clock < 0.5 * dt:
         own.clock += NAVIGATION_TICK
         navigate_legs(estimated, waypoints, parameters, own, factor, NAVIGATION_TICK)
+        # Where a loiter was left sooner than the path does, the rest of it is not flown.
+        while pieces[memory.piece].leg < own.left_for - 1 and memory.piece + 1 < pieces.shape[0]:
+            memory.piece += 1
         demand_height(estimated, waypoints[own.leg + 1], parameters, own, NAVIGATION_TICK)
         wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
         memory.speed_command = wanted * factor
@@ -671,6 +530,8 @@ def _follow(
     limit = gains.roll_acceleration_max * dt
     rate = before + min(limit, max(-limit, rate - before))
     follow_roll(state, gains, memory, commands, memory.bank + rate * dt, rate, (rate - before) / dt, dt)
+    # Of the rudder the ailerons' share alone: nothing takes the sideslip out of a turn, which is so much wider.
+    commands.rudder = -parameters.rudder_mix * commands.aileron
     pitch_rate = (own.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG * parameters.pitch_time)
     pitch_rate = min(_FASTEST_PITCH, max(-_FASTEST_PITCH, pitch_rate))
     steer_elevator(state, gains, memory, commands, estimated.velocity_up, state.airspeed * pitch_rate)

@@ -65,6 +65,7 @@ DEFINITIONS = {
     "pitch_trim": Definition("PTCH_TRIM_DEG", 0.0, -45.0, 45.0, _DEGREE, ("TRIM_PITCH_CD", _CENTI)),
     "roll_time": Definition("RLL2SRV_TCONST", 0.5, 0.05, 10.0),
     "pitch_time": Definition("PTCH2SRV_TCONST", 0.5, 0.05, 10.0),
+    "rudder_mix": Definition("KFF_RDDRMIX", 0.5, 0.0, 1.0),
     "airspeed_cruise": Definition("AIRSPEED_CRUISE", 12.0, 1.0, 500.0, 1.0, ("TRIM_ARSPD_CM", _CENTI)),
     "airspeed_min": Definition("AIRSPEED_MIN", 9.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MIN", 1.0)),
     "airspeed_max": Definition("AIRSPEED_MAX", 22.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MAX", 1.0)),
@@ -176,6 +177,7 @@ class ArduPilotParameters:
     pitch_trim: float = field(init=False)
     roll_time: float = field(init=False)
     pitch_time: float = field(init=False)
+    rudder_mix: float = field(init=False)
     airspeed_cruise: float = field(init=False)
     airspeed_min: float = field(init=False)
     airspeed_max: float = field(init=False)

@@ -27,10 +27,10 @@ from flight.autopilots.arduplane.law import (
     ROLL_LAG,
     SPEED_SUM,
     demand_height,
-    navigate_legs,
     roll_demand,
     update_tecs,
 )
+from flight.autopilots.arduplane.navigator import navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, angle_of_attack, excess_power, move_on
 from flight.dynamics.state import STATE

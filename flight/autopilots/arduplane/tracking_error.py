@@ -15,12 +15,11 @@ from aircraft.envelope import GRAVITY
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
-    MAX_ACCEPTANCE,
     NAVIGATION_TICK,
     ROLL_LAG,
-    navigate_legs,
     roll_demand,
 )
+from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import ERRORS, MOTION

@@ -83,6 +83,9 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     elif settings.on_last_leg:
         across, beyond = beyond_end(work.true, path.waypoint[: settings.waypoints])
         memory.done = beyond >= 0.0
+        before = path.waypoint[settings.waypoints - 2]
+        # What circles at a mission's end, as wide as it can, has not missed it.
+        memory.returning = before.circle != 0.0 and before.item == last.item
         if memory.done:
             memory.cross_track = across
     return end_tick(work)

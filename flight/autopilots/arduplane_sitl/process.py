@@ -17,6 +17,7 @@ from pathlib import Path
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.parameters import AIRCRAFT_FILE, DEFINITIONS
 from flight.autopilots.arduplane_sitl.physics import LOOPBACK, ServoMap
+from flight.autopilots.guard import Guard
 from flight.autopilots.parameter_files import read_parameter_file
 from flight.mission.items import Home
 from flight.simulation.setup import FlightSetup
@@ -57,7 +58,9 @@ def check_binary(binary: Path) -> str:
 
 
 class AutopilotProcess:
-    """The running program; a context manager, after which neither it nor its folder is left.
+    """The running program; a context manager, after which neither it, nor what it started, nor its folder is left.
+
+    Where we are killed, a guard sees to the same.
 
     binary: its file, checked by `check_binary`.
     home: where it starts.  heading: degrees, that it starts with.
@@ -78,11 +81,15 @@ class AutopilotProcess:
     ) -> None:
         self.binary = binary
         self._place = contextlib.ExitStack()
-        self._folder = self._place.enter_context(temporary_folder("planfly-autopilot-"))
+        self._ended = False
+        guard = self._place.enter_context(Guard())
         try:
+            self._folder = self._place.enter_context(temporary_folder("planfly-autopilot-"))
+            guard.keep_folder(self._folder)
             text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
             (self._folder / _DEFAULTS).write_text(text, encoding="ascii")
             self._process = self._spawn(home, heading, physics_port, link_port)
+            guard.keep_group(self._process.pid)
         except BaseException:
             self._place.close()
             raise
@@ -111,7 +118,7 @@ class AutopilotProcess:
                     stdout=output,
                     stderr=subprocess.STDOUT,
                     env=environment,
-                    # Ctrl-C is ours: we end it in order.
+                    # Ctrl-C is ours: we end it in order, and what it started: they are a group of their own.
                     start_new_session=True,
                     preexec_fn=_die_with_parent if sys.platform == "linux" else None,
                 )
@@ -146,11 +153,9 @@ class AutopilotProcess:
 
         answer: serves it a frame of physics meanwhile; false where none was asked for.
         """
-        if self._process.poll() is None:
-            with contextlib.suppress(ProcessLookupError):
-                self._process.send_signal(signal.SIGTERM)
+        if self._signal(signal.SIGTERM):
             until = time.monotonic() + _GRACE
-            while self._process.poll() is None and time.monotonic() < until:
+            while self._lives() and time.monotonic() < until:
                 if not answer():
                     time.sleep(0.001)
         self._kill()
@@ -164,10 +169,26 @@ class AutopilotProcess:
             shutil.move(logs[-1], target)
         return True
 
+    def _signal(self, number: int) -> bool:
+        """Send the program and what it started a signal, 0 for none; whether any of them is there.
+
+        A group that is gone is sent none again: its number may be another's by then.
+        """
+        if not self._ended:
+            try:
+                os.killpg(self._process.pid, number)
+            except ProcessLookupError:
+                self._ended = True
+        return not self._ended
+
+    def _lives(self) -> bool:
+        """Whether the program, or what it started, goes on; one that has ended but was not waited for does not."""
+        self._process.poll()
+        return self._signal(0)
+
     def _kill(self) -> None:
-        if self._process.poll() is None:
-            with contextlib.suppress(ProcessLookupError):
-                self._process.kill()
+        if self._lives():
+            self._signal(signal.SIGKILL)
         self._process.wait()
 
     def _lines(self) -> list[str]:

@@ -212,7 +212,7 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
     own.from_up = a.up
     if a.circle != 0.0 and math.isnan(a.stays):
         own.from_east, own.from_north = estimated.east, estimated.north
-    if a.circle != 0.0 and a.leaves_on_tangent:
+    if a.circle != 0.0 and a.leaves_on_tangent and not math.isnan(a.stays):
         east, north = _target(b)
         bearing = math.atan2(east - a.centre_east, north - a.centre_north)
         share = abs(a.circle) / max(1e-3, math.hypot(east - a.centre_east, north - a.centre_north))

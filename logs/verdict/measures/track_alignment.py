@@ -101,6 +101,12 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     if first >= 0:
         # A return ends where its autopilot circles, which is not where its circle is drawn.
         arrived[first + 1 :] = [max(NEAR, radius) for radius in arrived[first + 1 :]]
+    if requirements.setup.autopilot.loiter_rules.at_middle:
+        # A mission that ends on a circle about a middle ends anywhere on it, which is as wide as it is flown.
+        ends, item = requirements.setup.route.arcs.size - 1, requirements.setup.route.items[-1]
+        while ends > 0 and requirements.setup.route.items[ends] == item and requirements.setup.route.arcs[ends - 1]:
+            arrived[ends] = max(arrived[ends], NEAR)
+            ends -= 1
     passed = (rows < last) | (off <= arrived)
     passed = np.logical_and.accumulate(passed)
     step = np.diff(clean.position[:, :2], axis=0)

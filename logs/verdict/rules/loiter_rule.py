@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.mission.itinerary import loiter_of
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
@@ -73,7 +74,10 @@ def fold_loiters(
     """Findings with those at a loiter's corners replaced by one, and those of its legs by the worst of each rule."""
     found, at_once = list(findings), requirements.setup.autopilot.loiter_rules.at_middle
     for circle in circles(requirements):
-        corners = {requirements.waypoint(i) for i in range(circle.first, circle.last + 1)}
+        # Where the mission ends on its circle, that end is on it too.
+        here = requirements.setup.route.items[circle.last : circle.last + 2]
+        last = circle.last + 1 if at_once and len(here) == 2 and here[0] == here[1] else circle.last
+        corners = {requirements.waypoint(i) for i in range(circle.first, last + 1)}
         legs = {requirements.leg(leg) for leg in range(circle.first, circle.last)}
         at = [item for item in found if item.rule in ("turn", "waypoint") and item.place in corners]
         if at:
@@ -107,13 +111,19 @@ def _loiter(
     if requirements.setup.autopilot.loiter_rules.at_middle:
         bad = bad if aligned is None or not _came_to(requirements, aligned, circle) else []
     faults = _too_small(requirements, circle, tightest) if known else []
+    own = _is_own(requirements, circle)
+    facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
+    if own and faults:
+        # What its parameter makes too tight it flies wider, as it does at the end of a return.
+        name = requirements.setup.autopilot.loiter_rules.radius_name
+        facts.append(f"{name} asks for less than the {tightest:.0f} m of the bank limit: flown wider")
+        faults = []
     if aligned is not None and bad:
         faults.append(_not_held(circle, bad))
     elif bad and not faults:
         first = bad[0]
         text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
         faults.append(Message(text, _bare(first.place), placed))
-    facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
     mean = math.nan
     if aligned is not None and aligned.passed[circle.last] and aligned.rows[circle.last] > aligned.rows[circle.first]:
         rows = slice(int(aligned.rows[circle.first]), int(aligned.rows[circle.last]) + 1)
@@ -140,6 +150,13 @@ def _loiter(
         unit="m",
         method="radius over the ground against the bank limit's in this wind; each corner as a turn",
     )
+
+
+def _is_own(requirements: RouteRequirements, circle: Circle) -> bool:
+    """Whether a circle's radius is that of the autopilot's parameter, for want of one that it reads in the item."""
+    rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
+    asked = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
+    return rules.lines_up and rules.radius != 0.0 and asked is not None and rules.radius_of(asked) == 0.0
 
 
 def _came_to(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:

@@ -253,3 +253,42 @@ def test_what_comes_after_the_last_waypoint_is_said() -> None:
     for last in (wp(0, 0, command=17, p="0 0 150 0"), "3 20 0 0 0 0 0 0 0", wp(0, 0, command=21)):
         assert not any("without end" in line for line in laid_for(rules, wp(0, -1500), wp(900, -1500), last).notes)
     assert not any("without end" in line for line in laid_for(LoiterRules(), wp(0, -1500), wp(0, 0)).notes)
+
+
+def test_a_circle_that_is_left_heading_for_what_follows_is_drawn_as_it_is_flown() -> None:
+    """Its turns count from where it turns away from the middle, a quarter of a circle before the tangent's place."""
+    onward = {"ahead": wp(0, 1500), "beside": wp(1500, 0), "back": wp(100, -1500)}
+    rules = LoiterRules(at_middle=True, lines_up=True)
+    for where, parts in (("ahead", 0.0), ("beside", 0.25), ("back", 0.5)):
+        for turns in (1, 3):
+            lines = wp(0, -1500), wp(0, 0, 100, 18, p=f"{turns} 0 150 0"), onward[where]
+            around, _ = circled(laid_for(rules, *lines), 2)
+            assert around == pytest.approx(turns + parts, abs=0.07)
+    # Ten degrees before a whole number of turns is enough.
+    lines = wp(0, -1500), wp(0, 0, 100, 18, p="2 0 150 0"), wp(-200, 1500)
+    assert circled(laid_for(rules, *lines), 2)[0] == pytest.approx(1.98, abs=0.04)
+
+
+def test_a_circle_tighter_than_the_aircraft_turns_is_gone_around_less_often() -> None:
+    lines = wp(0, -1500), wp(0, 0, 100, 19, p="120 0 30 0"), wp(1500, 1500)
+    # 120 s at 25 m/s are 15.9 circles of 30 m, and 3.7 of the 130 m that the aircraft flies on its own.
+    assert 3.0 < circled(laid_for(LoiterRules(at_middle=True, lines_up=True), *lines), 2)[0] < 4.5
+    assert circled(laid_for(LoiterRules(at_middle=True), *lines), 2)[0] > 14.0
+
+
+def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> None:
+    rules = LoiterRules(
+        radius=60.0, radius_name="WP_LOITER_RAD", radius_of=lambda one: 0.0 if one.seconds else 200.0,
+        growth=lambda up: 1.0 + up / 1000.0,
+    )  # fmt: skip
+    unread = "its radius of 150 m is not read: flown with WP_LOITER_RAD, 60 m"
+    # 100 m above home's 300 m: 1.4 times as wide.
+    for loiter, radius, note in (
+        (wp(0, 0, 100, 19, p="60 0 -150 0"), -84.0, f"{unread} to the left"),
+        (wp(0, 0, 100, 19, p="60 0 150 0"), 84.0, unread),
+        (wp(0, 0, 100, 18, p="2 0 207 0"), 280.0, "loiter radius 207 m: flown with 280 m at this height"),
+    ):  # fmt: skip
+        made = laid_for(rules, wp(0, -1500), loiter, wp(1500, 1500))
+        turns, arc = circled(made, 2)
+        assert math.copysign(arc, turns) == pytest.approx(radius)
+        assert f"item 2: {note}" in made.notes

@@ -8,13 +8,16 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.guidance.gains import load_gains
+from flight.mission.items import Mission
 from flight.mission.return_path import ReturnCircle
 from flight.simulation.airborne import PATIENCE, PATIENCE_SECONDS, Airborne
+from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
 from world.errors import FlightError
 
 AEROSONDE = load_aircraft("aerosonde")
 MAKE = setup_maker(AEROSONDE)
+NOTHING = Mission(None, ())
 
 
 class Gliding(Airborne):
@@ -59,6 +62,22 @@ def test_a_return_may_take_five_minutes_more_for_its_circles() -> None:
     back = replace(setup, route=replace(setup.route, return_from=0, return_to=ReturnCircle(0.0, 3000.0, 500.0, 80.0)))
     plain, longer = (Gliding(one, AEROSONDE, load_gains(AEROSONDE)) for one in (setup, back))
     assert (longer.max_ticks - plain.max_ticks) * plain.dt == pytest.approx(300.0, abs=1.0)
+
+
+def test_a_loiter_may_take_as_long_as_its_item_says() -> None:
+    lines = wp(0, -1500), wp(0, 0, 100, 19, p="120 0 150 0"), wp(1500, 1500)
+    setup = setup_of(*lines)
+    waits, plain = (Gliding(one, AEROSONDE, load_gains(AEROSONDE)) for one in (setup, replace(setup, mission=NOTHING)))
+    assert (waits.max_ticks - plain.max_ticks) * plain.dt == pytest.approx(120.0, abs=1.0)
+
+
+def test_a_flight_that_still_circles_when_its_time_is_over_says_so() -> None:
+    setup = setup_of(wp(0, -1500), wp(0, 0, 100, 18, p="3 0 150 0"), wp(1500, 1500))
+    for leg, said in ((0, "circled: at the loiter of item 2, "), (setup.route.legs - 1, "time limit: ")):
+        flight = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))
+        flight._disturb(setup)
+        flight.max_ticks, flight.memory.leg = 0, leg
+        assert flight.block(10)[1] == f"{said}not finished after 0 s"
 
 
 def test_a_block_ends_with_the_time() -> None:

@@ -17,19 +17,21 @@ from flight.autopilots.arduplane.law import (
     AIRSPEED_READING,
     ARDUPILOT_MEMORY,
     ROLL_LAG,
+    _follow,
     demand_height,
-    navigate_legs,
-    past_line,
     roll_demand,
-    turn_distance,
     update_tecs,
 )
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.dynamics.state import COMMANDS
+from flight.guidance.gains import GAINS
+from flight.guidance.inner_loops import GUIDANCE_MEMORY, steer_elevator
+from flight.guidance.navigation_error import MOTION
 from flight.mission_files.formats import parse_mission
 from flight.simulation.simulate import Flight, simulate
 from planfly.airframe import load_airframe
 from planfly.pipeline import make_setup as setup_of
-from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, state, waypoints
+from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record, state, waypoints
 from tests.setups import MakeSetup
 from tests.soak import SOAK
 from world.kernels import Record, field_names
@@ -43,9 +45,11 @@ def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
 
 def test_counts_are_whole_and_all_else_are_numbers() -> None:
     kinds = {name: ARDUPILOT_MEMORY[name] for name in field_names(ARDUPILOT_MEMORY)}
-    assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held"}
+    assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held", "left_for"}
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
-    assert truths == {"begun", "flown", "on_circle", "returning", "climbed", "under"}
+    assert truths == {
+        "begun", "flown", "on_circle", "loitering", "at_height", "over", "returning", "climbed", "under",
+    }  # fmt: skip
     assert all(kind == np.float64 for kind in kinds.values() if kind not in (np.int64, np.bool_))
 
 
@@ -164,6 +168,29 @@ def test_throttle_for_missing_height() -> None:
     assert own.throttle_sum == pytest.approx(0.3 * missing * DT / (5.0 * per_throttle))
 
 
+def test_the_rate_of_energy_that_is_amiss_is_smoothed_over_half_a_second() -> None:
+    """A first-order filter of 0.5 s (`AP_TECS`): n turns of 0.1 s leave (0.5 / 0.6)^n of what it has to come to."""
+    own = steady()
+    for k in range(1, 6):
+        before = own.energy_rate_error
+        weighed(own, reading(), flying(up=501.0))
+        # 1 m too high asks for g / 5 s less.
+        wanted = -GRAVITY / 5.0
+        assert own.energy_rate_error - before == pytest.approx((wanted - before) / 6.0, rel=0.05), k
+
+
+def test_too_fast_to_sink_height_is_no_reason_to_throttle_back() -> None:
+    """3 m too high are 29.4 m^2/s^2; at 30.5 m/s to AIRSPEED_MAX 31 are only 15.4, and no more is taken back."""
+    fast = {"airspeed": 30.5, "airspeed_read": 30.5, "last_velocity_north": 30.5, "airspeed_demand": 30.5}
+    own = steady(**fast)
+    seen = record(MOTION, up=503.0, velocity_north=30.5)
+    at = state(airspeed=30.5 / AIRSPEED_READING, velocity_north=30.5)
+    update_tecs(at, seen, parameters(AIRSPEED_MAX=31.0), own, 30.5, 1.0, DT)
+    # The integral's share of 0.3 of the gain: a throttle by 5 s and (5 + 2) m/s of climb.
+    gain = 1.0 / (5.0 * 7.0 * GRAVITY)
+    assert own.throttle_sum == pytest.approx(gain * 0.3 * -0.5 * (31.0**2 - 30.5**2) * DT, rel=0.02)
+
+
 def test_a_bank_takes_throttle() -> None:
     own = steady()
     weighed(own, reading(roll=math.radians(30.0)), flying())
@@ -243,108 +270,7 @@ def test_the_least_airspeed_grows_with_the_load_in_a_bank(bank_deg: float, preve
 
 
 # ----------------------------------------------------------------------
-# ArduPlane's legs: when it turns to the next, how it closes in on them, its loiters and its bank, by plain sums.
-
-RIGHT_ANGLE = math.pi / 2
-# L1's length at 25 m/s with its defaults: period x damping x speed / pi.
-LENGTH = 17.0 * 0.75 * 25.0 / math.pi
-
-
-@pytest.mark.parametrize(
-    ("acceptance", "turn", "factor", "expected"),
-    [
-        (0.0, RIGHT_ANGLE, 1.0, 90.0),  # WP_RADIUS at a right angle, and beyond
-        (0.0, math.radians(120.0), 1.0, 90.0),
-        (0.0, math.radians(30.0), 1.0, 30.0),  # a third of it at a third of a right angle
-        (0.0, math.radians(30.0), 1.05, 30.0 * 1.05**2),  # with height, by true over equivalent airspeed squared
-        (0.0, RIGHT_ANGLE, 1.2, LENGTH),  # 129.6 m: but no further than L1 looks
-        (25.0, math.radians(30.0), 1.05, 25.0),  # a stated acceptance is taken as it is
-        (25.9, math.radians(30.0), 1.0, 25.0),  # in whole metres
-        (0.9, math.radians(30.0), 1.0, 30.0),  # which leaves nothing of less than one
-        (300.0, math.radians(30.0), 1.0, 255.0),  # and no more than a byte
-    ],
-)
-def test_turn_distance(acceptance: float, turn: float, factor: float, expected: float) -> None:
-    assert turn_distance(acceptance, turn, 90.0, LENGTH, factor) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(("north", "leg"), [(969.0, 0), (971.0, 1)])
-def test_it_turns_within_its_distance_of_a_waypoint(north: float, leg: int) -> None:
-    way = waypoints((0, 0, 500), (0, 1000, 500), (500, 1866, 500), turn=math.radians(30.0))
-    own = memory()
-    navigate_legs(flying(0.0, north), way, parameters(), own, 1.0, 0.1)
-    assert own.leg == leg
-    assert (own.from_north, own.from_up) == (1000.0 * leg, 500.0)
-
-
-@pytest.mark.parametrize(("north", "leg"), [(989.0, 0), (991.0, 1)])
-def test_it_turns_within_a_stated_acceptance(north: float, leg: int) -> None:
-    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE, acceptance=10.0)
-    own = memory()
-    navigate_legs(flying(0.0, north), way, parameters(), own, 1.1, 0.1)
-    assert own.leg == leg
-
-
-def test_past_the_line_across_a_waypoint_the_leg_is_over() -> None:
-    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE)
-    assert past_line(flying(300.0, 1000.1), 0.0, 0.0, way[1])
-    assert not past_line(flying(300.0, 999.9), 0.0, 0.0, way[1])
-    for north, leg in ((999.9, 0), (1000.1, 1)):
-        own = memory()
-        navigate_legs(flying(300.0, north), way, parameters(), own, 1.0, 0.1)
-        assert own.leg == leg
-
-
-def test_beyond_a_greatest_radius_it_turns_back() -> None:
-    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE)
-    for radius, leg in ((301.0, 1), (299.0, 0)):
-        own = memory()
-        navigate_legs(flying(300.0, 1000.1), way, parameters(WP_MAX_RADIUS=radius), own, 1.0, 0.1)
-        assert own.leg == leg
-
-
-def test_a_leg_that_is_passed_when_it_begins_is_drawn_from_where_it_is() -> None:
-    # The next leg goes back: from 50 m short of the corner its end is passed already.
-    way = waypoints((0, 0, 500), (0, 1000, 500), (0, 980, 500), turn=math.pi)
-    own = memory()
-    navigate_legs(flying(0.0, 950.0, 498.0), way, parameters(), own, 1.0, 0.1)
-    assert own.leg == 1
-    assert (own.from_north, own.from_up) == (950.0, 498.0)
-
-
-def test_its_side_acceleration_is_l1s() -> None:
-    # 10 m right of its line: 4 damping^2 V^2 / L sin(asin(10 / L)) to the left.
-    way = waypoints((0, 0, 500), (0, 5000, 500), (1000, 5000, 500))
-    own = memory()
-    navigate_legs(flying(10.0, 500.0), way, parameters(NAVL1_XTRACK_I=0.0), own, 1.0, 0.1)
-    assert own.side_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * 10.0 / LENGTH)
-    assert own.cross_track_sum == 0.0
-    # Within five degrees its integral grows by gain x angle x time, and not beyond.
-    for right, grows in ((8.0, True), (9.0, False)):
-        own = memory()
-        navigate_legs(flying(right, 500.0), way, parameters(), own, 1.0, 0.1)
-        expected = 0.02 * math.asin(right / LENGTH) * 0.1
-        assert own.cross_track_sum == pytest.approx(expected if grows else 0.0)
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_around_a_loiter_it_turns_with_its_radius(side: float) -> None:
-    # On the circle, in its direction: V^2 / R towards the centre.
-    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=side * 120.0, centre_east=side * 120.0)
-    way["centre_north"] = 900.0
-    own = memory()
-    navigate_legs(flying(0.0, 900.0), way, parameters(), own, 1.0, 0.1)
-    assert own.on_circle
-    assert own.side_acceleration == pytest.approx(side * 25.0**2 / 120.0)
-
-
-def test_far_from_a_loiter_it_flies_to_its_centre() -> None:
-    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=120.0, centre_east=0.0, centre_north=1000.0)
-    own = memory()
-    navigate_legs(flying(0.0, 0.0), way, parameters(), own, 1.0, 0.1)
-    assert not own.on_circle
-    assert own.side_acceleration == pytest.approx(0.0)
-    assert own.leg == 0
+# ArduPlane's bank, by plain sums.
 
 
 def test_bank_is_that_of_the_acceleration_within_the_limit() -> None:
@@ -362,6 +288,52 @@ def test_slow_flight_narrows_the_bank() -> None:
     limits = parameters(ROLL_LIMIT_DEG=60.0, AIRSPEED_MIN=20.0)
     for airspeed, degrees in ((24.0, math.degrees(math.acos(1 / 1.44))), (22.0, 34.2654), (20.0, 25.0)):
         assert math.degrees(roll_demand(100.0, 0.0, airspeed, limits)) == pytest.approx(degrees, abs=1e-3)
+
+
+# ----------------------------------------------------------------------
+# How attitudes are followed, and what of the rudder is steered.
+
+
+def followed(own: Record, at: Record, pitch_trim: float = 0.0) -> tuple[Record, Record]:
+    """Commands and memory after a tick of a sixtieth of a second, with ArduPlane's parameters and gains of one."""
+    gains, kept, commands = record(GAINS), record(GUIDANCE_MEMORY), record(COMMANDS)
+    for name in field_names(GAINS):
+        setattr(gains, name, 1.0)
+    gains.reference_airspeed, gains.roll_rate_max, gains.roll_acceleration_max = 25.0, 10.0, 1000.0
+    law = parameters(PTCH_TRIM_DEG=pitch_trim, KFF_RDDRMIX=0.3)
+    _follow(at, flying(), gains, kept, law, own, 1.0, commands, 1.0 / 60.0)
+    return commands, kept
+
+
+def test_a_bank_is_late_as_in_logs_of_arduplane() -> None:
+    """Its first-order lag, fitted to desired and flown roll of the kept logs: 0.42, 0.44 and 0.44 s.
+
+    Those of ridge-5mps, demo and tight, with ArduPlane's RLL2SRV_TCONST of 0.5 s.  A share of an error of 0.1 rad is
+    rolled off at once, in proportion to it.
+    """
+    own = memory(side_acceleration=GRAVITY * math.tan(0.1))
+    _, kept = followed(own, state())
+    assert own.roll_demand == pytest.approx(0.1)
+    assert 0.1 / kept.bank_rate == pytest.approx(0.43, abs=0.015)
+
+
+def test_a_pitch_is_followed_a_tenth_later_than_its_time_constant_says() -> None:
+    """0.055 rad of 0.55 s are 0.1 rad/s, and at 25 m/s 2.5 m/s^2 upwards, as a path that asks for them."""
+    commands, _ = followed(memory(pitch_demand=0.055), state())
+    kept, asked, gains = record(GUIDANCE_MEMORY), record(COMMANDS), record(GAINS)
+    for name in field_names(GAINS):
+        setattr(gains, name, 1.0)
+    gains.reference_airspeed = 25.0
+    steer_elevator(state(), gains, kept, asked, 0.0, 2.5)
+    assert commands.elevator == pytest.approx(asked.elevator, abs=1e-6)
+
+
+def test_the_rudder_has_its_share_of_the_ailerons_and_no_more() -> None:
+    # Whatever sideslips: ArduPlane's yaw damper is off by default.
+    commands, _ = followed(memory(side_acceleration=3.0), state(beta=0.05, yaw_rate=0.1))
+    assert commands.aileron > 0.0
+    # A roll to the right goes with a yaw to the right, which is negative.
+    assert commands.rudder == pytest.approx(-0.3 * commands.aileron)
 
 
 # ----------------------------------------------------------------------
@@ -387,6 +359,15 @@ def test_it_holds_an_equivalent_airspeed(
     # Standard density at 2,000 m: 1.0066.
     assert float(late.mean()) == pytest.approx(24.0 * math.sqrt(1.2250 / 1.0066), rel=0.005)
     assert track.speed_command[-1] == pytest.approx(24.0 * math.sqrt(1.2250 / 1.0066), rel=0.001)
+
+
+def test_it_flies_no_faster_than_airspeed_max(
+    make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters
+) -> None:
+    setup = make_setup([[0, 0, 0.0], [0, 1500, 0.0]], speeds=25.0, terrain={"kind": "flat", "amsl_m": -500.0})
+    slow = usual.changed(AIRSPEED_MAX=22.0)
+    track = simulate(replace(setup, autopilot=ArduPlane(slow)), aerosonde).track
+    assert float(track.speed_command[-1]) == pytest.approx(22.0, rel=1e-3)
 
 
 def test_a_climbing_leg_is_flown_a_time_constant_low(

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.arduplane.law import demand_height, navigate_legs
+from flight.autopilots.arduplane.law import demand_height
+from flight.autopilots.arduplane.navigator import navigate_legs
 from flight.guidance.path import waypoint_records
 from tests.flight.autopilots.arduplane.kept_flights import KEPT, flown_return, kept_track, return_setup
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, waypoints
@@ -136,9 +137,9 @@ def test_after_a_loiter_the_slope_begins_at_its_top() -> None:
     way = waypoints((-60.0, -60.0, 500.0), (0.0, 0.0, 500.0), (EAST, NORTH, 100.0))
     for name, loiter, ahead in (("centre_east", 120.0, EAST), ("centre_north", 0.0, NORTH), ("circle", 120.0, 60.0)):
         way[name][:2], way[name][2] = loiter, ahead
-    way["returns"][2] = True
-    here = flying(0.0, 1.0)
-    own = navigated(memory(), here, way)
+    way["returns"][2], way["item"] = True, (1, 1, 2)
+    here = flying(0.0, 1.0, course=math.atan2(EAST, NORTH))
+    own = navigated(memory(loitering=True, over=True), here, way)
     assert own.leg == 1
     assert asked(own, here, way) > 499.0
 

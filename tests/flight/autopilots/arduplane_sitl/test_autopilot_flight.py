@@ -168,8 +168,12 @@ with AutopilotFlight(make_setup(), AEROSONDE, Path({str(fake_autopilot())!r}), {
             break
         time.sleep(0.02)
     assert not Path("/proc", pid).exists()
-    # Only its folder is left of a process that was killed without a word.
-    Path(folder, "defaults.parm").unlink()
+    # Its folder too is gone, though the process was killed without a word.
+    for _ in range(1000):
+        if not Path(folder).exists():
+            break
+        time.sleep(0.02)
+    assert not Path(folder).exists()
     assert tmp_path.exists()
 
 

@@ -2,6 +2,8 @@
 
 import hashlib
 import os
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -65,6 +67,76 @@ def test_leaving_kills_a_program_that_would_stay(tmp_path: Path) -> None:
         os.kill(pid, 0)
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+def gone(pid: int) -> bool:
+    """Whether a process has ended, waited for or not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    except OSError:
+        return True
+
+
+def wait_until_gone(pid: int) -> None:
+    for _ in range(1000):
+        if gone(pid):
+            return
+        time.sleep(0.01)
+    raise AssertionError(f"process {pid} was left")
+
+
+def wrapper(tmp_path: Path, text: str) -> Path:
+    """A script that runs the program and waits for it, without exec."""
+    inner = tmp_path / "inner"
+    inner.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+    inner.chmod(0o755)
+    return script(tmp_path, f"{inner}; echo over")
+
+
+STUBBORN = "trap '' TERM; echo $$ > {0}/pid; while :; do sleep 0.05; done"
+
+
+def test_leaving_kills_what_a_wrapper_without_exec_has_started(tmp_path: Path) -> None:
+    with started(wrapper(tmp_path, STUBBORN.format(tmp_path))):
+        pid = int(wait_for(tmp_path / "pid"))
+        assert not gone(pid)
+    wait_until_gone(pid)
+
+
+def test_what_a_wrapper_has_started_is_asked_to_end_and_closes_its_log(tmp_path: Path) -> None:
+    text = (
+        f"mkdir logs; trap 'sleep 0.2; echo end >> logs/00000001.BIN; exit' TERM; echo log > logs/00000001.BIN\n"
+        f"echo up > {tmp_path}/up; while :; do sleep 0.02; done"
+    )
+    with started(wrapper(tmp_path, text)) as process:
+        wait_for(tmp_path / "up")
+        process.end(lambda: False)
+        assert process.keep_log(tmp_path / "kept.BIN")
+    assert (tmp_path / "kept.BIN").read_text() == "log\nend\n"
+
+
+def test_killed_we_leave_neither_program_nor_folder(tmp_path: Path) -> None:
+    program = wrapper(tmp_path, STUBBORN.format(tmp_path))
+    code = (
+        "import sys, tempfile, time; from pathlib import Path\n"
+        "from tests.flight.autopilots.arduplane_sitl.test_autopilot_process import started\n"
+        "tempfile.tempdir = sys.argv[2]\n"
+        "with started(Path(sys.argv[1])): time.sleep(60)"
+    )
+    temporary = tmp_path / "temporary"
+    ours = subprocess.Popen([sys.executable, "-c", code, str(program), str(temporary)], cwd=Path(__file__).parents[4])
+    try:
+        pid = int(wait_for(tmp_path / "pid"))
+        assert list(temporary.iterdir())
+    finally:
+        ours.kill()
+        ours.wait()
+    wait_until_gone(pid)
+    for _ in range(1000):
+        if not list(temporary.iterdir()):
+            return
+        time.sleep(0.01)
+    raise AssertionError("the folder was left")
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,14 @@ def test_a_track_beside_its_legs_all_along_is_as_far_off_everywhere() -> None:
         assert [of(verdict, "corridor", leg(k)).ok for k in range(2)] == [ok, ok]
 
 
+def test_a_leg_that_comes_back_beside_it_is_no_part_of_a_legs_corridor() -> None:
+    """600 m to the right of the first leg it is 400 m from the third, which goes back 1,000 m beside it."""
+    setup = make_setup([[0, 0, 300], [0, 3000, 300], [1000, 3000, 300], [1000, 0, 300]])
+    item = of(judge(setup, fly_path(setup, across=bump(1500.0, 600.0, 400.0))), "corridor", leg(0))
+    assert item.ok is False
+    assert item.flown == pytest.approx(600.0, abs=1.0)
+
+
 @pytest.mark.parametrize(("stated", "ok"), [(32.4, True), (32.2, False)])
 def test_turns_count_where_the_scenario_says_how_wide(stated: float, ok: bool) -> None:
     """The arc of a right angle passes R (1 - cos 45) = 32.33 m inside its legs at 25 m/s and 30 degrees of bank."""

@@ -1,0 +1,81 @@
+"""A guard of what a flight has started: where we are killed, the program and its folder go too.
+
+The kernel kills a program whose parent is killed, but not that program's own children, as a wrapper script has one, and
+removes no folder.  The guard is a small process of its own that outlives us by as much as that takes.
+"""
+
+import contextlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+# It reads what it is told until the line "done" or, where we are gone, the end; it then kills the group, first so that
+# nothing is written any more, and removes the folder.
+_GUARD = """
+import os, shutil, signal, sys, time
+group, folder = 0, ""
+for line in sys.stdin:
+    word, _, value = line.rstrip("\\n").partition(" ")
+    if word == "done":
+        sys.exit()
+    group, folder = (int(value), folder) if word == "group" else (group, value)
+for _ in range(100):
+    if group:
+        try:
+            os.killpg(group, signal.SIGKILL)
+        except OSError:
+            group = 0
+    if not folder or not os.path.lexists(folder):
+        break
+    shutil.rmtree(folder, ignore_errors=True)
+    time.sleep(0.02)
+"""
+
+
+class Guard:
+    """A guard; a context manager, which leaves nothing for it to do.
+
+    >>> with Guard() as guard:
+    ...     guard.keep_folder(Path("/nowhere/planfly-autopilot-1"))
+    """
+
+    def __init__(self) -> None:
+        read, write = os.pipe()
+        with os.fdopen(read, "rb") as end:
+            self._words = os.fdopen(write, "wb", buffering=0)
+            # Of its own session: what ends us by our group does not end it.
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", "-S", "-c", _GUARD],
+                stdin=end,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+                cwd="/",
+            )
+
+    def keep_folder(self, folder: Path) -> None:
+        """Guard a folder, whose name has no line break."""
+        self._tell(f"folder {folder}")
+
+    def keep_group(self, group: int) -> None:
+        """Guard a process group."""
+        self._tell(f"group {group}")
+
+    def _tell(self, line: str) -> None:
+        with contextlib.suppress(BrokenPipeError):
+            self._words.write(f"{line}\n".encode())
+
+    def __enter__(self) -> Self:
+        """Return the guard itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Have it end."""
+        self._tell("done")
+        self._words.close()
+        self._process.wait()

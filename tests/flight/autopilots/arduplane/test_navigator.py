@@ -1,0 +1,220 @@
+"""ArduPlane's legs: when it turns to the next, how it closes in on them, and its loiters, by plain sums and flights."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flight.autopilots.arduplane.navigator import navigate_legs, past_line, turn_distance
+from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, waypoints
+
+RIGHT_ANGLE = math.pi / 2
+# L1's length at 25 m/s with its defaults: period x damping x speed / pi.
+LENGTH = 17.0 * 0.75 * 25.0 / math.pi
+
+
+@pytest.mark.parametrize(
+    ("acceptance", "turn", "factor", "expected"),
+    [
+        (0.0, RIGHT_ANGLE, 1.0, 90.0),  # WP_RADIUS at a right angle, and beyond
+        (0.0, math.radians(120.0), 1.0, 90.0),
+        (0.0, math.radians(30.0), 1.0, 30.0),  # a third of it at a third of a right angle
+        (0.0, math.radians(30.0), 1.05, 30.0 * 1.05**2),  # with height, by true over equivalent airspeed squared
+        (0.0, RIGHT_ANGLE, 1.2, LENGTH),  # 129.6 m: but no further than L1 looks
+        (25.0, math.radians(30.0), 1.05, 25.0),  # a stated acceptance is taken as it is
+        (25.9, math.radians(30.0), 1.0, 25.0),  # in whole metres
+        (0.9, math.radians(30.0), 1.0, 30.0),  # which leaves nothing of less than one
+        (300.0, math.radians(30.0), 1.0, 255.0),  # and no more than a byte
+    ],
+)
+def test_turn_distance(acceptance: float, turn: float, factor: float, expected: float) -> None:
+    assert turn_distance(acceptance, turn, 90.0, LENGTH, factor) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("north", "leg"), [(969.0, 0), (971.0, 1)])
+def test_it_turns_within_its_distance_of_a_waypoint(north: float, leg: int) -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (500, 1866, 500), turn=math.radians(30.0))
+    own = memory()
+    navigate_legs(flying(0.0, north), way, parameters(), own, 1.0, 0.1)
+    assert own.leg == leg
+    assert (own.from_north, own.from_up) == (1000.0 * leg, 500.0)
+
+
+@pytest.mark.parametrize(("north", "leg"), [(989.0, 0), (991.0, 1)])
+def test_it_turns_within_a_stated_acceptance(north: float, leg: int) -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE, acceptance=10.0)
+    own = memory()
+    navigate_legs(flying(0.0, north), way, parameters(), own, 1.1, 0.1)
+    assert own.leg == leg
+
+
+def test_past_the_line_across_a_waypoint_the_leg_is_over() -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE)
+    assert past_line(flying(300.0, 1000.1), 0.0, 0.0, 0.0, 1000.0)
+    assert not past_line(flying(300.0, 999.9), 0.0, 0.0, 0.0, 1000.0)
+    for north, leg in ((999.9, 0), (1000.1, 1)):
+        own = memory()
+        navigate_legs(flying(300.0, north), way, parameters(), own, 1.0, 0.1)
+        assert own.leg == leg
+
+
+def test_beyond_a_greatest_radius_it_turns_back() -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE)
+    for radius, leg in ((301.0, 1), (299.0, 0)):
+        own = memory()
+        navigate_legs(flying(300.0, 1000.1), way, parameters(WP_MAX_RADIUS=radius), own, 1.0, 0.1)
+        assert own.leg == leg
+
+
+def test_a_leg_that_is_passed_when_it_begins_is_drawn_from_where_it_is() -> None:
+    # The next leg goes back: from 50 m short of the corner its end is passed already.
+    way = waypoints((0, 0, 500), (0, 1000, 500), (0, 980, 500), turn=math.pi)
+    own = memory()
+    navigate_legs(flying(0.0, 950.0, 498.0), way, parameters(), own, 1.0, 0.1)
+    assert own.leg == 1
+    assert (own.from_north, own.from_up) == (950.0, 498.0)
+
+
+def test_its_side_acceleration_is_l1s() -> None:
+    # 10 m right of its line: 4 damping^2 V^2 / L sin(asin(10 / L)) to the left.
+    way = waypoints((0, 0, 500), (0, 5000, 500), (1000, 5000, 500))
+    own = memory()
+    navigate_legs(flying(10.0, 500.0), way, parameters(NAVL1_XTRACK_I=0.0), own, 1.0, 0.1)
+    assert own.side_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * 10.0 / LENGTH)
+    assert own.cross_track_sum == 0.0
+    # Within five degrees its integral grows by gain x angle x time, and not beyond.
+    for right, grows in ((8.0, True), (9.0, False)):
+        own = memory()
+        navigate_legs(flying(right, 500.0), way, parameters(), own, 1.0, 0.1)
+        expected = 0.02 * math.asin(right / LENGTH) * 0.1
+        assert own.cross_track_sum == pytest.approx(expected if grows else 0.0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_around_a_loiter_it_turns_with_its_radius(side: float) -> None:
+    # On the circle, in its direction: V^2 / R towards the centre.
+    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=side * 120.0, centre_east=side * 120.0)
+    way["centre_north"], way["up"] = 900.0, 0.0
+    own = memory()
+    navigate_legs(flying(0.0, 900.0), way, parameters(), own, 1.0, 0.1)
+    assert own.on_circle
+    assert own.side_acceleration == pytest.approx(side * 25.0**2 / 120.0)
+
+
+def test_far_from_a_loiter_it_flies_to_its_centre() -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=120.0, centre_east=0.0, centre_north=1000.0)
+    own = memory()
+    navigate_legs(flying(0.0, 0.0), way, parameters(), own, 1.0, 0.1)
+    assert not own.on_circle
+    assert own.side_acceleration == pytest.approx(0.0)
+    assert own.leg == 0
+
+
+# A circle of 200 m about the origin, left for a place 5 km north of it.
+CIRCLE = {"circle": 200.0, "item": 1, "stays": math.nan, "turns": 1.0}
+
+
+def circle_route(**fields: Any) -> np.ndarray:
+    """From 5 km south to a loiter at sea level, and on."""
+    way = waypoints((0, -5000, 0), (0, 200, 0), (0, 5000, 0))
+    way["item"] = (0, 1, 2)
+    for name, value in (CIRCLE | fields).items():
+        way[name][1] = value
+    return way
+
+
+def go_around(way: np.ndarray, seconds: float, **how: float) -> tuple[Any, float | None]:
+    """The memory, and how far around (degrees from the south, to the right) it left the circle at 25 m/s; None: not.
+
+    how: the height (up), and how far the course always is off that to what follows (off, rad), not along the circle.
+    """
+    own = memory(from_north=-5000.0)
+    step, angle = 25.0 / 200.0 * 0.1, 0.0
+    for _ in range(round(seconds / 0.1)):
+        east, north = -199.9 * math.sin(angle), -199.9 * math.cos(angle)
+        course = math.atan2(-east, 5000.0 - north) + how["off"] if "off" in how else angle - RIGHT_ANGLE
+        seen = flying(east, north, how.get("up", 0.0), course)
+        navigate_legs(seen, way, parameters(), own, 1.0, 0.1)
+        if own.leg:
+            return own, math.degrees(angle)
+        angle += step
+    return own, None
+
+
+def test_the_line_to_a_loiters_middle_is_followed_to_three_of_its_radii() -> None:
+    for away, follows in ((601.0, True), (599.0, False)):
+        own = memory(from_north=-5000.0)
+        navigate_legs(flying(30.0, -away), circle_route(), parameters(NAVL1_XTRACK_I=0.0), own, 1.0, 0.1)
+        # To the line as from any leg; or to the middle, from where the course leads 30 m beside it.
+        angle = math.asin(30.0 / LENGTH) if follows else math.atan2(30.0, away)
+        assert own.side_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * math.sin(angle), rel=1e-3)
+
+
+@pytest.mark.parametrize("turns", [1.0, 2.0])
+def test_a_loiter_is_left_after_its_turns_where_what_follows_lies_ahead(turns: float) -> None:
+    own, left = go_around(circle_route(turns=turns), 300.0)
+    # The tangent to 5 km north is 90 degrees from the south but for asin(200 / 5000); 10 degrees before it will do.
+    tangent = 90.0 + math.degrees(math.asin(200.0 / 5000.0))
+    assert left == pytest.approx(360.0 * turns + tangent - 10.0, abs=1.0)
+    # The next leg's line begins in the middle.
+    assert (own.leg, own.from_east, own.from_north, own.from_up) == (1, 0.0, 0.0, 0.0)
+
+
+def test_a_loiter_is_left_after_its_time() -> None:
+    # A circle takes 50.3 s: after 60 s it has gone around 1.19 times, and heads north 0.04 of a circle later.
+    for seconds, circles in ((60.0, 1), (70.0, 2)):
+        _, left = go_around(circle_route(turns=0.0, stays=seconds), 300.0)
+        assert left == pytest.approx(360.0 * circles + 82.3, abs=1.0)
+    assert go_around(circle_route(turns=0.0, stays=math.inf), 300.0)[1] is None
+
+
+@pytest.mark.parametrize(("up", "circles"), [(-4.9, 0), (-5.1, 3)])
+def test_a_loiter_to_a_height_is_left_at_it_or_where_that_stays_out_of_reach(up: float, circles: int) -> None:
+    way = circle_route(turns=0.0, stays=0.0, to_height=True)
+    _, left = go_around(way, 300.0, up=up)
+    assert left == pytest.approx(360.0 * circles + 82.3, abs=1.0)
+
+
+def test_who_waits_for_the_course_is_content_with_ten_degrees_more_each_circle() -> None:
+    """After 1 s of its loiter (7 degrees) it waits, with a course that is always so far off: a circle, or two."""
+    for degrees, circles in ((9.0, 0), (11.0, 1), (19.0, 1), (21.0, 2), (-21.0, 2)):
+        way = circle_route(turns=0.0, stays=1.0)
+        left = go_around(way, 300.0, off=math.radians(degrees))[1]
+        assert left == pytest.approx(360.0 * circles + math.degrees(25.0 / 200.0), abs=2.0)
+
+
+def test_no_course_is_asked_for_to_a_place_within_the_circle() -> None:
+    """Within 1.05 radii of the middle: there the course from the circle is off by up to 90 degrees on all of it."""
+    for north, waits in ((209.0, False), (211.0, True)):
+        way = circle_route(turns=0.0, stays=1.0)
+        way["north"][2] = north
+        left = go_around(way, 300.0)[1]
+        assert left is not None
+        assert (left > 20.0) == waits
+
+
+def test_the_next_legs_line_begins_where_the_loiter_is_left_if_its_item_asks_for_that() -> None:
+    own, left = go_around(circle_route(leaves_on_tangent=True), 300.0)
+    assert left is not None
+    assert math.hypot(own.from_east, own.from_north) == pytest.approx(199.9)
+
+
+def test_above_its_height_a_circle_is_wider() -> None:
+    # 1.1 times the equivalent airspeed: 1.21 times the radius, which is held with that circle's acceleration.
+    own = memory(from_north=-5000.0)
+    way = circle_route()
+    way["up"] = 0.0
+    navigate_legs(flying(-242.0, 0.0), way, parameters(), own, 1.1, 0.1)
+    assert own.on_circle
+    assert own.side_acceleration == pytest.approx(25.0**2 / 242.0)
+
+
+def test_beside_a_loiter_the_turn_is_that_from_or_to_its_middle() -> None:
+    """A right angle to the middle, though the route goes on by the tangent with half of that: it turns 90 m before."""
+    for north, leg in ((-1091.0, 0), (-1089.0, 1)):
+        way = waypoints((0, -3000, 500), (0, -1000, 500), (200, -800, 500), (5000, -1000, 500), turn=RIGHT_ANGLE / 2)
+        way["circle"][2], way["centre_east"][2], way["centre_north"][2], way["item"] = 200.0, 900.0, -1000.0, range(4)
+        own = memory(from_north=-3000.0)
+        navigate_legs(flying(0.0, north), way, parameters(), own, 1.0, 0.1)
+        assert own.leg == leg
