@@ -34,6 +34,7 @@ from logs.verdict.tolerances import (
     BUFFER_LENGTH,
     BUFFER_SPEED,
     MIN_RISE,
+    ON_THE_SPOT,
     ROUNDING,
     SPEED_STEP,
     TELLING_FLIGHT,
@@ -115,9 +116,14 @@ def _least_shift(
 _Sized = tuple[float, Suggestion]
 
 
+# A change to more than ten times what is planned is no advice: a leg of 84 km instead of 326 m.
+_LARGEST_CHANGE = 9.0
+
+
 def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
-    """Alternatives by the relative size of their changes; of equal ones the one listed first."""
-    return tuple(suggestion for _, suggestion in sorted(alternatives, key=lambda sized: sized[0]))
+    """Alternatives by the relative size of their changes; of equal ones the one listed first, and none too large."""
+    helpful = [sized for sized in alternatives if sized[0] <= _LARGEST_CHANGE]
+    return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
 
 def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
@@ -151,7 +157,9 @@ def ease_slope(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
     if speed is not None:
         now = float(requirements.setup.route.airspeed[leg])
         alternatives.append((abs(speed - now) / now, (Change("airspeed", place, now, speed, "m/s"),)))
-    alternatives.append((longer / run - 1.0, (Change("length", place, run, float(math.ceil(longer)), "m"),)))
+    # One that goes straight up has no length to compare with.
+    relative = longer / run - 1.0 if run >= ON_THE_SPOT else _LARGEST_CHANGE
+    alternatives.append((relative, (Change("length", place, run, float(math.ceil(longer)), "m"),)))
     return _smallest_first(alternatives)
 
 

@@ -86,6 +86,22 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
     return _most_telling(failed)[0] if failed else None
 
 
+def failed_by_rule(findings: Sequence[Finding]) -> list[list[Finding]]:
+    """The failed findings of each rule, the worst first; rules in the order of the first line.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> beyond = {0: 2.0, 1: 5.0}
+    >>> slopes = [make_finding("slope", Place("leg", k), ok=False, reason="", margin=-m) for k, m in beyond.items()]
+    >>> [[finding.place.index for finding in group] for group in failed_by_rule(slopes)]
+    [[1, 0]]
+    """
+    groups: dict[str, list[Finding]] = {}
+    for item in _failed(findings):
+        groups.setdefault(item.rule, []).append(item)
+    return [sorted(group, key=lambda item: item.margin or 0.0) for group in groups.values()]
+
+
 def _failed(findings: Sequence[Finding]) -> list[Finding]:
     """What failed: what ends a flight first, then what a plan may be mended by, then in the verdict's order."""
     order = {name: k for k, name in enumerate(RULES)}

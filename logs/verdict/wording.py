@@ -36,8 +36,12 @@ def place_text(place: Place) -> str:
     return place.kind
 
 
-def _place_within(place: Place) -> str:
-    """A place with words after it: what says which leg it is stands between commas."""
+def place_text_within(place: Place) -> str:
+    """A place with words after it: what says which leg it is stands between commas.
+
+    >>> place_text_within(Place("leg", 7, to_item=9))
+    'leg 7, to item 9,'
+    """
     return place_text(place) + ("," if place.to_item is not None else "")
 
 
@@ -66,7 +70,7 @@ def change_text(change: Change) -> str:
     >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
     'fly a climb of 20 s at full throttle and give its log to planfly aircraft --identify'
     """
-    where, wanted = _place_within(change.place), change.wanted
+    where, wanted = place_text_within(change.place), change.wanted
     match change.what:
         case "length":
             return f"make {_length(change)}"
@@ -112,13 +116,15 @@ def _rise(change: Change) -> str:
     verb = "climb" if math.copysign(1.0, change.wanted) > 0.0 else "fall"
     if change.current is None:
         return f"{verb} {abs(change.wanted):.0f} m on {place_text(change.place)}"
-    return f"{verb} {abs(change.wanted):.0f} m on {_place_within(change.place)} instead of {abs(change.current):.0f} m"
+    return (
+        f"{verb} {abs(change.wanted):.0f} m on {place_text_within(change.place)} instead of {abs(change.current):.0f} m"
+    )
 
 
 def _length(change: Change) -> str:
     current = change.current or 0.0
     instead = "; it goes nowhere now" if current < ON_THE_SPOT else f" instead of {current:.0f} m"
-    return f"{_place_within(change.place)} {change.wanted:.0f} m long{instead}"
+    return f"{place_text_within(change.place)} {change.wanted:.0f} m long{instead}"
 
 
 def suggestion_text(suggestion: Suggestion) -> str:
@@ -154,7 +160,7 @@ def disagreement_text(one: Disagreement) -> str:
     'speed at leg 0 passes by geometry and fails in flight'
     """
     verbs = {True: "passes", False: "fails"}
-    where = f"{one.rule} at {_place_within(one.place)}"
+    where = f"{one.rule} at {place_text_within(one.place)}"
     return f"{where} {verbs[one.there]} {_BY_LEVEL[one.level]} and {verbs[one.here]} in flight"
 
 

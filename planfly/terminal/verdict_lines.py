@@ -5,11 +5,12 @@ from collections.abc import Iterable
 from logs.verdict.findings import Finding, Verdict, closest_to_limit, left_open
 from logs.verdict.rule import Rule
 from logs.verdict.rules.registry import RULES
+from logs.verdict.summary import failed_by_rule
 from logs.verdict.wording import place_text, quantity_text, suggestions_text
 from planfly.terminal.command_parser import coloured
 
-# Failed findings that are listed one by one.
-_LISTED = 12
+# Findings of a rule that are named, beside the worst of those that fail.
+_LISTED = 6
 # Sources of a limit that are named beside it; any other limit is a check of planfly's own.
 _LIMIT_SOURCES = ("scenario", "aircraft", "autopilot", "mission")
 # Width of the column of rules.
@@ -20,17 +21,11 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     """The summary, then what fails, then what is closest to each rule's limit, then notes, in colour where wanted."""
     first, *rest = verdict.lines or ("",)
     lines = [coloured(first, "good" if verdict.flyable else "bad"), *rest]
-    failed = [finding for finding in verdict.findings if finding.ok is False]
-    for finding in failed[:_LISTED]:
-        lines.append(
-            coloured("  failed  ", "bad") + f"{_noun(finding)} at {place_text(finding.place)}: {finding.reason}"
-        )
-        if finding.suggestions:
-            lines.append(coloured("          would pass: ", "hint") + suggestions_text(finding.suggestions))
-    if len(failed) > _LISTED:
-        lines.append(coloured("  failed  ", "bad") + f"and {len(failed) - _LISTED} more")
+    for group in failed_by_rule(verdict.findings):
+        judged = sum(finding.rule == group[0].rule and finding.ok is not None for finding in verdict.findings)
+        lines += _failed_lines(group, judged)
     still_open = left_open(verdict.findings)
-    lines += [f"  open    {_noun(one)} at {place_text(one.place)}: {one.reason}" for one in still_open[:_LISTED]]
+    lines += [f"  open    {_noun(one)} at {place_text(one.place)}: {one.reason}" for one in still_open[: 2 * _LISTED]]
     # The same flight tells of them all.
     telling = dict.fromkeys(suggestions_text(one.suggestions) for one in still_open if one.suggestions)
     lines += [coloured("          would tell: ", "hint") + text for text in telling]
@@ -39,6 +34,31 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
         if mine:
             lines.append(f"  {rule.title:<{_TITLES}}{_state(rule, mine)}")
     return [*lines, *(f"  note    {note}" for note in notes)]
+
+
+def _failed_lines(group: list[Finding], judged: int) -> list[str]:
+    """What fails by one rule: the worst in full with what would pass, and where else.
+
+    group: the worst first.  judged: how many findings of the rule are.
+    """
+    worst, *others = group
+    where = f"{_noun(worst)} at {place_text(worst.place)}"
+    many = f"{_noun(worst)}, {len(group)} of {judged}; the worst at {place_text(worst.place)}"
+    lines = [coloured("  failed  ", "bad") + f"{many if others else where}: {worst.reason}"]
+    if worst.suggestions:
+        lines.append(coloured("          would pass: ", "hint") + suggestions_text(worst.suggestions))
+    if others:
+        named = "; ".join(map(_in_short, others[:_LISTED]))
+        more = f"; {len(others) - _LISTED} more" if len(others) > _LISTED else ""
+        lines.append(f"          also at {named}{more}")
+    return lines
+
+
+def _in_short(finding: Finding) -> str:
+    """Where a finding fails, and by how much."""
+    value = finding.planned if finding.flown is None else finding.flown
+    by = "" if value is None else f" ({quantity_text(value, finding.unit)})"
+    return place_text(finding.place) + by
 
 
 def _noun(finding: Finding) -> str:

@@ -2,10 +2,12 @@
 
 import math
 
+import numpy as np
+
 from flight.guidance.navigation_error import ERRORS
 from flight.guidance.path import SHARPEST
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.acceptance import negligible_kink
+from logs.verdict.measures.acceptance import negligible_kink, reach
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
@@ -23,6 +25,7 @@ from logs.verdict.tolerances import (
     SETTLED,
     STRAIGHT,
 )
+from logs.verdict.wording import place_text_within
 from world.geometry import fly_by_offset
 
 
@@ -33,12 +36,16 @@ def turn_findings(
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
-    return [_judge(requirements, i, measure) for i, measure in enumerate(measures, 1)]
+    return [_judge(requirements, i, measure, aligned) for i, measure in enumerate(measures, 1)]
 
 
-def _judge(requirements: RouteRequirements, i: int, measure: TurnMeasure | None) -> Finding:
+def _judge(
+    requirements: RouteRequirements, i: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
+) -> Finding:
     planned = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
+    # Neighbours that want more than the legs have are at fault themselves: going straight on takes no room.
+    limit = max(limit, 0.0)
     if requirements.runs[i - 1 : i + 1].min() < ON_THE_SPOT:
         reason = "a leg beside it goes straight up or down, which has no course to turn from or to"
         return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
@@ -66,7 +73,7 @@ def _judge(requirements: RouteRequirements, i: int, measure: TurnMeasure | None)
             method = "not flown"
     ok: bool | None = not faults
     if measure is not None and not measure.over:
-        facts.append("the flight did not get past it" if measure.corner is None else "its legs were not flown in turn")
+        facts.append(_not_over(requirements, i, measure, aligned))
         ok = None if ok else False
     return make_finding(
         "turn",
@@ -83,6 +90,22 @@ def _judge(requirements: RouteRequirements, i: int, measure: TurnMeasure | None)
         unit="deg",
         method=method,
         facts=_measured(measure),
+    )
+
+
+def _not_over(requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None) -> str:
+    """Why a turn was not flown: the flight ended before it, or the autopilot left a leg beside it at once."""
+    if measure.corner is not None:
+        return "its legs were not flown in turn"
+    if aligned is None or int(aligned.track.leg.max()) < i:
+        return "the flight did not get past it"
+    active = [float(np.count_nonzero(aligned.track.leg == leg)) * aligned.tick for leg in (i - 1, i)]
+    leg = i if active[1] <= active[0] else i - 1
+    taken, run = min(active), float(requirements.runs[leg])
+    radius = reach(requirements, leg + 1).radius
+    return (
+        f"{requirements.setup.autopilot.title} was on {place_text_within(requirements.leg(leg))} of {run:.0f} m for"
+        f" {taken:.1f} s, since it counts a waypoint as reached from {radius:.0f} m"
     )
 
 

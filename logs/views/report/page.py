@@ -30,7 +30,7 @@ from logs.views.failures import failures
 from logs.views.figures import FIGURES, Subject, View, figure_views, subject_of, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
-from logs.views.report.text import badge_of, count_sentence, finding_rows, level_rows, rule_rows
+from logs.views.report.text import badge_of, count_sentence, failed_groups, finding_rows, level_rows, rule_rows
 from logs.views.scene import script_json
 from world.files import write_whole
 
@@ -220,6 +220,7 @@ def _page(
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings, verdict.deciding)
+    shown = report_pictures(subject, pictures)
     environment = Environment(
         loader=PackageLoader("logs.views.report"),
         autoescape=True,
@@ -232,14 +233,15 @@ def _page(
         badge=badge_of(verdict),
         summary=verdict.lines or [""],
         flown=track is not None,
-        failing=[row for row in rows if row.state == "fail"],
+        failing=failed_groups(verdict),
+        first=next((one for one in shown if one.identifier == "map"), None) if verdict.failed else None,
         counts=count_sentence(rows),
         flight_line=tables.flight_sentence(setup, track),
         levels=level_rows(verdict, setup.autopilot),
         rules=rule_rows(verdict.findings),
         findings=rows,
         notes=[note for note in tables.notes_of(setup) if note not in verdict.notes],
-        pictures=report_pictures(subject, pictures),
+        pictures=shown,
         leg_columns=tables.LEG_COLUMNS,
         legs=tables.leg_rows(setup, track, frozenset(failed.legs)),
         passage_columns=tables.PASSAGE_COLUMNS,

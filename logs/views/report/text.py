@@ -11,6 +11,7 @@ from logs.verdict.findings import Finding, Verdict, closest_to_limit, left_open
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.places import DecidingParameter, Suggestion
 from logs.verdict.rules.registry import RULES
+from logs.verdict.summary import failed_by_rule
 from logs.verdict.wording import place_text, suggestions_text
 
 # ----------------------------------------------------------------------
@@ -229,6 +230,37 @@ def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None
     """
     order = {"fail": 0, "pass": 1, "unjudged": 2}
     return sorted((_row(finding, deciding) for finding in findings), key=lambda row: order[row.state])
+
+
+@dataclass(frozen=True, slots=True)
+class FailedGroup:
+    """The findings that fail by one rule.
+
+    judged: how many findings of the rule are.  others: where else it fails and by what value, the worst first.
+    """
+
+    rule: str
+    judged: int
+    worst: FindingRow
+    others: tuple[str, ...]
+
+
+def failed_groups(verdict: Verdict) -> list[FailedGroup]:
+    """What fails, by rule, in the order of the verdict's first line."""
+    groups = []
+    for group in failed_by_rule(verdict.findings):
+        rule = group[0].rule
+        judged = sum(finding.rule == rule and finding.ok is not None for finding in verdict.findings)
+        worst, *others = (_row(finding, verdict.deciding) for finding in group)
+        groups.append(FailedGroup(rule, judged, worst, tuple(map(_in_short, others))))
+    return groups
+
+
+def _in_short(row: FindingRow) -> str:
+    """Where a finding fails, and its value."""
+    value = row.planned if row.flown == NOTHING else row.flown
+    unit = row.unit if row.unit in ("°", "%") else f" {row.unit}"
+    return row.where if value == NOTHING else f"{row.where} ({value}{unit.rstrip()})"
 
 
 def would_pass_text(found: WouldPass, unit: str) -> str:

@@ -66,11 +66,15 @@ def test_large_numbers_stand_without_a_power_of_ten(
     assert lines[1].endswith(f"leg 0: slope {round(flown)}° (limit {round(limit)}°, aircraft)")
 
 
-def test_of_many_failures_twelve_are_listed_and_the_rest_counted(capsys: pytest.CaptureFixture[str]) -> None:
-    findings = tuple(slope(k, 9.0, 8.0) for k in range(15))
+def test_failures_of_one_rule_are_one_paragraph_the_worst_first(capsys: pytest.CaptureFixture[str]) -> None:
+    findings = (*(slope(k, 9.0 + k, 8.0) for k in range(9)), slope(9, 4.0, 8.0))
     lines = printed(capsys, Verdict(findings, False, True, ("not flyable",), "flown"))
-    assert sum(line.startswith("  failed  slope") for line in lines) == 12
-    assert "  failed  and 3 more" in lines
+    assert lines[1] == "  failed  slope, 9 of 10; the worst at leg 8: leg 8 is as it is"
+    assert lines[2].endswith("would pass: make leg 8 400 m long instead of 300 m")
+    assert lines[3] == (
+        "          also at leg 7 (16°); leg 6 (15°); leg 5 (14°); leg 4 (13°); leg 3 (12°); leg 2 (11°); 2 more"
+    )
+    assert not any(line.startswith("  failed") for line in lines[2:])
 
 
 def test_warnings_do_not_mix_with_results(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,7 @@
 """The turn rule on synthetic flights, passing and failing."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
-from logs.verdict.measures.turns import measure_turn
+from logs.verdict.measures.turns import TurnMeasure, measure_turn
+from logs.verdict.places import Place
+from logs.verdict.rules.turn_rule import _not_over
 from tests.logs.verdict.judging import ROUTE, failing, judge, of, waypoint
 from tests.synthetic import (
     bank_radius,
@@ -152,3 +155,41 @@ def test_short_legs_name_their_method() -> None:
     assert item.flown == pytest.approx(40.0, abs=0.5)
     assert item.tolerance is not None
     assert item.tolerance >= 1.0
+
+
+def test_a_leg_that_the_autopilot_left_at_once_is_the_reason_that_is_given() -> None:
+    """The leg of 40 m between two corners is active for a second, or not at all; or the flight ends before it."""
+    short = make_setup(zigzag(60.0, 40.0))
+    requirements, track = route_requirements(short), fly_path(short)
+    start = len(track) // 2
+
+    def why(seconds: float, last: int) -> str:
+        leg = np.select([track.time < track.time[start], track.time < track.time[start] + seconds], [1, 2], last)
+        return _not_over(requirements, 2, TurnMeasure(), align_track(requirements, replace(track, leg=leg)))
+
+    counts = "since it counts a waypoint as reached from"
+    assert f"{short.autopilot.title} was on leg 2, to item 3, of 40 m for 1.0 s, {counts}" in why(1.0, 3)
+    assert f"was on leg 2, to item 3, of 40 m for 0.0 s, {counts}" in why(0.0, 3)
+    assert why(0.0, 1) == "the flight did not get past it"
+
+
+def test_straight_on_does_not_fail_for_a_neighbour_that_leaves_no_room() -> None:
+    """15 m behind a corner of 66 degrees the way bends back by 0.01: no room is needed for that."""
+    points, course = [[0.0, 0.0, 300.0], [0.0, 1200.0, 300.0]], 0.0
+    for turn, run in ((66.0, 15.0), (-0.01, 1200.0)):
+        course += math.radians(turn)
+        east, north, up = points[-1]
+        points.append([east + run * math.sin(course), north + run * math.cos(course), up])
+    assert route_requirements(make_setup(points)).turn_limit[2] < 0.0
+    findings = judge_geometry(make_setup(points))
+    assert of(findings, "turn", waypoint(2)).ok is True
+    assert of(findings, "turn", waypoint(1)).ok is False
+
+
+def test_no_leg_is_to_be_more_than_ten_times_as_long() -> None:
+    """A climb of 500 m on a leg of 150 m takes some 2 km, 14 times as much; one on a leg of 300 m is told so."""
+    for run, told in ((150.0, False), (300.0, True)):
+        points = [[0.0, 0.0, 300.0], [0.0, 1200.0, 300.0], [0.0, 1200.0 + run, 800.0], [0.0, 3000.0, 800.0]]
+        item = of(judge_geometry(make_setup(points)), "slope", Place("leg", 1))
+        assert item.ok is False
+        assert any(change.what == "length" for changes in item.suggestions for change in changes) == told
