@@ -1,4 +1,4 @@
-"""Will it come home?  The return to launch from everywhere on the way of a mission, a plan or a flight."""
+"""Will it come home?  From everywhere on the way of a mission, a plan or a flight, with its engine and without."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -9,8 +9,17 @@ from flight.simulation.setup import FlightSetup, VerticalDatum
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
+from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
+from logs.verdict.returns.judge_glides import NOT_ASKED, Glides, judge_glides
 from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
-from logs.verdict.returns.returns_text import causes_text, headline, landing_text, range_text, remedy_text
+from logs.verdict.returns.returns_text import (
+    causes_text,
+    headline,
+    landing_text,
+    no_return_text,
+    range_text,
+    remedy_text,
+)
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario
@@ -43,11 +52,13 @@ class ReturnsFound:
 
     setup: what was flown, and by what.
     returns: each of them, and in ranges of seconds, the worst first.
+    glides: what can be reached where the engine stops; empty where that was not asked.
     suggested: what would help, the plainest first, each with the returns that it leads to; none where none was asked.
     """
 
     setup: FlightSetup
     returns: Returns
+    glides: Glides = NOT_ASKED
     suggested: tuple[Suggested, ...] = ()
 
     @property
@@ -74,6 +85,21 @@ class ReturnsFound:
     def lines_of_ranges(self) -> tuple[str, ...]:
         """Each range of seconds in words, the worst first."""
         return tuple(range_text(one, self.returns, self.setup.scenario) for one in self.returns.ranges)
+
+    @property
+    def line_of_no_return(self) -> str:
+        """From where on the battery no longer brings it back."""
+        return no_return_text(self.returns)
+
+    @property
+    def headline_of_glides(self) -> str:
+        """What can be reached without the engine, in a line."""
+        return glides_headline(self.glides)
+
+    @property
+    def lines_of_glides(self) -> tuple[str, ...]:
+        """Each range of seconds from which the same can be reached without the engine, in words, by time."""
+        return tuple(glide_range_text(one, self.glides) for one in self.glides.ranges)
 
     @property
     def lines_of_suggestions(self) -> tuple[str, ...]:
@@ -104,7 +130,7 @@ class ReturnsFound:
             found.append("the mission came without a scenario: threats are not known")
         if not self.returns.flown:
             found.append("from the planned path: nothing was flown, and no energy was used before")
-        return tuple(found)
+        return (*found, *glide_notes(self.glides))
 
     def __repr__(self) -> str:
         return f"<ReturnsFound {self.setup.scenario.name}: {self.headline}>"
@@ -137,7 +163,7 @@ def returns(
     flight: int | None = None,
     datum: VerticalDatum | None = None,
 ) -> ReturnsFound:
-    """Fly the return to launch from everywhere on the way, and judge each.
+    """Fly the return to launch from everywhere on the way, judge each, and tell what is reached without an engine.
 
     what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: what `planfly.fly`
     gave, a flight log or its path, or an autopilot's log.
@@ -149,8 +175,8 @@ def returns(
 
     >>> import planfly
     >>> found = planfly.returns(planfly.plan("jacksboro", seed=1), every=20)
-    >>> found.safe, found.returns.count("ground") > 0, found.returns.ranges[0].worst.target.name
-    (False, True, 'home')
+    >>> found.safe, found.returns.ranges[0].worst.target.name, found.glides.each[0].reach
+    (False, 'home', 'home')
     """
     check_arguments(every=every, seed=seed, flight=flight, datum=datum)
     given: dict[str, Any] = {
@@ -193,7 +219,9 @@ def _judged(setup: FlightSetup, track: Track | None, every: float, suggest: bool
     world = return_world(setup)
     starts = return_starts(setup, track, every)
     with stage(f"flying {len(starts)} returns"):
-        found = ReturnsFound(setup, judge_returns(world, starts, every, fly_return))
+        judged = judge_returns(world, starts, every, fly_return)
+    with stage("gliding from there without the engine"):
+        found = ReturnsFound(setup, judged, judge_glides(world, starts))
     if not suggest or found.safe or not found.returns.each:
         return found
     with stage("looking for what would make them safe"):

@@ -1,6 +1,7 @@
 """``planfly returns``: the return to launch from everywhere on the way."""
 
 import argparse
+import math
 from typing import TYPE_CHECKING
 
 import planfly
@@ -29,7 +30,8 @@ def returns_options(line: LineParser) -> None:
     """The parser of ``planfly returns``."""
     parser = line.command(
         "returns",
-        "fly the return to launch from everywhere on the way: say whether each is safe, where it goes and why",
+        "fly the return to launch from everywhere on the way: say whether each is safe, where it goes and why; and"
+        " what can be reached without the engine",
         "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
         "planfly returns flight.mcap --every 5",
     )
@@ -68,10 +70,16 @@ def returns(args: argparse.Namespace) -> int:
         print(f"  {text}")
     if len(found.lines_of_ranges) > _LISTED:
         print(f"  and {len(found.lines_of_ranges) - _LISTED} ranges more; --json FILE has them all")
+    print(f"  {found.line_of_no_return}")
     for text in found.lines_of_suggestions:
         print(coloured("  would help: ", "hint") + text)
     if args.suggest and not found.safe and not found.suggested:
         print("  no RTL_ALTITUDE, climb or rally points were found that would help")
+    print(f"engine out: {found.headline_of_glides}")
+    for text in found.lines_of_glides[:_LISTED]:
+        print(f"  {text}")
+    if len(found.lines_of_glides) > _LISTED:
+        print(f"  and {len(found.lines_of_glides) - _LISTED} ranges more; --json FILE has them all")
     for text in found.notes:
         print(f"  note    {text}")
     give_answer(args, lambda: _answer(str(args.what), found, code))
@@ -79,9 +87,9 @@ def returns(args: argparse.Namespace) -> int:
 
 
 def _answer(what: str, found: "ReturnsFound", code: int) -> object:
-    from planfly.terminal.answers import CauseEntry, ReturnsAnswer, return_entry, suggestion_entry
+    from planfly.terminal.answers import CauseEntry, ReturnsAnswer, glides_entry, return_entry, suggestion_entry
 
-    returns = found.returns
+    returns, no_return = found.returns, found.returns.point_of_no_return
     return ReturnsAnswer(
         exit_code=code,
         what=what,
@@ -95,6 +103,9 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         rtl_autoland=returns.autoland,
         not_judged=list(returns.open),
         ranges=[return_entry(found, one) for one in returns.ranges],
+        no_return=no_return.kind,
+        no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),
+        engine_out=glides_entry(found),
         suggestions=[suggestion_entry(found, one) for one in found.suggested],
         notes=list(found.notes),
     )

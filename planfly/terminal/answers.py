@@ -9,6 +9,8 @@ from pydantic.dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
 from logs.verdict.findings import Verdict, verdict_json
+from logs.verdict.returns.glides_text import glide_range_text, glides_headline
+from logs.verdict.returns.judge_glides import MARGIN
 from logs.verdict.returns.judge_returns import ReturnRange
 from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.aircraft import AircraftNumbers
@@ -637,6 +639,68 @@ class ReturnSuggestion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class GlideEntry:
+    """Seconds in a row from which the same can be reached without the engine; numbers are of the one with the least."""
+
+    first_s: float
+    last_s: float
+    count: int
+    reach: str
+    """home, site, flat, nothing or unknown."""
+    site: int | None
+    """Which of the sites; null for none."""
+    least_at_s: float
+    left_m: float | None
+    """Height left over, negative where it is missing; null where no way leads anywhere."""
+    flat_east_m: float | None
+    """Flat ground that can be reached; null for none."""
+    flat_north_m: float | None
+    own: str
+    """What ArduPlane's own return comes to: arrives, low, ground, threat, unknown or not flown."""
+    own_target: str
+    own_over_m: float | None
+    """Height over the ground at its target; null where it does not arrive."""
+    own_short_m: float | None
+    """From where it comes down to its target; null where it does not."""
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class GlideSiteEntry:
+    """A place that can be glided to."""
+
+    kind: str
+    """home, rally or landing."""
+    number: int
+    """Of the rally point, or the mission item."""
+    east_m: float
+    north_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class GlidesEntry:
+    """What can be reached without the engine."""
+
+    headline: str
+    not_judged: str
+    """terrain or far; empty where it is judged."""
+    airspeed_mps: float
+    """Equivalent, that glides are flown at."""
+    margin_m: float
+    cell_m: float | None
+    sites: list[GlideSiteEntry]
+    home: int
+    """From how many places home can be reached; the next four are of those from which it cannot."""
+    site: int
+    flat: int
+    nothing: int
+    unknown: int
+    own_arrives: int
+    """From how many ArduPlane's own return arrives."""
+    ranges: list[GlideEntry]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ReturnsAnswer:
     """planfly returns: the returns in ranges of seconds, the worst first."""
 
@@ -653,6 +717,10 @@ class ReturnsAnswer:
     not_judged: list[str]
     """What leaves the returns open: terrain, law, autoland, return path or landing; empty where nothing does."""
     ranges: list[ReturnEntry]
+    no_return: str
+    """By energy: never, later (than no_return_s), at once; or why it is not known: battery, used or arrives."""
+    no_return_s: float | None
+    engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]
     """Of --suggest."""
     notes: list[str]
@@ -677,12 +745,58 @@ def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
     )
 
 
+def _tenths(value: float) -> float | None:
+    """A number as an answer has it; None for none."""
+    return round(value, 1) if math.isfinite(value) else None
+
+
+def glides_entry(found: ReturnsFound) -> GlidesEntry:
+    """What can be reached without the engine as an answer has it."""
+    glides = found.glides
+    entries = []
+    for group in glides.ranges:
+        one = group.least
+        entries.append(
+            GlideEntry(
+                first_s=round(group.first, 2),
+                last_s=round(group.last, 2),
+                count=group.count,
+                reach=one.reach,
+                site=group.site if group.site >= 0 else None,
+                least_at_s=round(one.time, 2),
+                left_m=_tenths(glides.spare(one)),
+                flat_east_m=_tenths(one.flat_at[0]),
+                flat_north_m=_tenths(one.flat_at[1]),
+                own=one.own.end,
+                own_target=one.own.target.name,
+                own_over_m=_tenths(one.own.over),
+                own_short_m=_tenths(one.own.short),
+                text=glide_range_text(group, glides),
+            )
+        )
+    return GlidesEntry(
+        headline=glides_headline(glides),
+        not_judged=glides.not_judged,
+        airspeed_mps=glides.airspeed,
+        margin_m=MARGIN,
+        cell_m=_tenths(glides.cell),
+        sites=[
+            GlideSiteEntry(kind=one.kind, number=one.number, east_m=round(one.east, 1), north_m=round(one.north, 1))
+            for one in glides.sites
+        ],
+        own_arrives=glides.arrivals,
+        home=glides.count("home"),
+        site=glides.count("site"),
+        flat=glides.count("flat"),
+        nothing=glides.count("nothing"),
+        unknown=glides.count("unknown"),
+        ranges=entries,
+    )
+
+
 def return_entry(found: ReturnsFound, group: ReturnRange) -> ReturnEntry:
     """A range of returns as an answer has it."""
-    one, scenario = group.worst, found.setup.scenario
-
-    def number(value: float) -> float | None:
-        return round(value, 1) if math.isfinite(value) else None
+    one, scenario, number = group.worst, found.setup.scenario, _tenths
 
     return ReturnEntry(
         first_s=round(group.first, 2),

@@ -165,8 +165,10 @@ def fly_returns(
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import load_parameters
+    >>> from flight.autopilots.arduplane.point_mass import point_mass
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from world.scenario import load_scenario
+    >>> from world.wind import Wind
     >>> scenario, aerosonde = load_scenario("jacksboro"), load_aircraft("aerosonde")
     >>> start = np.zeros(1, RETURN_START)
     >>> start["up"], start["velocity_north"] = 1000.0, 26.0

@@ -28,11 +28,24 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFi
     assert "flown again in JSBSim" in out
     answer = json.loads((hill / "mission.json").read_text(encoding="utf-8"))
     assert answer["ranges"][0]["kind"] == "ground"
+    assert "engine out: of 13 places home can be reached from" in out
+    assert "point of no return: none, for every return leaves the reserve of" in out
+    assert "it knows no trees, houses or water" in out
+    glides = answer["engine_out"]
+    assert sum(glides[kind] for kind in ("home", "site", "flat", "nothing", "unknown")) == 13
+    assert sum(one["count"] for one in glides["ranges"]) == 13
+    assert glides["sites"][0]["kind"] == "home"
+    assert (glides["not_judged"], glides["airspeed_mps"], glides["margin_m"]) == ("", 18.0, 30.0)
+    # 500 m over the ground glide for 5 km: home from the first, flat ground alone from the last.
+    assert (glides["ranges"][0]["reach"], glides["ranges"][-1]["reach"]) == ("home", "flat")
+    assert glides["ranges"][0]["own"] == "arrives"
+    assert (answer["no_return"], answer["no_return_s"]) == ("never", None)
     assert main(["fly", "hill.waypoints", "--scenario", "hill.toml", "--log", "hill.mcap"]) == 0
     assert "returns   of " in capsys.readouterr().out
     assert main(["returns", "hill.mcap", "--every", "20", "--json", "log.json", "--quiet"]) == 4
     of_log = json.loads((hill / "log.json").read_text(encoding="utf-8"))
     assert of_log["headline"] == answer["headline"]
+    assert of_log["engine_out"] == answer["engine_out"]
     assert main(["check", "hill.waypoints", "--scenario", "hill.toml"]) == 0
     assert "returns   of " in capsys.readouterr().out
 
@@ -42,6 +55,7 @@ def test_without_terrain_nothing_is_known(hill: Path, capsys: pytest.CaptureFixt
     out = capsys.readouterr().out
     assert "fly where the ground is not known" in out
     assert "--terrain names an elevation file" in out
+    assert "engine out: not judged: there is no elevation file" in out
 
 
 def test_parameters_make_it_safe(hill: Path) -> None:
@@ -58,6 +72,7 @@ def test_returns_that_follow_the_terrain_end_with_3(hill: Path, capsys: pytest.C
     out = capsys.readouterr().out
     assert out.startswith("returns   not judged: TERRAIN_FOLLOW has returns follow the terrain")
     assert "safe" not in out
+    assert "ArduPlane's own return, which would follow the terrain, is not flown" in out
 
 
 def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,425 @@
+"""How high an aircraft without thrust has to be, everywhere, to glide to a place: shortest paths backwards over ground.
+
+One search begins at the places to be reached and goes against the way that is flown.  A cell's label is the least
+height from which the glide gets there: that of the next cell and what the way to it costs, and no less than the ground
+with its margin, there and between them; so the terrain stands in the labels, and one search serves every second of a
+flight.  A way costs its length times sink by ground speed on its course in the wind at that height, which is exact for
+each step of a path.  Labels only grow on the way back: cells are settled by height, in bands no higher than the
+cheapest step (E. W. Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands: R. B. Dial, "Algorithm
+360", 1969).
+
+A step goes to one of 32 cells, in directions 7 to 14 degrees apart.  On a plane the labels are those of the straight
+way, or more: by 1.0 % at the most in still air, and 1.8 % in 10 m/s for an aircraft that glides at 18 m/s
+(`tests/logs/verdict/returns/test_glide_map.py`).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import ground_speed
+from flight.autopilots.arduplane.point_mass import PointMass, excess_power
+from flight.guidance.equivalent_airspeed import true_by_equivalent
+from world.airspace.zone_kernels import ZoneRecords, edge_distance
+from world.kernels import Record, Records, compiled, inner, record_dtype
+from world.terrain import Terrain
+from world.wind import mean_wind_speed
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int32]
+Flags = NDArray[np.bool_]
+# Rows and columns of cells (c, 2).
+Cells = NDArray[np.int64]
+
+# ----------------------------------------------------------------------
+# The map: cells with their least heights.
+
+# Cells that a map has at most, their least size, m, and the samples along the side of one in which its highest ground
+# is looked for.
+MOST_CELLS, _LEAST_CELL, _MOST_SAMPLES = 700_000, 20.0, 8
+# So far around the places and the flight the map goes, m.
+AROUND = 3000.0
+
+
+@dataclass(frozen=True, slots=True)
+class GlideMap:
+    """Square cells in rows to the north and columns to the east.
+
+    west, south: m, of the middle of the first cell.  cell: its side, m.
+    ground: (n, e) of the middles, m, NaN where it is not known.
+    floor: (n, e) least height in a cell: its highest ground and the margin, m; NaN where it is not known.
+    low, high: (n, e) between these heights a cell lies in kill spheres, m; inf and -inf for none.
+    """
+
+    west: float
+    south: float
+    cell: float
+    ground: Floats
+    floor: Floats
+    low: Floats
+    high: Floats
+
+    def cell_of(self, east: float, north: float) -> tuple[int, int]:
+        """Row and column of the cell that a place on the map is in."""
+        row, column = round((north - self.south) / self.cell), round((east - self.west) / self.cell)
+        return row, column
+
+    def middle(self, row: int, column: int) -> tuple[float, float]:
+        """East and north of a cell's middle, m."""
+        return self.west + column * self.cell, self.south + row * self.cell
+
+
+def glide_map(
+    terrain: Terrain, places: Floats, margin: float, spheres: Floats, radii: Floats, around: float = AROUND
+) -> GlideMap | None:
+    """The map around places (p, 2), m; None where they lie so far apart that its cells would hide what they hold.
+
+    margin: m above ground that a glide keeps.  spheres, radii: (m, 3) and (m,) of kill spheres, m.
+
+    >>> from world.terrain import flat_terrain
+    >>> ground = flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), 100.0, 0.0)
+    >>> made = glide_map(ground, np.zeros((1, 2)), 30.0, np.array([[0.0, 0.0, 100.0]]), np.array([500.0]))
+    >>> row, column = made.cell_of(0.0, 0.0)
+    >>> float(made.floor[row, column]), bool(made.high[row, column] > 590.0), made.cell
+    (130.0, True, 100.0)
+    """
+    (west, south), (east, north) = places.min(axis=0) - around, places.max(axis=0) + around
+    spacing = max(1.0, terrain.spacing)
+    cell = max(_LEAST_CELL, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MOST_CELLS))
+    samples = max(2, math.ceil(cell / spacing))
+    if samples > _MOST_SAMPLES:
+        return None
+    columns, rows = math.ceil((east - west) / cell) + 1, math.ceil((north - south) / cell) + 1
+    # Samples lie on the cells' sides too, which those beside them share.
+    step = cell / samples
+    es = west - 0.5 * cell + step * np.arange(columns * samples + 1)
+    ns = south - 0.5 * cell + step * np.arange(rows * samples + 1)
+    heights = terrain.height(es[None, :], ns[:, None])
+    highest = np.full((rows, columns), -math.inf)
+    for i in range(samples + 1):
+        for j in range(samples + 1):
+            # NaN stays.
+            part = heights[i : i + rows * samples : samples, j : j + columns * samples : samples]
+            highest = np.maximum(highest, part)
+    middles = terrain.height(west + cell * np.arange(columns)[None, :], south + cell * np.arange(rows)[:, None])
+    low, high = np.full(highest.shape, math.inf), np.full(highest.shape, -math.inf)
+    made = GlideMap(west, south, cell, middles, highest + margin, low, high)
+    for centre, radius in zip(spheres, radii, strict=True):
+        if radius > 0.0:
+            _add_sphere(made, centre, float(radius))
+    return made
+
+
+def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
+    """Widen the heights that cells lie in kill spheres at, by their middles."""
+    row, column = made.cell_of(float(centre[0]), float(centre[1]))
+    steps = math.ceil(radius / made.cell)
+    rows = slice(max(0, row - steps), max(0, row + steps + 1))
+    columns = slice(max(0, column - steps), max(0, column + steps + 1))
+    shape = made.floor[rows, columns].shape
+    norths = made.south + made.cell * (rows.start + np.arange(shape[0]))
+    easts = made.west + made.cell * (columns.start + np.arange(shape[1]))
+    away = np.hypot(easts[None, :] - centre[0], norths[:, None] - centre[1])
+    half = np.sqrt(np.maximum(0.0, radius * radius - away**2))
+    inside = away < radius
+    low, high = made.low[rows, columns], made.high[rows, columns]
+    low[inside] = np.minimum(low, centre[2] - half)[inside]
+    high[inside] = np.maximum(high, centre[2] + half)[inside]
+
+
+# A landing place is a square of this side (m), of which the plane that fits it best rises by no more than this share,
+# and whose heights leave it by no more than this (root mean square, m).
+PATCH, STEEPEST, ROUGHEST = 150.0, 0.05, 1.5
+
+
+def landable(made: GlideMap) -> Flags:
+    """Cells (n, e) around which the ground is flat by the elevation file, and outside kill spheres.
+
+    The file knows no trees, houses or water.
+    """
+    half = max(1, math.ceil(0.5 * (PATCH / made.cell - 1.0) - 1e-9))
+    taps = np.arange(-half, half + 1)
+    count = taps.size**2
+    ground = made.ground
+    # Heights over some middle one, so that their squares keep their digits.
+    z = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
+    one = np.ones(taps.size)
+    total, squares = _patch(z, one, one), _patch(z * z, one, one)
+    away = np.asarray(taps * made.cell, dtype=np.float64)
+    across, up = _patch(z, one, away), _patch(z, away, one)
+    spread = taps.size * float((taps**2).sum()) * made.cell**2
+    left = squares - total**2 / count - (across**2 + up**2) / spread
+    flat = np.hypot(across, up) / spread <= STEEPEST
+    flat &= np.sqrt(np.maximum(0.0, left) / count) <= ROUGHEST
+    return np.asarray(flat & ~((made.low < made.floor) & (made.floor < made.high)))
+
+
+def _patch(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
+    """Weighted sums (n, e) over the square around each cell; NaN where it leaves the map."""
+    out = values
+    for axis, weights in ((0, by_row), (1, by_column)):
+        half = weights.size // 2
+        padded = np.pad(out, [(half, half) if k == axis else (0, 0) for k in range(2)], constant_values=math.nan)
+        length = values.shape[axis]
+        parts = [np.take(padded, range(k, k + length), axis=axis) for k in range(weights.size)]
+        out = np.sum([weight * part for weight, part in zip(weights, parts, strict=True)], axis=0)
+    return np.asarray(out)
+
+
+def bar_zones(made: GlideMap, flat: Flags, zones: ZoneRecords, above: float) -> None:
+    """Take out of cells (n, e) those in exclusion zones that reach down to so far above ground, m."""
+    for z in np.flatnonzero(zones.zones["exclusion"]):
+        _bar_zone(flat, made.ground, zones, int(z), made.west, made.south, made.cell, above)
+
+
+@compiled
+def _bar_zone(
+    flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, above: float
+) -> None:  # pragma: no cover - compiled
+    zone = zones.zones[z]
+    rows, columns = flat.shape
+    for i in range(
+        max(0, math.ceil((zone.south - south) / cell)), min(rows, math.floor((zone.north - south) / cell) + 1)
+    ):
+        for j in range(
+            max(0, math.ceil((zone.west - west) / cell)), min(columns, math.floor((zone.east - west) / cell) + 1)
+        ):
+            if flat[i, j]:
+                floor = zone.floor + (ground[i, j] if zone.floor_above_ground else 0.0)
+                if floor <= ground[i, j] + above and edge_distance(zones, z, west + j * cell, south + i * cell) < 0.0:
+                    flat[i, j] = False
+
+
+# ----------------------------------------------------------------------
+# Steps from cell to cell, and what they cost.
+
+# Cells that a step goes on by, in the eighth of a circle from east to north-east; the other seven are mirrored.
+_EIGHTH = ((1, 0), (4, 1), (2, 1), (3, 2), (1, 1))
+# A step: cells that it goes on by, its course (rad), its length in cells, and the cells between, of `_BETWEEN`.
+STEP = record_dtype(
+    ("east", np.int64), ("north", np.int64), "course", "length", ("first", np.int64), ("last", np.int64)
+)
+# A cell between: from the step's end, and the share of the step that lies between the end and it.
+_BETWEEN = record_dtype(("east", np.int64), ("north", np.int64), "share")
+
+
+def steps() -> tuple[Records, Records]:
+    """The 32 steps, (32,) of `STEP`, and the cells that lie between the ends of each.
+
+    >>> made, between = steps()
+    >>> len(made), len({round(float(one.course), 6) for one in made})
+    (32, 32)
+    """
+    found: set[tuple[int, int]] = set()
+    for a, b in _EIGHTH:
+        found |= {(x * i, y * j) for x, y in ((a, b), (b, a)) for i in (-1, 1) for j in (-1, 1)}
+    made: Records = np.zeros(len(found), STEP)
+    between: list[tuple[int, int, float]] = []
+    for step, (east, north) in zip(made, sorted(found), strict=True):
+        step.east, step.north = east, north
+        step.course, step.length, step.first = math.atan2(east, north), math.hypot(east, north), len(between)
+        nearest: dict[tuple[int, int], float] = {}
+        for k in range(1, 64):
+            share = k / 64.0
+            # From the end backwards; corners, which are touched and not crossed, fall to either side.
+            cell = (-round(share * east), -round(share * north))
+            nearest.setdefault(cell, share)
+        ends = ((0, 0), (-east, -north))
+        between += [(cell[0], cell[1], share) for cell, share in nearest.items() if cell not in ends]
+        step.last = len(between)
+    cells: Records = np.zeros(len(between), _BETWEEN)
+    for cell, row in zip(cells, between, strict=True):
+        cell.east, cell.north, cell.share = row
+    return made, cells
+
+
+class GlideSlopes(NamedTuple):
+    """Height lost per metre over the ground, by course and height.
+
+    low, pitch: the first height and the step between two, m.
+    table: (c, h) m per m, for the courses of `steps`; inf where no progress is made.
+    """
+
+    low: float
+    pitch: float
+    table: Floats
+
+
+# Between two heights of the slopes, m.
+_PITCH = 100.0
+# Slower than this over the ground (m/s) is no progress.
+_SLOWEST = 1.0
+
+
+def glide_slopes(aircraft: PointMass, airspeed: float, low: float, top: float) -> GlideSlopes:
+    """Slopes between two heights (m AMSL) at an airspeed, equivalent, m/s."""
+    courses = np.array(steps()[0]["course"])
+    table = np.empty((courses.size, max(2, math.ceil((top - low) / _PITCH) + 1)))
+    _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, low, table)
+    return GlideSlopes(low, _PITCH, table)
+
+
+@compiled
+def _fill_slopes(
+    aircraft: Record, excess: Floats, airspeed: float, courses: Floats, low: float, table: Floats
+) -> None:  # pragma: no cover - compiled
+    for h in range(table.shape[1]):
+        amsl = low + h * _PITCH
+        true = airspeed * true_by_equivalent(amsl)
+        sink = max(0.0, -excess_power(excess, 0.0, true, amsl, aircraft))
+        level = math.sqrt(max(0.0, true * true - sink * sink))
+        wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, amsl)
+        for c in range(courses.size):
+            east, north = math.sin(courses[c]), math.cos(courses[c])
+            along = wind * (aircraft.wind_east * east + aircraft.wind_north * north)
+            across = wind * (aircraft.wind_east * north - aircraft.wind_north * east)
+            over = ground_speed(level, along, across)
+            table[c, h] = sink / over if over > _SLOWEST else math.inf
+
+
+# ----------------------------------------------------------------------
+# The search.
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What the search has found for one set of places.
+
+    made: the map.
+    need: (n, e) least height from which a glide gets to one of them, m AMSL; inf for none.
+    origin: (n, e) the cell of the place that it gets to, counted through all rows; -1 for none.
+    onward: (n, e) the step that it goes on by, an index of `steps`; -1 at the place itself.
+    """
+
+    made: GlideMap
+    need: Floats
+    origin: Codes
+    onward: Codes
+
+
+def least_heights(made: GlideMap, cells: Cells, slopes: GlideSlopes, top: float) -> Needs:
+    """Search backwards from cells up to a height, m AMSL, above which nothing is asked.
+
+    Cells beyond the map, and those whose ground is not known, lead nowhere.
+    """
+    need: Floats = np.full_like(made.floor, math.inf)
+    origin: Codes = np.full(need.shape, -1, dtype=np.int32)
+    onward: Codes = np.full(need.shape, -1, dtype=np.int32)
+    rows, columns = made.floor.shape
+    row, column = cells[:, 0], cells[:, 1]
+    held = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    row, column = row[held], column[held]
+    begins = made.floor[row, column]
+    low, high = made.low[row, column], made.high[row, column]
+    need[row, column] = np.where((low < begins) & (begins < high), high, begins)
+    need[~(need <= top)] = math.inf
+    origin[row, column] = row * columns + column
+    origin[np.isinf(need)] = -1
+    moves, between = steps()
+    finite = slopes.table[np.isfinite(slopes.table) & (slopes.table > 0.0)]
+    if np.isfinite(need).any() and finite.size:
+        band = float(finite.min()) * made.cell
+        lowest = float(need.min())
+        heads: Codes = np.full(max(1, math.ceil((top - lowest) / band) + 2), -1, dtype=np.int32)
+        _search(
+            made.floor, made.low, made.high, need, origin, onward, moves, between, slopes.table, slopes.low,
+            slopes.pitch, made.cell, lowest, band, top, heads, np.full((need.size, 2), -1, dtype=np.int32),
+        )  # fmt: skip
+    return Needs(made, need, origin, onward)
+
+
+@compiled
+def _search(
+    floor: Floats, low: Floats, high: Floats, need: Floats, origin: Codes, onward: Codes, moves: Records,
+    between: Records, slopes: Floats, slopes_low: float, pitch: float, cell: float, lowest: float, band: float,
+    top: float, heads: Codes, links: Codes,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Settle cells by height, band after band.
+
+    heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) the cells before and after one in its band.
+    """
+    rows, columns = need.shape
+    flat = need.ravel()
+    for k in range(flat.size):
+        if flat[k] <= top:
+            _put(k, int((flat[k] - lowest) / band), heads, links)
+    for b in range(heads.size):
+        while heads[b] >= 0:
+            k = heads[b]
+            _take(k, b, heads, links)
+            row, column = k // columns, k % columns
+            here = flat[k]
+            x = min(slopes.shape[1] - 1.001, max(0.0, (here - slopes_low) / pitch))
+            h = int(x)
+            for m in range(moves.shape[0]):
+                move = moves[m]
+                i, j = row - move.north, column - move.east
+                if not (0 <= i < rows and 0 <= j < columns):
+                    continue
+                loss = cell * move.length * (slopes[m, h] + (x - h) * (slopes[m, h + 1] - slopes[m, h]))
+                if not here + loss < need[i, j]:
+                    continue
+                wanted = _lifted(floor, low, high, between, move, row, column, here, loss)
+                if not (wanted < need[i, j] and wanted <= top):
+                    continue
+                other = i * columns + j
+                if need[i, j] <= top:
+                    _take(other, int((need[i, j] - lowest) / band), heads, links)
+                need[i, j], origin[i, j], onward[i, j] = wanted, origin[row, column], m
+                _put(other, int((wanted - lowest) / band), heads, links)
+
+
+@inner
+def _lifted(
+    floor: Floats, low: Floats, high: Floats, between: Records, move: Record, row: int, column: int, here: float,
+    loss: float,
+) -> float:  # pragma: no cover - compiled  # fmt: skip
+    """Least height where a step begins that ends at a cell at a height, above what lies between; NaN for none."""
+    wanted = here + loss
+    for k in range(move.first, move.last):
+        cell = between[k]
+        i, j = row + cell.north, column + cell.east
+        # From where it begins, the glide has lost so much there.
+        lost = (1.0 - cell.share) * loss
+        there = _out_of_spheres(max(wanted - lost, floor[i, j]), low[i, j], high[i, j])
+        # NaN, where the ground is not known, is no height.
+        if not floor[i, j] <= there:
+            return math.nan
+        wanted = there + lost
+    i, j = row - move.north, column - move.east
+    if not floor[i, j] <= math.inf:
+        return math.nan
+    wanted = _out_of_spheres(max(wanted, floor[i, j]), low[i, j], high[i, j])
+    return wanted
+
+
+@inner
+def _out_of_spheres(up: float, low: float, high: float) -> float:  # pragma: no cover - compiled
+    """A height, or the top of the spheres that it lies in."""
+    return high if low < up < high else up
+
+
+@inner
+def _put(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
+    """Put a cell at the head of a band."""
+    first = heads[band]
+    links[cell, 0], links[cell, 1] = -1, first
+    if first >= 0:
+        links[first, 0] = cell
+    heads[band] = cell
+
+
+@inner
+def _take(cell: int, band: int, heads: Codes, links: Codes) -> None:  # pragma: no cover - compiled
+    """Take a cell out of its band, if it is in it."""
+    before, after = links[cell, 0], links[cell, 1]
+    if before >= 0:
+        links[before, 1] = after
+    elif heads[band] == cell:
+        heads[band] = after
+    if after >= 0:
+        links[after, 0] = before
+    links[cell, 0], links[cell, 1] = -1, -1

@@ -1,0 +1,109 @@
+"""Glides without an engine in words."""
+
+import math
+
+from flight.autopilots.arduplane.swift_return import REACTION
+from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange, Glides, GlideSite, NotJudged, Reach
+
+_NOT_JUDGED: dict[NotJudged, str] = {
+    "terrain": "there is no elevation file",
+    "far": "the way is too long for a map of what lies around it",
+}
+_FROM: dict[Reach, str] = {
+    "home": "home can be reached from {count}",
+    "site": "a rally point or landing place, but not home, from {count}",
+    "flat": "flat ground alone from {count}",
+    "nothing": "nothing from {count}",
+    "unknown": "from {count} it is not known",
+}
+
+
+def glides_headline(glides: Glides) -> str:
+    """What can be reached, in a line.
+
+    >>> glides_headline(Glides((), (), 18.0, not_judged="terrain"))
+    'not judged: there is no elevation file'
+    """
+    if glides.not_judged:
+        return f"not judged: {_NOT_JUDGED[glides.not_judged]}"
+    if not glides.each:
+        return "no place to glide from"
+    counted = [(reach, glides.count(reach)) for reach in REACHES]
+    # Home is told even where nobody gets there.
+    reached = ", ".join(_FROM[reach].format(count=count) for reach, count in counted if count or reach == "home")
+    if any(one.own.end == "not flown" for one in glides.each):
+        own = "ArduPlane's own return, which would follow the terrain, is not flown"
+    else:
+        own = f"ArduPlane's own return arrives from {glides.arrivals}"
+    return f"of {len(glides.each)} places {reached}; {own}"
+
+
+def site_text(site: GlideSite) -> str:
+    """A place that somebody has chosen.
+
+    >>> site_text(GlideSite("rally", 2, 0.0, 0.0)), site_text(GlideSite("landing", 9, 0.0, 0.0))
+    ('rally point 2', 'the landing at item 9')
+    """
+    match site.kind:
+        case "home":
+            return "home"
+        case "rally":
+            return f"rally point {site.number}"
+        case "landing":
+            return f"the landing at item {site.number}"
+
+
+def glide_range_text(found: GlideRange, glides: Glides) -> str:
+    """A range of seconds: what can be reached from there, what is left over, and what ArduPlane itself does."""
+    when = f"{found.first:.0f} s" if found.count == 1 else f"{found.first:.0f} to {found.last:.0f} s"
+    return f"{when}: {_reached(found, glides)}{_own(found.least)}"
+
+
+def _reached(found: GlideRange, glides: Glides) -> str:
+    one = found.least
+    spare = glides.spare(one)
+    at = "" if found.count == 1 else f" at the least, from {one.time:.0f} s"
+    match one.reach:
+        case "home" | "site":
+            return f"{site_text(glides.sites[found.site])}, {spare:.0f} m left over{at}"
+        case "flat":
+            east, north, up = one.flat_at
+            where = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
+            return f"flat ground alone, {where}, {spare:.0f} m left over{at}"
+        case "nothing":
+            missing = "no way leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at the most"
+            return f"nothing, {missing}"
+        case "unknown":
+            return "not known, for it is beyond the elevation data"
+
+
+def _own(one: Glide) -> str:
+    name = one.own.target.name
+    match one.own.end:
+        case "arrives":
+            return f"; ArduPlane's own return arrives over {name}"
+        case "low":
+            low = min(one.own.over, one.own.clearance)
+            return f"; ArduPlane's own return comes {low:.0f} m above ground, and {MARGIN:.0f} m are asked"
+        case "ground":
+            return f"; ArduPlane's own return comes down {one.own.short / 1000.0:.1f} km from {name}"
+        case "threat":
+            return "; ArduPlane's own return enters a missile's sphere"
+        case "unknown":
+            return "; ArduPlane's own return leaves the elevation data"
+        case "not flown":
+            return ""
+
+
+def glide_notes(glides: Glides) -> list[str]:
+    """What a person has to know of how glides were flown."""
+    if not glides.each:
+        return []
+    notes = [
+        f"without the engine: on for {REACTION:.0f} s, then at AIRSPEED_MIN {glides.airspeed:g} m/s, {MARGIN:.0f} m"
+        " above ground all the way, outside missiles' spheres, through zones",
+        "flat by the elevation file: it knows no trees, houses or water",
+    ]
+    if glides.fuel:
+        notes.append("glides are those of the closed throttle: how much an engine that stands brakes is not known")
+    return notes

@@ -1,0 +1,48 @@
+"""A glider whose sink is the same at every airspeed, and grounds for it: what it reaches can be summed up."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.autopilots.arduplane.point_mass import POINT_MASS, PointMass
+from world.kernels import Record
+from world.terrain import Terrain, gridded
+
+Floats = NDArray[np.float64]
+
+AIRSPEED, SINK, BANK = 18.0, 1.8, math.radians(30.0)
+# Without spheres.
+NO_SPHERES, NO_RADII = np.zeros((0, 3)), np.zeros(0)
+
+
+def glider(wind: float = 0.0, blows_to: float = 0.0) -> PointMass:
+    """One that sinks 1.8 m/s at any airspeed and in any bank, in a wind (m/s) that blows on a course (degrees)."""
+    record: Record = np.zeros(1, POINT_MASS)[0]
+    record.airspeed, record.slowest, record.speed_step, record.height_step = 25.0, AIRSPEED, 2.0, 2000.0
+    record.wind_speed = wind
+    record.wind_east, record.wind_north = math.sin(math.radians(blows_to)), math.cos(math.radians(blows_to))
+    return PointMass(record, np.full((21, 7, 3), -SINK), np.zeros((3, 7, 3)))
+
+
+def true_airspeed(amsl: float) -> float:
+    """Of 18 m/s equivalent, in the standard atmosphere (ISO 2533): density falls as T^4.2559, T by 6.5 K a km."""
+    return float(AIRSPEED * ((288.15 - 0.0065 * amsl) / 288.15) ** (-0.5 * 4.2559))
+
+
+def height_needed(east: float, north: float, end: float, wind: float = 0.0, blows_to: float = 0.0) -> float:
+    """From what height a straight glide from (east, north) ends at the middle at a height, m; by the wind triangle."""
+    distance, height = math.hypot(east, north), end
+    course, to = math.atan2(-east, -north), math.radians(blows_to)
+    along, across = wind * math.cos(to - course), wind * math.sin(to - course)
+    for _ in range(400):
+        level = math.sqrt(true_airspeed(height) ** 2 - SINK**2)
+        height += distance / 400.0 * SINK / (math.sqrt(level**2 - across**2) + along)
+    return height
+
+
+def ground(function: "np.ufunc | object", half: float = 6000.0, pitch: float = 50.0) -> Terrain:
+    """Ground of a function of east and north (m) within so far from the middle."""
+    line = np.arange(-half, half + 0.5 * pitch, pitch)
+    heights = np.asarray(function(line[None, :], line[:, None]) + np.zeros((line.size, line.size)))  # type: ignore[operator]
+    return gridded(heights, line, line, source="made", sha256="", datum="mean sea level")

@@ -1,0 +1,112 @@
+"""What is left of an aircraft's height when its engine stops, ahead and behind, by plain sums."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flight.autopilots.arduplane.swift_return import RETURN_START, Surroundings
+from logs.verdict.returns.glide_map import glide_map, glide_slopes, least_heights
+from logs.verdict.returns.glide_reach import heights_left, place_of
+from tests.logs.verdict.returns.gliders import (
+    AIRSPEED,
+    BANK,
+    NO_RADII,
+    NO_SPHERES,
+    SINK,
+    glider,
+    ground,
+    height_needed,
+    true_airspeed,
+)
+from world.kernels import Records
+from world.terrain import Terrain
+
+MARGIN, TOP, CRUISE, REACTION = 30.0, 2000.0, 26.0, 3.0
+
+
+def left_of(
+    terrain: Terrain, *, up: float = 800.0, course: float = 0.0, wind: float = 0.0, blows_to: float = 0.0,
+    east: float = 0.0, north: float = 0.0, speed: float = CRUISE, sphere: tuple[float, ...] = (),
+) -> tuple[float, tuple[float, float, float]]:  # fmt: skip
+    """What is left of a start's height to reach a place 3 km north of the middle, and which place that is."""
+    spheres, radii = (np.array([sphere[:3]]), np.array([sphere[3]])) if sphere else (NO_SPHERES, NO_RADII)
+    made = glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0)
+    assert made is not None
+    aircraft = glider(wind, blows_to)
+    needs = least_heights(made, np.array([made.cell_of(0.0, 3000.0)]), glide_slopes(aircraft, AIRSPEED, 0.0, TOP), TOP)
+    start: Records = np.zeros(1, RETURN_START)
+    to = math.radians(blows_to)
+    start["east"], start["north"], start["up"] = east, north, up
+    start["velocity_east"] = speed * math.sin(math.radians(course)) + wind * math.sin(to)
+    start["velocity_north"] = speed * math.cos(math.radians(course)) + wind * math.cos(to)
+    around = Surroundings(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
+    left, reached = heights_left(start, needs, aircraft, around, AIRSPEED, BANK)
+    return float(left[0]), place_of(made, int(reached[0])) if reached[0] >= 0 else (math.nan,) * 3
+
+
+def plane() -> Terrain:
+    return ground(lambda east, _north: 0.0 * east)
+
+
+def test_straight_ahead_it_costs_the_way_alone() -> None:
+    left, place = left_of(plane())
+    # 3 s at 1.8 m/s, 78 m on the way; then the glide.
+    expected = 800.0 - REACTION * SINK - height_needed(0.0, 3000.0 - REACTION * CRUISE, MARGIN)
+    assert left == pytest.approx(expected, abs=8.0)
+    assert place[:2] == pytest.approx((0.0, 3000.0), abs=20.0)
+
+
+@pytest.mark.parametrize("course", [90.0, -90.0, 150.0, -150.0])
+def test_behind_it_the_turn_costs_its_time_and_its_way(course: float) -> None:
+    left, _ = left_of(plane(), course=course)
+    rate = 9.80665 * math.tan(BANK) / CRUISE
+    radius, turned = CRUISE / rate, math.radians(abs(course))
+    # Ahead 78 m, then the arc: where it ends, beside and along the first course.
+    along, beside = REACTION * CRUISE + radius * math.sin(turned), radius * (1.0 - math.cos(turned))
+    to = math.radians(abs(course))
+    north = along * math.cos(to) + beside * math.sin(to)
+    east = along * math.sin(to) - beside * math.cos(to)
+    needed = height_needed(east, 3000.0 - north, MARGIN)
+    expected = 800.0 - SINK * (REACTION + turned / rate) - needed
+    # It turns in parts of 10 degrees, and a little less than back to the course along which the place lies.
+    assert left == pytest.approx(expected, abs=12.0)
+
+
+def test_in_wind_it_turns_with_the_wind() -> None:
+    """It drifts 10 m/s times the turn's time, towards the place or away from it."""
+    still = left_of(plane(), course=180.0)[0]
+    time = REACTION + math.pi * CRUISE / (9.80665 * math.tan(BANK))
+    for blows_to in (0.0, 180.0):
+        sign = 1.0 if blows_to == 0.0 else -1.0
+        away = 3000.0 + REACTION * CRUISE
+        calm = height_needed(240.0, away, MARGIN)
+        windy = height_needed(240.0, sign * 10.0 * time - away, MARGIN, 10.0, blows_to)
+        assert left_of(plane(), course=180.0, wind=10.0, blows_to=blows_to)[0] - still == pytest.approx(
+            calm - windy, abs=0.05 * windy + 5.0
+        )
+
+
+def test_a_turn_that_would_meet_the_ground_or_a_sphere_is_flown_to_the_other_side() -> None:
+    """A slope to the right that begins 100 m beside it; the same as a sphere."""
+    free = left_of(plane(), course=180.0)[0]
+    hill = ground(lambda east, _north: np.where(east < -150.0, 1200.0, 0.0))
+    assert left_of(hill, course=180.0)[0] == pytest.approx(free, abs=8.0)
+    sphere = (-400.0, 0.0, 800.0, 320.0)
+    assert left_of(plane(), course=180.0, sphere=sphere)[0] == pytest.approx(free, abs=8.0)
+    both = ground(lambda east, _north: np.where(np.abs(east) > 150.0, 1200.0, 0.0))
+    assert left_of(both, course=180.0)[0] == -math.inf
+
+
+def test_too_low_or_beyond_the_map_nothing_is_left() -> None:
+    assert left_of(plane(), up=MARGIN + 3.0)[0] == -math.inf
+    missing = 100.0 - REACTION * SINK - height_needed(0.0, 3000.0 - REACTION * CRUISE, MARGIN)
+    assert left_of(plane(), up=100.0)[0] == pytest.approx(missing, abs=8.0)
+    assert left_of(plane(), east=20_000.0)[0] == -math.inf
+
+
+def test_slower_than_the_glide_it_turns_at_the_glides_airspeed() -> None:
+    least = true_airspeed(800.0)
+    slow, fast = (left_of(plane(), course=180.0, speed=speed)[0] for speed in (10.0, least))
+    # After 3 s it is nearer by so much, and turns alike.
+    assert slow == pytest.approx(fast + REACTION * (least - 10.0) * SINK / least, abs=6.0)

@@ -1,0 +1,198 @@
+"""What can be reached without an engine over a hill, by plain sums: home, a rally point, a landing, flat ground."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flight.mission.items import Command, Frame, MissionItem
+from flight.simulation.setup import FlightSetup
+from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
+from logs.verdict.returns.judge_glides import Glides, judge_glides
+from logs.verdict.returns.judge_returns import PointOfNoReturn, judge_returns, return_world
+from logs.verdict.returns.return_starts import planned_starts
+from logs.verdict.returns.returns_text import no_return_text
+from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup
+
+# Nobody may land within 20 km: without it, all but the hill is flat.
+BARRED = (
+    '[[zones]]\nname = "town"\nkind = "exclusion"\nradius_m = 20000\neast_m = 3000\nnorth_m = 0\nceiling_amsl_m = 50\n'
+)
+# ArduPlane's Aerosonde glides 10.4 to 10.8 : 1 at its least airspeed.
+RATIO = 10.6
+
+
+def judged(setup: FlightSetup, every: float = 4.0, **parameters: float) -> Glides:
+    return judge_glides(return_world(setup).with_parameters(**parameters), planned_starts(setup, every))
+
+
+def rally(east: float, up: float = 100.0) -> MissionItem:
+    return MissionItem(0, Command.NAV_RALLY_POINT, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 46.0, 8.0 + east / DEGREE, up)
+
+
+def test_home_is_in_reach_as_far_as_the_height_lasts(tmp_path: Path) -> None:
+    """At 600 m, flying away: 8 m are lost in 3 s, some 60 m in the turn, and 30 m are kept."""
+    found = judged(hill_setup(tmp_path, BARRED), 2.0)
+    home = [one for one in found.each if one.reach == "home"]
+    farthest = max(one.start[0] for one in home)
+    # Back over 78 m and a turn's width aside; the hill's top, 400 m + 30 m, is 3 km before home and hardly in the way.
+    assert farthest == pytest.approx((600.0 - 8.0 - 60.0 - 30.0) * RATIO - 78.0, abs=350.0)
+    assert {one.reach for one in found.each if one.start[0] > farthest} == {"nothing"}
+    near = min(found.each, key=lambda one: abs(one.start[0] - 1500.0))
+    assert near.left[0] == pytest.approx(600.0 - 8.0 - 60.0 - 30.0 - 1578.0 / RATIO, abs=30.0)
+    assert [one.kind for one in found.sites] == ["home"]
+    assert found.airspeed == 18.0
+
+
+def test_what_is_reached_falls_from_home_to_flat_ground_to_nothing(tmp_path: Path) -> None:
+    open_ground = judged(hill_setup(tmp_path), 4.0)
+    assert {one.reach for one in open_ground.each} == {"home", "flat"}
+    flat = [one for one in open_ground.each if one.reach == "flat"]
+    assert all(0.0 <= one.flat <= 600.0 - 8.0 - 30.0 for one in flat)
+    # The hill is no flat ground: 400 m high with a deviation of 300 m it is steeper than 5 % within 850 m.
+    assert all(math.dist(one.flat_at[:2], (3000.0, 0.0)) > 800.0 for one in flat)
+    barred = judged(hill_setup(tmp_path, BARRED), 4.0)
+    assert {one.reach for one in barred.each} == {"home", "nothing"}
+    assert all(one.flat == -math.inf and math.isnan(one.flat_at[0]) for one in barred.each)
+
+
+def test_a_rally_point_and_a_landing_of_the_mission_are_reached(tmp_path: Path) -> None:
+    way = HEAD + "".join(
+        f"{k}\t0\t0\t{command}\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up}\t1\n"
+        for k, (command, x, up) in enumerate(((16, 0.0, 600), (16, 6500.0, 600), (21, 8000.0, 0)), 1)
+    )
+    found = judged(hill_setup(tmp_path, BARRED, way, (rally(7500.0),)), 4.0)
+    assert [(one.kind, one.number) for one in found.sites] == [("home", 0), ("rally", 1), ("landing", 3)]
+    site = [one for one in found.each if one.reach == "site"]
+    assert site
+    late = min(site, key=lambda one: one.start[0])
+    # Ahead of it, with no turn: the rally point is 500 m nearer than the landing.
+    assert late.left[1] - late.left[2] == pytest.approx(500.0 / RATIO, abs=8.0)
+    assert found.best_site(late) == 1
+    assert any(": rally point 1, " in glide_range_text(group, found) for group in found.ranges)
+    assert ": the landing at item 3, " in glide_range_text(found.ranges[-1], found)
+    assert "a rally point or landing place, but not home, from " in glides_headline(found)
+
+
+def test_arduplanes_own_return_ends_where_its_law_says(tmp_path: Path) -> None:
+    """It glides straight home, into the hill from behind it, and gets there from before it."""
+    found = judged(hill_setup(tmp_path), 4.0)
+    before = [one for one in found.each if 500.0 < one.start[0] < 2500.0]
+    assert {one.own.end for one in before} == {"arrives"}
+    assert all(one.own.over > 100.0 for one in before)
+    behind = [one for one in found.each if one.start[0] > 5600.0]
+    assert {one.own.end for one in behind} == {"ground"}
+    for one in behind:
+        assert one.own.short == pytest.approx(math.dist(one.own.at[:2], (0.0, 0.0)), abs=1.0)
+        assert one.own.short > 600.0
+        assert math.isnan(one.own.over)
+    assert found.arrivals == sum(one.own.end == "arrives" for one in found.each) > len(before)
+    # It is never better than the best there is, but for what the turn gives back of its speed.
+    assert all(one.left[0] > -25.0 for one in found.each if one.own.end == "arrives")
+
+
+def test_a_sphere_on_the_way_home_stops_its_own_return_and_is_flown_around(tmp_path: Path) -> None:
+    threat = (
+        '[[threats]]\nname = "post"\neast_m = 900\nnorth_m = 0\namsl_m = 350\nkill_radius_m = 150\nkill_scale_m = 50\n'
+    )
+    found = judged(hill_setup(tmp_path, threat), 4.0)
+    ones = [one for one in found.each if 2400.0 < one.start[0] < 3800.0]
+    assert {one.own.end for one in ones} == {"threat"}
+    assert {one.reach for one in ones} == {"home"}
+
+
+def test_what_is_not_known_is_said(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path)
+    nowhere = replace(setup, scenario=replace(setup.scenario, terrain=None))
+    found = judge_glides(return_world(nowhere), planned_starts(setup, 20.0))
+    assert (found.each, found.not_judged) == ((), "terrain")
+    assert glides_headline(found) == "not judged: there is no elevation file"
+    assert glide_notes(found) == []
+    follows = judged(setup, 20.0, TERRAIN_FOLLOW=1)
+    assert {one.own.end for one in follows.each} == {"not flown"}
+    assert {one.reach for one in follows.each} == {"home", "flat"}
+    assert "is not flown" in glides_headline(follows)
+    starts = planned_starts(setup, 20.0)
+    starts.rows["east"] += 50_000.0
+    away = judge_glides(return_world(setup), starts)
+    assert away.not_judged == "far" or {one.reach for one in away.each} == {"unknown"}
+
+
+def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:
+    found = judged(hill_setup(tmp_path), 4.0)
+    assert sum(one.count for one in found.ranges) == len(found.each)
+    assert [one.first for one in found.ranges] == sorted(one.first for one in found.ranges)
+    for group in found.ranges:
+        inside = [one for one in found.each if group.first <= one.time <= group.last]
+        assert {one.reach for one in inside} == {group.least.reach}
+        assert found.spare(group.least) == min(found.spare(one) for one in inside)
+    assert sum(found.count(one) for one in ("home", "flat")) == len(found.each)
+    assert "it knows no trees, houses or water" in " ".join(glide_notes(found))
+
+
+def test_an_engine_that_burns_fuel_has_a_note(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path)
+    fuelled = replace(setup, limits=replace(setup.limits, envelope=replace(setup.envelope, volts=0.0)))
+    assert any("closed throttle" in note for note in glide_notes(judged(fuelled, 40.0)))
+    assert not any("closed throttle" in note for note in glide_notes(judged(setup, 40.0)))
+
+
+# ----------------------------------------------------------------------
+# The point of no return, by energy.
+
+
+def no_return(setup: FlightSetup, used: float = 0.0, flown: float = 0.0, **parameters: float) -> PointOfNoReturn:
+    """Of a flight that had used so many Wh at first, and uses so many in each second."""
+    starts = planned_starts(setup, 4.0)
+    starts.used[:] = used + flown * starts.time
+    return judge_returns(return_world(setup).with_parameters(**parameters), starts, 4.0).point_of_no_return
+
+
+def test_the_point_of_no_return_is_the_last_with_the_reserve(tmp_path: Path) -> None:
+    """10 Wh, 2 of them reserve; a return takes some 7 Wh for its circle, and 4 Wh a kilometre."""
+    setup = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
+    each = judge_returns(return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 4.0), 4.0).each
+    point = no_return(setup, flown=0.02, RTL_ALTITUDE=600.0)
+    leaves = [one.left - 0.02 * one.time for one in each]
+    last = max(one.time for one, left in zip(each, leaves, strict=True) if left >= 2.0)
+    assert (point.kind, point.time) == ("later", last)
+    assert 0.0 < point.time < each[-1].time
+    assert no_return(setup, 9.0, RTL_ALTITUDE=600.0).kind == "at once"
+    plenty = hill_setup(tmp_path, "[flight]\nbattery_wh = 100\n")
+    never = no_return(plenty, RTL_ALTITUDE=600.0)
+    assert never.kind == "never"
+    assert math.isnan(never.time)
+    assert never.left == pytest.approx(100.0 - 10.0 + min(one.left for one in each))
+
+
+def test_more_wind_against_the_way_back_brings_it_nearer(tmp_path: Path) -> None:
+    """The wind blows away from home: back it is slower, and takes longer."""
+    away = []
+    for wind in (0, 5, 10):
+        weather = f"[flight]\nbattery_wh = 30\n[wind]\nspeed_mps = {wind}\nfrom_deg = 270\n"
+        setup = hill_setup(tmp_path, weather)
+        point, starts = no_return(setup, RTL_ALTITUDE=600.0), planned_starts(setup, 4.0)
+        assert point.kind == "later"
+        away.append(float(starts.rows["east"][starts.time == point.time][0]))
+    assert away[0] > away[1] + 200.0 > away[2] + 400.0
+
+
+def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path)
+    returns = judge_returns(return_world(setup), planned_starts(setup, 20.0), 20.0)
+    assert returns.point_of_no_return.kind == "used"
+    assert "the energy used before is not known" in no_return_text(returns)
+    guessed = replace(setup, limits=replace(setup.limits, envelope=replace(setup.envelope, battery_guessed=True)))
+    assert no_return(guessed).kind == "battery"
+    # From behind the hill, into it: what does not arrive is left out.
+    found = no_return(setup)
+    assert found.kind == "never"
+    assert found.skipped > 0
+    starts = planned_starts(setup, 20.0)
+    starts.used[:] = 0.0
+    deep = starts.at(np.flatnonzero(starts.rows["east"] > 6000.0))
+    none = judge_returns(return_world(setup), deep, 20.0)
+    assert none.point_of_no_return.kind == "arrives"
+    assert no_return_text(none).endswith("for no return arrives")
