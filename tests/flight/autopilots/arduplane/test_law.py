@@ -294,14 +294,20 @@ def test_slow_flight_narrows_the_bank() -> None:
 # How attitudes are followed, and what of the rudder is steered.
 
 
-def followed(own: Record, at: Record, pitch_trim: float = 0.0) -> tuple[Record, Record]:
-    """Commands and memory after a tick of a sixtieth of a second, with ArduPlane's parameters and gains of one."""
-    gains, kept, commands = record(GAINS), record(GUIDANCE_MEMORY), record(COMMANDS)
+def even_gains() -> Record:
+    """Gains of one, but for the angle of attack, which would come to its limits, and the damping of the pitch rate."""
+    gains = record(GAINS)
     for name in field_names(GAINS):
         setattr(gains, name, 1.0)
+    gains.alpha_per_g, gains.pitch_rate_gain = 0.01, 0.0
     gains.reference_airspeed, gains.roll_rate_max, gains.roll_acceleration_max = 25.0, 10.0, 1000.0
-    law = parameters(PTCH_TRIM_DEG=pitch_trim, KFF_RDDRMIX=0.3)
-    _follow(at, flying(), gains, kept, law, own, 1.0, commands, 1.0 / 60.0)
+    return gains
+
+
+def followed(own: Record, at: Record) -> tuple[Record, Record]:
+    """Commands and memory after a tick of a sixtieth of a second, with ArduPlane's parameters."""
+    kept, commands = record(GUIDANCE_MEMORY), record(COMMANDS)
+    _follow(at, flying(), even_gains(), kept, parameters(KFF_RDDRMIX=0.3), own, 1.0, commands, 1.0 / 60.0)
     return commands, kept
 
 
@@ -320,11 +326,8 @@ def test_a_bank_is_late_as_in_logs_of_arduplane() -> None:
 def test_a_pitch_is_followed_a_tenth_later_than_its_time_constant_says() -> None:
     """0.055 rad of 0.55 s are 0.1 rad/s, and at 25 m/s 2.5 m/s^2 upwards, as a path that asks for them."""
     commands, _ = followed(memory(pitch_demand=0.055), state())
-    kept, asked, gains = record(GUIDANCE_MEMORY), record(COMMANDS), record(GAINS)
-    for name in field_names(GAINS):
-        setattr(gains, name, 1.0)
-    gains.reference_airspeed = 25.0
-    steer_elevator(state(), gains, kept, asked, 0.0, 2.5)
+    kept, asked = record(GUIDANCE_MEMORY), record(COMMANDS)
+    steer_elevator(state(), even_gains(), kept, asked, 0.0, 2.5)
     assert commands.elevator == pytest.approx(asked.elevator, abs=1e-6)
 
 
