@@ -160,8 +160,7 @@ def fly_returns(
     landings: n landing sequences that they go on to, None for those that end in their circle; or none at all.
     keep: whether their ways are kept.
     least: (n,) heights above ground and (n,) distances outside spheres, m, below which a return need not be flown on.
-    engine_out: whether the engine has stopped where it begins: it flies on for `REACTION` s, then returns without
-        thrust, and is over where it comes to its circle.
+    engine_out: whether the engine has stopped: it flies on for `REACTION` s, and its circle ends it.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import load_parameters
