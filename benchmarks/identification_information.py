@@ -29,13 +29,14 @@ from aircraft.identification.drag import (
     NUISANCES,
     AlphaDoubt,
     ForwardForces,
+    drag_priors,
     forward_forces,
 )
 from aircraft.identification.draws import draw_aircraft
 from aircraft.identification.estimate import Estimate, aligned_signals, estimate_model
 from aircraft.identification.flight_record import GRID_HZ
 from aircraft.identification.flow import vane
-from aircraft.identification.parameters import PARAMETERS, prior_means, prior_sds
+from aircraft.identification.parameters import PARAMETERS
 from aircraft.identification.performance import GRAVITY, performance
 from benchmarks.identification import drawn_truth, fly_missions, true_values
 from planfly.identification.base_numbers import base_model, scaled
@@ -45,6 +46,7 @@ from planfly.identification.servos import read_servos
 from tests.instrumented_flights import drawn_sensors, sensed
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 _CRUISE, _TWO_SIDED = 25.0, 1.96
 _OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
@@ -115,7 +117,7 @@ def information(forces: ForwardForces, unknown: Floats, noise: str, *, current: 
     return np.asarray(made)
 
 
-def halves(precision: Floats, slopes: Floats, known: Floats) -> dict[str, float]:
+def halves(precision: Floats, slopes: Floats, known: Flags) -> dict[str, float]:
     """Half the 95 % interval of sink and power, percent, and of the climb, degrees; known: held at the truth."""
     inverse = np.zeros_like(precision)
     free = np.flatnonzero(~known)
@@ -152,7 +154,7 @@ def one_seed(seed: int) -> dict[str, Any]:
     estimate = estimate_model(records, base)
     signals = aligned_signals(records, estimate.clocks, base)
     forces = forward_forces(signals, base, values, vane(signals, base, values), AlphaDoubt())
-    sds = np.concatenate([prior_sds()[_OWN], list(NUISANCES.values())])
+    _, sds = drag_priors(with_current=False)
     unknown = np.concatenate([values[_OWN], np.zeros(len(NUISANCES))])
     before, slopes = np.diag(1.0 / np.square(sds)), gradients(base, values, unknown)
     nothing, nuisances = np.zeros(len(sds), np.bool_), np.arange(len(sds)) >= int(_OWN.sum())
@@ -180,7 +182,6 @@ def one_seed(seed: int) -> dict[str, Any]:
     made["bound: model, with current"] = halves(
         before + information(forces, unknown, "model", current=True), slopes, nothing
     )
-    assert list(prior_means()[_OWN]) == [1.0] * int(_OWN.sum())
     return made
 
 

@@ -111,10 +111,7 @@ def fit_drag(
     forces = forward_forces(signals, base, values, flow, AlphaDoubt() if doubt is None else doubt)
     thin = forces.signals
     with_current = bool(np.isfinite(thin.current).all())
-    nuisances = np.array(list(NUISANCES.values()))
-    nuisances[list(NUISANCES).index("voltage of the battery")] *= _LOGGED_VOLTAGE if with_current else 1.0
-    means = np.concatenate([prior_means()[_OWN], np.zeros(len(nuisances))])
-    sds = np.concatenate([prior_sds()[_OWN], nuisances])
+    means, sds = drag_priors(with_current=with_current)
     # From the forces alone to the two together: with the current at once the first steps lead astray.
     fit = _search(forces, _Goal(thin, with_current=False), means, sds)
     if with_current:
@@ -124,6 +121,14 @@ def fit_drag(
     explained = 1.0 - float((goal - force).var() / goal.var())
     five, turn = _folded(forces, fit.estimate)
     return Fit(fit.estimate, fit.covariance, force, goal - force, explained), five, turn @ fit.covariance @ turn.T
+
+
+def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
+    """Means and standard deviations (p,) of the parameters of drag and motor, and of `NUISANCES` behind them."""
+    nuisances = np.array(list(NUISANCES.values()))
+    nuisances[list(NUISANCES).index("voltage of the battery")] *= _LOGGED_VOLTAGE if with_current else 1.0
+    means = np.concatenate([prior_means()[_OWN], np.zeros(len(nuisances))])
+    return means, np.concatenate([prior_sds()[_OWN], nuisances])
 
 
 def _folded(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:

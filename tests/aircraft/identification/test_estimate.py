@@ -125,6 +125,16 @@ def test_what_noise_hides_is_what_as_much_again_hides_where_the_axis_is_still_ex
     assert not _hidden_by_noise(replace(made(1.0, 0.7), dynamics=False), made(0.8, 0.9)).any()
 
 
+def test_what_noise_hides_is_given_back_to_the_moments() -> None:
+    flown = flown_truth()
+    nominal = fit_all(aligned_signals(flown.records, flown.estimate.clocks, flown.base), flown.base).values
+    given = flown.estimate.values - nominal
+    moments = np.array([parameter.group in ("pitch", "roll", "yaw") for parameter in PARAMETERS])
+    shift = flown.estimate.shifts["noise of the accelerometers"]
+    assert given == pytest.approx(np.where(moments, -shift, 0.0), abs=1e-9)
+    assert np.abs(shift[moments]).max() > 1e-3
+
+
 def test_an_interval_is_of_fit_and_shifts_and_none_wider_than_the_prior() -> None:
     n = len(PARAMETERS)
     shift = np.zeros(n)

@@ -9,6 +9,7 @@ from aircraft.catalog import load_aircraft
 from aircraft.identification.flow import attitude_alpha, vane
 from aircraft.identification.parameters import prior_means
 from planfly.identification.base_numbers import base_model
+from tests.aircraft.identification.made_signals import steady
 
 
 def signals(
@@ -53,3 +54,28 @@ def test_a_wing_that_rolls_has_side_force_without_sideslip() -> None:
         voltage=np.nan * one, smooth=lambda values, band: values,
     )  # fmt: skip
     assert vane(turning, base, prior_means()).beta == pytest.approx(np.zeros(4), abs=1e-4)
+
+
+def test_the_vane_tells_the_flow_that_made_the_forces() -> None:
+    """Lift, drag, side force and thrust of a flow, summed by hand with the book's coefficients of the Aerosonde."""
+    base = base_model(load_aircraft("aerosonde"))
+    alpha, beta, elevator, aileron, rudder, q = 0.06, 0.05, -0.08, 0.2, -0.15, 0.3
+    speed, density = 25.0, 1.2
+    thrust, _ = base.motor.thrust_and_current(np.full(1, speed), np.full(1, 0.6), np.full(1, density))
+    pressure = 0.5 * density * speed**2 * 0.55
+    along = 0.18994 / (2.0 * speed)
+    lift = pressure * (0.23 + 5.61 * alpha + 7.95 * q * along + 0.13 * elevator)
+    drag = pressure * 0.06
+    side = pressure * (-0.98 * beta + 0.075 * aileron + 0.19 * rudder)
+    force = (
+        lift * math.sin(alpha) - drag * math.cos(alpha) + float(thrust[0]), side,
+        -lift * math.cos(alpha) - drag * math.sin(alpha),
+    )  # fmt: skip
+    made = steady(
+        acceleration=np.array(force) / base.mass, rates=(0.0, q, 0.0), surfaces=(elevator, aileron, rudder),
+        airspeed=speed, density=density,
+    )  # fmt: skip
+    found = vane(made, base, prior_means())
+    assert found.alpha == pytest.approx(alpha, abs=2e-4)
+    assert found.beta == pytest.approx(beta, abs=1e-4)
+    assert found.lift == pytest.approx(0.23 + 5.61 * alpha, abs=1e-3)
