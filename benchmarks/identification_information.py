@@ -33,6 +33,7 @@ from aircraft.identification.drag import (
     forward_forces,
 )
 from aircraft.identification.draws import draw_aircraft
+from aircraft.identification.electric_motor import ElectricMotor
 from aircraft.identification.estimate import Estimate, aligned_signals, estimate_model
 from aircraft.identification.flight_record import GRID_HZ
 from aircraft.identification.flow import vane
@@ -60,13 +61,14 @@ def flown_as(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
     own = int(_OWN.sum())
     resistance, idle, voltage, elevator = unknown[own + 1 : own + 5]
     motor = base.motor.changed(resistance=1.0 + resistance, idle=1.0 + idle)
+    assert isinstance(motor, ElectricMotor)
     c = base.coefficients
     changed = replace(base, motor=replace(motor, voltage=motor.voltage * (1.0 + voltage)),
                       coefficients=replace(c, drag_elevator=c.drag_elevator * (1.0 + elevator)))  # fmt: skip
     every = values.copy()
     every[_OWN] = unknown[:own]
     made = performance(changed, every, _CRUISE, DENSITY)
-    return np.array([made.sink[0], made.power[0], made.climb[0]])
+    return np.concatenate([made.sink, made.power, made.climb])
 
 
 def gradients(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
@@ -74,7 +76,8 @@ def gradients(base: BaseModel, values: Floats, unknown: Floats) -> Floats:
     step = 1e-4
     at = flown_as(base, values, unknown)
     rows = [(flown_as(base, values, unknown + step * one) - at) / step for one in np.eye(len(unknown))]
-    return np.array(rows).T / np.array([at[0], at[1], np.radians(1.0)])[:, np.newaxis]
+    units = np.array([at[0], at[1], np.radians(1.0)])
+    return np.asarray(np.array(rows).T / units[:, np.newaxis])
 
 
 def glide(base: BaseModel, values: Floats, seconds: float) -> ForwardForces:
