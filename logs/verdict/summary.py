@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.conditions import condition_lines, navigation_text
+from logs.verdict.conditions import condition_lines, corridor_line, navigation_text
 from logs.verdict.findings import Finding, Verdict, left_open
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
@@ -179,6 +179,7 @@ def summary_lines(
     if level == "flown":
         lines.append(f"Flown by: {setup.autopilot.described(setup.aircraft)}; {navigation_text(setup)}")
         lines += _parameter_lines(setup)
+        lines += [line] if (line := corridor_line(setup)) else []
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     for other in others:

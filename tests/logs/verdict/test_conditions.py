@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from logs.verdict.conditions import condition_lines
+from logs.verdict.conditions import condition_lines, corridor_line, least_gap
 from tests.logs.made_flight import make_setup
 from world.errors import FlightError
 from world.scenario import with_flight, with_wind
@@ -43,3 +44,39 @@ def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("logs.verdict.conditions.find_aircraft", missing)
     line, _ = condition_lines(make_setup())
     assert " kg" not in line
+
+
+def lines(gap: float, *, overlap: float = 1.0) -> np.ndarray:
+    """Two lines of 900 m side by side, flown to and fro."""
+    end = 900.0 * (1.0 - overlap)
+    return np.array([[0, 0, 300], [0, 900, 300], [gap, 900, 300], [gap, end, 300]], dtype=float)
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "gap"),
+    [
+        (lines(40.0), 40.0),
+        (lines(-40.0), 40.0),
+        # A line that leads away, and one that is flown back, are none beside each other.
+        (np.array([[0, 0, 300], [0, 900, 300], [40, 900, 300], [40, 1800, 300]], dtype=float), None),
+        (np.array([[0, 0, 300], [0, 900, 300], [40, 900, 300], [900, 900, 300]], dtype=float), None),
+        (lines(0.5), None),
+    ],
+)
+def test_the_gap_between_lines_of_a_survey(waypoints: np.ndarray, gap: float | None) -> None:
+    found = least_gap(waypoints)
+    assert (None if found is None else found[0]) == pytest.approx(gap)
+
+
+def test_a_corridor_wider_than_the_gap_between_lines_is_told() -> None:
+    setup = make_setup()
+    survey = replace(setup, route=replace(setup.route, waypoints=lines(20.0)))
+    assert setup.corridor == 30.0
+    assert corridor_line(survey) == (
+        "Corridor: 30 m to either side, planfly's default, is wider than the 20 m between legs 0 and 2: keeping to it"
+        " does not show that the lines were flown ([limits] corridor_m states one)"
+    )
+    assert corridor_line(replace(setup, route=replace(setup.route, waypoints=lines(31.0)))) == ""
+    assert corridor_line(setup) == ""
+    stated = setup.scenario.limits.model_copy(update={"corridor_m": 30.0})
+    assert corridor_line(survey.in_scenario(replace(setup.scenario, limits=stated))) == ""
