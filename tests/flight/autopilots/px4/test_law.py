@@ -40,11 +40,11 @@ def test_it_turns_to_the_next_leg_where_px4_does() -> None:
             if k not in CIRCLED[flight]
         ]
     )
-    # PX4's own switch is up to 0.3 s late: 7 m.
+    # PX4's own switch is 0.02 to 0.26 s late, which is 6.1 m: from the middle of these, nobody is nearer than 3 m.
     assert len(off) == 33
     assert np.median(np.abs(off)) < 2.0
-    assert (np.abs(off) < 3.0).mean() > 0.85
-    assert np.abs(off).max() < 5.0
+    assert (np.abs(off) < 3.0).mean() > 0.9
+    assert np.abs(off).max() < 3.5
 
 
 def test_it_overshoots_corners_as_far_as_px4() -> None:
