@@ -287,7 +287,6 @@ def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  #
     if memory.circled > 0.0 or (there and abs(motion.up - b.up) < AT_HEIGHT):
         memory.circled += dt
     around = abs(memory.turned) >= 2.0 * math.pi
-    memory.done = memory.done or memory.circled > MOST_CIRCLES * UNLIMITED
     memory.done = (memory.done and around and memory.circled > UNLIMITED) or memory.circled > longest_circling(radius)
 
 

@@ -11,9 +11,10 @@ from functools import partial
 
 import numpy as np
 
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Command
 from flight.mission.itinerary import UNLIMITED
-from flight.simulation.tick import AT_HEIGHT, NEAR
+from flight.simulation.tick import AT_HEIGHT, NEAR, WIDER
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -26,6 +27,8 @@ from world.errors import MissionError
 
 # Returns that are flown where all are required to be safe: one a second, and no more than this, 2 ms each.
 _MOST = 3000
+# A log's rows begin and end up to a second before and after its circle does, rad: 26 m/s on 260 m.
+_PART_OF_A_TICK = 0.1
 # Rules that hold a flight to its legs.
 _OF_LEGS = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 
@@ -82,17 +85,25 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
 
 
 def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:
-    """Whether a track has been at its return's circle for as long as that is flown, from when it had come to it.
+    """Whether a track has been at its return's circle for as long as that is flown, and all around it, at its height.
 
-    It has come there near its middle and at its height, as for a simulated flight (`flight.simulation.tick.NEAR`).
+    From when it had come there, near its middle and at its height, as for a simulated flight
+    (`flight.simulation.tick.end_return`).
     """
     end = requirements.setup.route.return_to
     if end is None:
         return False
     track = aligned.track
     east, north, up = (track.position - (end.east, end.north, end.up)).T
-    there = (np.hypot(east, north) < max(NEAR, 2.0 * abs(end.radius))) & (np.abs(up) < AT_HEIGHT)
-    return bool(there.any()) and float(track.time[-1] - track.time[int(np.argmax(there))]) >= UNLIMITED
+    # True radii grow with height as the square of true airspeed.
+    wide = WIDER * abs(end.radius) * true_by_equivalent(end.up) ** 2
+    there = (np.hypot(east, north) < max(NEAR, wide)) & (np.abs(up) < AT_HEIGHT)
+    if not there.any():
+        return False
+    first = int(np.argmax(there))
+    bearing = np.unwrap(np.arctan2(east[first:], north[first:]))
+    around = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _PART_OF_A_TICK
+    return around and float(track.time[-1] - track.time[first]) >= UNLIMITED
 
 
 def _flown(requirements: RouteRequirements, arrived: bool, why: str = "") -> list[Finding]:

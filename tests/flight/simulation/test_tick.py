@@ -257,6 +257,10 @@ def test_a_return_ends_no_sooner_than_it_was_all_around_its_circle() -> None:
     assert not ended(fresh(done=True), 500.0, 400.0, 180, 2.0, circle=500.0)
     assert ended(fresh(done=True), 500.0, 400.0, 182, 2.0, circle=500.0)
     assert ended(fresh(done=True), 500.0, 400.0, 182, -2.0, circle=-500.0)
+    # A path that is not over yet, as its circle was come to before where it is drawn: once around it goes on, however
+    # long that took, here 450 s, and is given up as late.
+    assert not ended(fresh(done=False), 1500.0, 400.0, 460, 0.8, circle=1500.0)
+    assert ended(fresh(done=True), 1500.0, 400.0, 460, 0.8, circle=1500.0)
     # It never gets around: given up after five times 2 pi 500 m at 10 m/s, 1,571 s; 400 m up it is 4 % wider.
     assert not ended(fresh(done=True), 500.0, 400.0, 1571, 0.0, circle=500.0)
     assert ended(fresh(done=True), 500.0, 400.0, 1660, 0.0, circle=500.0)

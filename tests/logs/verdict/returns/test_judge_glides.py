@@ -88,6 +88,10 @@ def test_arduplanes_own_return_ends_where_its_law_says(tmp_path: Path) -> None:
         assert one.own.short == pytest.approx(math.dist(one.own.at[:2], (0.0, 0.0)), abs=1.0)
         assert one.own.short > 600.0
         assert math.isnan(one.own.over)
+    # Over the hill, and not by 30 m.
+    low = [one.own for one in judged(hill_setup(tmp_path), 1.0).each if one.own.end == "low"]
+    assert low
+    assert all(0.0 < one.clearance < 30.0 for one in low)
     assert found.arrivals == sum(one.own.end == "arrives" for one in found.each) > len(before)
     # It is never better than the best there is, but for what the turn gives back of its speed.
     assert all(one.left[0] > -25.0 for one in found.each if one.own.end == "arrives")

@@ -165,10 +165,20 @@ def test_a_planned_return_is_told_and_not_judged() -> None:
     assert "not flown yet" in found.reason
 
 
-@pytest.mark.parametrize(("seconds", "arrived"), [(0.0, True), (-30.0, False)])
-def test_an_imported_return_has_circled_at_its_height(seconds: float, arrived: bool) -> None:
-    # Of an imported flight nobody knows how it ended but by its rows.
-    setup = by_arduplane(setup_of(*WAY, home=HOME))
+def test_a_return_to_a_wide_circle_comes_to_its_end() -> None:
+    """Once around takes 6 minutes, and it comes to its circle before where that is drawn to begin."""
+    verdict, ended = flown(by_arduplane(setup_of(*WAY, home=HOME), RTL_RADIUS=1500.0))
+    assert ended == "completed"
+    assert of(verdict, "return").ok
+    assert verdict.complete, verdict.lines
+
+
+@pytest.mark.parametrize(
+    ("seconds", "radius", "arrived"), [(0.0, 0.0, True), (-30.0, 0.0, False), (-70.0, 500.0, False)]
+)
+def test_an_imported_return_has_circled_at_its_height(seconds: float, radius: float, arrived: bool) -> None:
+    # Of an imported flight nobody knows how it ended but by its rows.  Around 500 m it flies for two minutes and more.
+    setup = by_arduplane(setup_of(*WAY, home=HOME), RTL_RADIUS=radius)
     done = simulate(setup, load_aircraft("aerosonde"))
     rows = done.track.rows(0, len(done.track) + round(seconds / float(done.track.time[1] - done.track.time[0])))
     requirements = route_requirements(setup)
