@@ -109,7 +109,8 @@ def _loiter(
     tightest = float(requirements.tightest[inner].max()) if known else math.nan
     bad = [item for item in at if item.ok is False]
     if requirements.setup.autopilot.loiter_rules.at_middle:
-        bad = bad if aligned is None or not _came_to(requirements, aligned, circle) else []
+        missed = not _is_own(requirements, circle) if aligned is None else not _came_to(requirements, aligned, circle)
+        bad = bad if missed else []
     faults = _too_small(requirements, circle, tightest) if known else []
     own = _is_own(requirements, circle)
     facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]

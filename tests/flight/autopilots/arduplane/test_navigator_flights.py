@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from logs.verdict.judge_flight import judge_flight
+from logs.verdict.judge_flight import judge_flight, judge_geometry
 from tests.flight.autopilots.arduplane.kept_missions import (
     CIRCLES,
     CORNERS,
@@ -101,3 +101,4 @@ def test_circles_that_harm_nothing_are_flyable(flight: str) -> None:
     done = simulated(flight)
     verdict = judge_flight(kept_setup(flight), done.track, done.ended)
     assert verdict.flyable, verdict.headline
+    assert judge_geometry(kept_setup(flight)).flyable
