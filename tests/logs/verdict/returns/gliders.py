@@ -16,13 +16,18 @@ AIRSPEED, SINK, BANK = 18.0, 1.8, math.radians(30.0)
 NO_SPHERES, NO_RADII = np.zeros((0, 3)), np.zeros(0)
 
 
-def glider(wind: float = 0.0, blows_to: float = 0.0) -> PointMass:
-    """One that sinks 1.8 m/s at any airspeed and in any bank, in a wind (m/s) that blows on a course (degrees)."""
+def glider(wind: float = 0.0, blows_to: float = 0.0, fast_sink: float = SINK) -> PointMass:
+    """One that sinks 1.8 m/s at any airspeed and in any bank, in a wind (m/s) that blows on a course (degrees).
+
+    fast_sink: from 24 m/s on, m/s.
+    """
     record: Record = np.zeros(1, POINT_MASS)[0]
     record.airspeed, record.slowest, record.speed_step, record.height_step = 25.0, AIRSPEED, 2.0, 2000.0
     record.wind_speed = wind
     record.wind_east, record.wind_north = math.sin(math.radians(blows_to)), math.cos(math.radians(blows_to))
-    return PointMass(record, np.full((21, 7, 3), -SINK), np.zeros((3, 7, 3)))
+    excess = np.full((21, 7, 3), -SINK)
+    excess[:, 3:] = -fast_sink
+    return PointMass(record, excess, np.zeros((3, 7, 3)))
 
 
 def true_airspeed(amsl: float) -> float:

@@ -31,12 +31,13 @@ MARGIN, TOP, CRUISE, REACTION = 30.0, 2000.0, 26.0, 3.0
 def left_of(
     terrain: Terrain, *, up: float = 800.0, course: float = 0.0, wind: float = 0.0, blows_to: float = 0.0,
     east: float = 0.0, north: float = 0.0, speed: float = CRUISE, sphere: tuple[float, ...] = (),
+    fast_sink: float = SINK,
 ) -> tuple[float, tuple[float, float, float]]:  # fmt: skip
     """What is left of a start's height to reach a place 3 km north of the middle, and which place that is."""
     spheres, radii = (np.array([sphere[:3]]), np.array([sphere[3]])) if sphere else (NO_SPHERES, NO_RADII)
     made = glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0)
     assert made is not None
-    aircraft = glider(wind, blows_to)
+    aircraft = glider(wind, blows_to, fast_sink)
     needs = least_heights(made, np.array([made.cell_of(0.0, 3000.0)]), glide_slopes(aircraft, AIRSPEED, 0.0, TOP), TOP)
     start: Records = np.zeros(1, RETURN_START)
     to = math.radians(blows_to)
@@ -76,6 +77,13 @@ def test_behind_it_the_turn_costs_its_time_and_its_way(course: float) -> None:
     assert left == pytest.approx(expected, abs=8.0)
 
 
+def test_it_sinks_in_its_turn_as_it_does_at_its_airspeed() -> None:
+    """5.4 m/s at 26 m/s, and 1.8 m/s in the glide: 3.6 m/s more for as long as it flies on and turns."""
+    lasts = REACTION + math.pi * CRUISE / (9.80665 * math.tan(BANK))
+    slow, fast = (left_of(plane(), course=180.0, fast_sink=sink)[0] for sink in (SINK, 3.0 * SINK))
+    assert slow - fast == pytest.approx(2.0 * SINK * lasts, abs=6.0)
+
+
 def test_in_wind_it_turns_with_the_wind() -> None:
     """It drifts 10 m/s times the turn's time, towards the place or away from it."""
     still = left_of(plane(), course=180.0)[0]
@@ -97,7 +105,10 @@ def test_across_the_wind_it_turns_into_it(blows_to: float) -> None:
     aside = 2.0 * CRUISE**2 / (9.80665 * math.tan(BANK)) - 10.0 * lasts
     away = 600.0 + REACTION * CRUISE
     needed = height_needed(math.copysign(aside, blows_to - 180.0), -away, MARGIN, 10.0, blows_to)
-    left, _ = left_of(plane(), course=180.0, wind=10.0, blows_to=blows_to, north=2400.0)
+    # A slope lets it turn to that side alone.
+    side = 1.0 if blows_to == 90.0 else -1.0
+    slope = ground(lambda east, _north: np.where(side * east > 250.0, 1200.0, 0.0))
+    left, _ = left_of(slope, course=180.0, wind=10.0, blows_to=blows_to, north=2400.0)
     assert left == pytest.approx(800.0 - SINK * lasts - needed, abs=9.0)
 
 
