@@ -261,7 +261,8 @@ def _print_limits(chosen: "Aircraft", envelope: "Envelope") -> None:
     if envelope.source:
         climb, descent = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
         print(
-            f"  known    from {envelope.source}: climbs to {climb:.1f} deg, descents to {descent:.1f} (one deviation)"
+            f"  known    from {envelope.source}: climbs to {climb:.1f} deg, descents to {descent:.1f}, the fastest"
+            f" level flight to {envelope.fastest_sd:.1f} m/s (one deviation)"
         )
 
 
