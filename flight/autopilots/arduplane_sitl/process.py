@@ -88,13 +88,14 @@ class AutopilotProcess:
             guard.keep_folder(self._folder)
             text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
             (self._folder / _DEFAULTS).write_text(text, encoding="ascii")
-            self._process = self._spawn(home, heading, physics_port, link_port)
-            guard.keep_group(self._process.pid)
+            self._process = self._spawn(guard, home, heading, physics_port, link_port)
         except BaseException:
             self._place.close()
             raise
 
-    def _spawn(self, home: Home, heading: float, physics_port: int, link_port: int) -> "subprocess.Popen[bytes]":
+    def _spawn(
+        self, guard: Guard, home: Home, heading: float, physics_port: int, link_port: int
+    ) -> "subprocess.Popen[bytes]":
         place = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt:.3f},{heading:.2f}"
         free = _free_ports(3)
         command = [
@@ -109,6 +110,13 @@ class AutopilotProcess:
         ]
         # By default the program stays after a panic, and turns in a loop.
         environment = os.environ | {"SITL_PANIC_EXIT": "1"}
+
+        def begin() -> None:
+            """Have the group guarded before the program runs: told afterwards, we may be killed in between."""
+            guard.keep_group(os.getpid())
+            if sys.platform == "linux":
+                _die_with_parent()
+
         with (self._folder / _OUTPUT).open("wb") as output:
             try:
                 return subprocess.Popen(
@@ -120,7 +128,7 @@ class AutopilotProcess:
                     env=environment,
                     # Ctrl-C is ours: we end it in order, and what it started: they are a group of their own.
                     start_new_session=True,
-                    preexec_fn=_die_with_parent if sys.platform == "linux" else None,
+                    preexec_fn=begin,
                 )
             except OSError as error:
                 raise FlightError(

@@ -115,12 +115,23 @@ def test_what_a_wrapper_has_started_is_asked_to_end_and_closes_its_log(tmp_path:
     assert (tmp_path / "kept.BIN").read_text() == "log\nend\n"
 
 
-def test_killed_we_leave_neither_program_nor_folder(tmp_path: Path) -> None:
+# Killed when the program runs, and we know nothing of it yet.
+HELD_AT_THE_START = """start = subprocess.Popen
+def held(*words, **options):
+    started = start(*words, **options)
+    time.sleep(60 if "preexec_fn" in options else 0)
+    return started
+subprocess.Popen = held
+"""
+
+
+@pytest.mark.parametrize("first", ["", HELD_AT_THE_START])
+def test_killed_we_leave_neither_program_nor_folder(tmp_path: Path, first: str) -> None:
     program = wrapper(tmp_path, STUBBORN.format(tmp_path))
     code = (
-        "import sys, tempfile, time; from pathlib import Path\n"
+        "import os, subprocess, sys, tempfile, time; from pathlib import Path\n"
         "from tests.flight.autopilots.arduplane_sitl.test_autopilot_process import started\n"
-        "tempfile.tempdir = sys.argv[2]\n"
+        f"tempfile.tempdir = sys.argv[2]\n{first}"
         "with started(Path(sys.argv[1])): time.sleep(60)"
     )
     temporary = tmp_path / "temporary"
