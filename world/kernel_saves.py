@@ -35,8 +35,8 @@ class SavingTurns:
     def register(self) -> None:
         """Listen to numba from now on, as long as this process lives."""
         listen: Any = event.register
-        listen("numba:compile", _Listener(lambda: None, self._take))
-        listen("numba:compiler_lock", _Listener(lambda: self._count(1), lambda: self._count(-1)))
+        listen("numba:compile", _Around(lambda: None, self._take))
+        listen("numba:compiler_lock", _Around(lambda: self._count(1), lambda: self._count(-1)))
 
     def _count(self, step: int) -> None:
         """Count how often this thread has asked for the compiler, and end its turn where it lets go of it."""
@@ -59,7 +59,7 @@ class SavingTurns:
                 time.sleep(0.002)
 
 
-class _Listener(event.Listener):
+class _Around(event.Listener):
     """Calls one function at the beginning and another at the end of what it listens to."""
 
     def __init__(self, begin: Any, end: Any) -> None:

@@ -21,7 +21,8 @@ LINUX_ALONE = {
     "os.getuid": set(),
     "os.geteuid": set(),
     "os.fork": set(),
-    "os.killpg": set(),
+    # Programs of ArduPlane run on Linux and macOS.
+    "os.killpg": {"flight/autopilots/arduplane_sitl/process.py"},
     "os.setsid": set(),
     "os.set_blocking": {"planfly/terminal/signal_watch.py"},
     "signal.pthread_sigmask": {"world/interruption.py"},
