@@ -22,7 +22,7 @@ html_title = "planfly"
 html_show_sourcelink = False
 html_copy_source = False
 myst_enable_extensions = ["deflist", "dollarmath"]
-myst_heading_anchors = 3
+myst_heading_anchors = 4
 # `name` in a docstring is code.
 default_role = "code"
 autodoc_typehints = "signature"

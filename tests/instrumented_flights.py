@@ -303,12 +303,14 @@ def _to_body(force: Floats, roll: Floats, pitch: Floats, yaw: Floats) -> Floats:
 
 
 def _late(values: Floats, time: Floats, delay: float, lag: float) -> Floats:
-    """Behind a lag, step by step, and a delay."""
+    """Behind a first-order lag, exactly for values that are straight between samples, and a delay."""
     made = values.copy()
     if lag > 0.0:
-        decay = math.exp(-(time[1] - time[0]) / lag)
+        step = float(time[1] - time[0])
+        decay = math.exp(-step / lag)
+        slope = (1.0 - decay) * lag / step
         for k in range(1, len(made)):
-            made[k] = decay * made[k - 1] + (1.0 - decay) * values[k]
+            made[k] = decay * made[k - 1] + (slope - decay) * values[k - 1] + (1.0 - slope) * values[k]
     return np.column_stack([np.interp(time - delay, time, column) for column in made.T])
 
 
