@@ -86,7 +86,8 @@ class Verdict:
     program: of a flown verdict, the real autopilot that flew, None where none did.
     parameters: of a flown verdict, those of the ArduPlane that flew, by its law or itself; None where none did.
     unjudged: what was not judged, so that the flight is not flyable although nothing failed; "" for nothing: items that
-    the log of an imported flight lacks, or slopes that the aircraft is not known well enough for.
+    the log of an imported flight lacks, its end, or slopes that the aircraft is not known well enough for.
+    imported: of a flight that another program logged, which was flown as planned or was not.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -107,6 +108,19 @@ class Verdict:
     program: AutopilotProgram | None = None
     parameters: Parameters | None = None
     unjudged: str = ""
+    imported: bool = False
+
+    @property
+    def answer(self) -> str:
+        """The verdict in a few words.
+
+        >>> Verdict((), flyable=False, complete=True, lines=(), level="flown", imported=True).answer
+        'not flown as planned'
+        """
+        if self.undecided:
+            return "not judged in full"
+        yes = "flown as planned" if self.imported else "flyable"
+        return yes if self.flyable else f"not {yes}" if self.complete else "incomplete"
 
     @property
     def undecided(self) -> bool:
@@ -129,9 +143,7 @@ class Verdict:
         return tuple(finding for finding in self.findings if finding.ok is False)
 
     def __repr__(self) -> str:
-        answer = "flyable" if self.flyable else "not flyable" if self.complete else "incomplete"
-        answer = "not judged in full" if self.undecided else answer
-        return f"<Verdict {self.level}: {answer}; {len(self.findings)} findings, {len(self.failed)} failed>"
+        return f"<Verdict {self.level}: {self.answer}; {len(self.findings)} findings, {len(self.failed)} failed>"
 
     def to_junit(self, name: str) -> str:
         """The verdict as JUnit XML, as continuous integration shows test results.  name: of what was judged."""

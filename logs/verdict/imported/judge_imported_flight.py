@@ -221,10 +221,10 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
     findings = (*findings, *(judge(setup, flown, log_complete) for judge in ends))
     failed = any(item.ok is False for item in findings)
-    unjudged = "" if source.missing is None else missing_text(source.missing)
+    unjudged = _ended_early(findings) if source.missing is None else missing_text(source.missing)
     flyable = bool(flown) and not failed and not unjudged
     complete = not unjudged and all(item.ok is True for item in findings if item.rule == "completion")
-    answer = [headline(findings, flyable)] if failed or not unjudged else []
+    answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
     own = LevelAnswer(setup.autopilot.level, flyable, "; ".join([*answer, *filter(None, [unjudged])]))
     lines = imported_lines(findings, setup, own, flown)
     return Verdict(
@@ -238,7 +238,14 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         leg_ends=_leg_ends(setup, flown),
         parameters=setup.autopilot.parameters,
         unjudged=unjudged,
+        imported=True,
     )
+
+
+def _ended_early(findings: Sequence[Finding]) -> str:
+    """That a log ends before its mission does, in words; "" where it does not, or says that the flight did."""
+    ends = [item.reason for item in findings if item.rule == "completion" and item.ok is None]
+    return f"not judged to the mission's end: {ends[0]}" if ends else ""
 
 
 def _of_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:

@@ -196,7 +196,7 @@ def _wind(setup: FlightSetup) -> str:
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     """List quantity, unit, first, second, second less first, as text."""
-    first, second = (_label(verdict) for verdict in comparison.verdicts)
+    first, second = (verdict.answer for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first, second, "")]
     for item in comparison.differences:
         digits = None if item.unit else 0
@@ -204,12 +204,6 @@ def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
         both = (number(value, digits=digits) for value in (item.first, item.second))
         rows.append((item.name, item.unit, *both, change))
     return rows
-
-
-def _label(verdict: Verdict) -> str:
-    if verdict.undecided:
-        return "not judged in full"
-    return "flyable" if verdict.flyable else "not flyable" if verdict.complete else "incomplete"
 
 
 def difference_lines(comparison: Comparison) -> list[str]:

@@ -197,15 +197,17 @@ def state_of(ok: bool | None) -> str:
 def badge_of(verdict: Verdict) -> Badge:
     """Put the verdict in a word: incomplete where nothing failed but the completion itself."""
     if verdict.flyable:
-        return Badge("pass", _SIGNS["pass"], "Flyable" if verdict.level == "flown" else "Flyable on paper, not flown")
+        word = verdict.answer.capitalize() + ("" if verdict.level == "flown" else " on paper, not flown")
+        return Badge("pass", _SIGNS["pass"], word)
     if verdict.level == "plan":
         return Badge("fail", _SIGNS["fail"], "Not flyable: no feasible plan")
     if verdict.undecided:
         return Badge("fail", _SIGNS["unjudged"], "Not judged in full")
+    word = "not flown as planned" if verdict.imported else "not flyable"
     broken = {finding.rule for finding in verdict.findings if finding.ok is False} - {"completion"}
     if not broken and not verdict.complete:
-        return Badge("fail", "!", "Incomplete, so not flyable")
-    return Badge("fail", _SIGNS["fail"], "Not flyable" if verdict.complete else "Not flyable, and incomplete")
+        return Badge("fail", "!", f"Incomplete, so {word}")
+    return Badge("fail", _SIGNS["fail"], word.capitalize() + ("" if verdict.complete else ", and incomplete"))
 
 
 def level_rows(verdict: Verdict, autopilot: Autopilot) -> list[LevelRow]:

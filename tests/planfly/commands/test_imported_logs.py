@@ -232,7 +232,7 @@ def test_a_flight_that_is_judged_in_part_is_so_in_every_command(tmp_path: Path, 
     assert main(["check", str(log), "--plan", str(plan)]) == 0
 
 
-def test_what_fails_on_the_items_that_the_log_holds_is_not_flyable(tmp_path: Path, capsys: Output) -> None:
+def test_what_fails_on_the_items_that_the_log_holds_is_not_flown_as_planned(tmp_path: Path, capsys: Output) -> None:
     """The third waypoint 300 m beside the flight."""
     raw = with_13_items()
     mission = raw.missions[0].mission
@@ -242,7 +242,7 @@ def test_what_fails_on_the_items_that_the_log_holds_is_not_flyable(tmp_path: Pat
     log = dataflash(tmp_path / "a.BIN", moved, without_items=range(7, 14))
     assert main(["check", str(log)]) == 4
     first = capsys.readouterr().out.splitlines()[0]
-    assert first.startswith("not flyable: ")
+    assert first.startswith("not flown as planned: ")
     assert first.endswith("; not judged beyond item 6: items 7 to 13 of 14 are not in the log or left out")
 
 

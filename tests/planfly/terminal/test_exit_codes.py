@@ -11,11 +11,11 @@ ROOT = Path(__file__).parents[3]
 PAGES = (ROOT / "README.md", ROOT / "docs" / "commands.md")
 # By the sentence that the pages have for each; 130 and 143 are what a shell gives a command that a signal ended.
 MEANT = {
-    "flyable": exit_codes.FLYABLE,
+    "flyable, or flown as planned": exit_codes.FLYABLE,
     "internal or system error": exit_codes.FAULT,
     "incorrect usage or invalid input": exit_codes.BAD_INPUT,
     "finished, but data of a damaged log is lost": exit_codes.LOSS,
-    "not flyable, or no feasible plan": exit_codes.NOT_FLYABLE,
+    "not flyable, not flown as planned, or no feasible plan": exit_codes.NOT_FLYABLE,
     "stopped by SIGINT (Ctrl-C), 143 by SIGTERM": exit_codes.INTERRUPTED,
 }
 

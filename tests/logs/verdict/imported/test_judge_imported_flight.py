@@ -136,15 +136,16 @@ def test_a_log_that_ends_on_the_way_says_nothing_of_the_rest(tmp_path: Path) -> 
     time = example_raw_log().series["position"].time
     flight = judged(tmp_path, with_rows(time < 90.0), AEROSONDE)
     assert outcome(flight, "completion") == [None]
-    assert flight.verdict.flyable
-    assert not flight.verdict.complete
+    assert not flight.verdict.flyable
+    assert flight.verdict.undecided
+    assert flight.verdict.headline.startswith("not judged to the mission's end: ")
     # The last waypoint was not reached, and that is no fault.
     assert outcome(flight, "waypoint") == [True, True, None]
 
 
 def test_a_flight_without_auto_is_not_judged(tmp_path: Path) -> None:
     flight = judged(tmp_path, with_modes((20.0, "FBWA")))
-    assert flight.verdict.headline == "not flyable: completion (no stretch of it followed the mission)"
+    assert flight.verdict.headline == "not flown as planned: completion (no stretch of it followed the mission)"
     assert "Judged: nothing, for no stretch followed the mission" in flight.verdict.lines
 
 
