@@ -5,6 +5,7 @@ geometries have a `layer`, and points an `extent`; its schema is public (https:/
 either, a zone without a restriction keeps nobody out.
 """
 
+import math
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -155,8 +156,11 @@ def _limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[st
         return None
     try:
         height = float(value)
-    except (TypeError, ValueError) as error:
-        raise _refused(source, "", f"{side} limit", "a number is expected") from error
+    except (TypeError, ValueError):
+        height = math.nan
+    # A limit of infinity is one that there is not.
+    if not height > -math.inf:
+        raise _refused(source, "", f"{side} limit", "a number is expected")
     if side == "upper" and height >= _UNLIMITED:
         return None
     if _word(unit) not in _UNITS:

@@ -1,5 +1,6 @@
 """What files of zones say beside their shapes: kind, floor and ceiling, as entries of a [[zones]] table."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,6 +11,8 @@ from world.errors import ScenarioError
 PUBLISHED = "published"
 # Another: its limits stand the wrong way round in the file.
 UPSIDE_DOWN = "upside_down"
+# And another: its upper limit leaves no height to keep out of, and is not taken.
+NO_BAND = "no_band"
 # Keys that mean what they mean in a scenario file.
 _OWN = ("kind", "floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
 # A property that begins so and is none of ours, nor another's that is read, may be one of ours misspelt.
@@ -70,16 +73,25 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
     """As `zone_entries`, of limits that an authority states, marked `PUBLISHED`.
 
-    A lower limit above the upper one (both above the sea, or both above ground) is taken for the upper, and the other
-    way round, and marked `UPSIDE_DOWN`: in authorities' files some stand so.
+    In authorities' files some limits leave no height to keep out of.  A lower limit above the upper one (both above the
+    sea, or both above ground) is taken for the upper, and the other way round, and marked `UPSIDE_DOWN`.  An upper
+    limit of 0 or below may stand for none, or for the lower one: the zone is one of all heights.  An upper limit that
+    equals the lower one is not taken.  Zones of both kinds are marked `NO_BAND`.
 
     >>> high, low = ({"value": feet, "unit": "FT", "referenceDatum": "MSL"} for feet in (1000, 500))
     >>> published_entries({"lowerLimit": high, "upperLimit": low}, "a file")["ceiling_amsl_m"]
     304.8
+    >>> published_entries({"lowerLimit": high, "upperLimit": high}, "a file")
+    {'kind': 'exclusion', 'floor_amsl_m': 304.8, 'published': True, 'no_band': True}
     """
     lower, upper = limits.get("lowerLimit"), limits.get("upperLimit")
-    heights = [_compared(limit) for limit in (lower, upper)]
-    if heights[0] is None or heights[1] is None or heights[0][0] != heights[1][0] or heights[0] <= heights[1]:
+    low, high = _compared(lower), _compared(upper)
+    if high is not None and (high[1] <= 0.0 or low == high):
+        entries = zone_entries({**limits, "upperLimit": None}, source)
+        if high[1] <= 0.0:
+            entries = {key: value for key, value in entries.items() if not key.startswith("floor")}
+        return {**entries, PUBLISHED: True, NO_BAND: True}
+    if low is None or high is None or low[0] != high[0] or low < high:
         return {**zone_entries(limits, source), PUBLISHED: True}
     turned = {**limits, "lowerLimit": upper, "upperLimit": lower}
     return {**zone_entries(turned, source), PUBLISHED: True, UPSIDE_DOWN: True}
@@ -90,7 +102,7 @@ def _compared(limit: Any) -> tuple[bool, float] | None:
     if not isinstance(limit, dict):
         return None
     try:
-        return _DATUMS[limit["referenceDatum"]] == "agl", limit["value"] * _UNITS[limit["unit"]]
+        return _DATUMS[limit["referenceDatum"]] == "agl", round(limit["value"] * _UNITS[limit["unit"]], 3)
     except (KeyError, TypeError):
         return None
 
@@ -117,7 +129,7 @@ def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
         allowed = "a table of value, unit and referenceDatum is expected"
         raise ScenarioError.at(source, key, value, allowed, shown="")
     height, unit, datum = value.get("value"), value.get("unit"), value.get("referenceDatum")
-    if isinstance(height, bool) or not isinstance(height, int | float):
+    if isinstance(height, bool) or not isinstance(height, int | float) or not math.isfinite(height):
         raise ScenarioError.at(source, f"{key}.value", height, "a number is expected", shown="")
     # A list, say, is not even looked for.
     if not isinstance(unit, int | str) or unit not in _UNITS:
@@ -127,8 +139,10 @@ def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
         allowed = f"allowed {', '.join(map(str, _DATUMS))}"
         raise ScenarioError.at(source, f"{key}.referenceDatum", datum, allowed, shown="")
     side, metres, counted = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
-    if side == "floor" and counted == "agl" and metres <= 0.0:
-        return {}
+    if counted == "agl" and metres <= 0.0:
+        if side == "floor":
+            return {}
+        raise ScenarioError.at(source, key, value, "above 0 is expected: nothing lies below the ground", shown="")
     if _UNITS[unit] == _UNITS["FL"]:
         counted = "standard"
     if counted in _LOOSE:

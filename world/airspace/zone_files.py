@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from world.airspace.geopackage import geopackage_features
 from world.airspace.openair import is_openair, openair_zones
 from world.airspace.uas_zones import ed269_zones, ed318_zones, is_ed269, is_ed318
-from world.airspace.zone_entries import PUBLISHED, UPSIDE_DOWN, zone_entries
+from world.airspace.zone_entries import NO_BAND, PUBLISHED, UPSIDE_DOWN, zone_entries
 from world.airspace.zone_suffixes import GEOPACKAGE, SUFFIXES
 from world.airspace.zones import holes_lie_inside, mended_rings
 from world.errors import ScenarioError
@@ -280,6 +280,7 @@ FORMATS: dict[str, Reader] = {
 _CROSSED = "outlines that cross themselves are taken as the area they enclose"
 _EMPTY = "outlines that enclose no area are left out"
 _TURNED = "lower and upper limits that stand the wrong way round are swapped"
+_NO_BAND = "upper limits of 0, or equal to the lower one, are taken for none: no ceiling"
 # Bytes of a file at most.
 MAX_BYTES = 64 * 2**20
 
@@ -339,7 +340,7 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
         message = f"{source}: suffix {path.suffix!r}: {allowed}"
         raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
     read, free = FileZones(), Counter[str]()
-    mended: dict[str, list[str]] = {_CROSSED: [], _TURNED: [], _EMPTY: []}
+    mended: dict[str, list[str]] = {_CROSSED: [], _TURNED: [], _NO_BAND: [], _EMPTY: []}
     for where, entries in _found(path, suffix, source):
         if isinstance(entries, str):
             free[entries] += 1
@@ -369,8 +370,8 @@ def read_zone_file(path: Path, source: str, most: int = MAX_ZONES) -> FileZones:
 
 def _mend(entries: dict[str, Any]) -> list[str]:
     """Mend the outline of an authority's zone; what was mended, in words: nothing of anyone else's zone."""
-    published, turned = entries.pop(PUBLISHED, False), entries.pop(UPSIDE_DOWN, False)
-    words = [_TURNED] if turned else []
+    published = entries.pop(PUBLISHED, False)
+    words = [said for mark, said in ((UPSIDE_DOWN, _TURNED), (NO_BAND, _NO_BAND)) if entries.pop(mark, False)]
     if published and "rings_deg" in entries and (rings := mended_rings(entries["rings_deg"])) is not None:
         words.append(_CROSSED if rings else _EMPTY)
         entries["rings_deg"] = rings

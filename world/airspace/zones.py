@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
+import numpy as np
 import shapely
 
 ZoneKind = Literal["inclusion", "exclusion"]
@@ -178,8 +179,8 @@ MENDED_BY = 1e-6
 def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[float]]] | None:
     """Rings of the area that an outline with its holes encloses, where they cross; none for an outline of no area.
 
-    rings: of [latitude, longitude], the outline first.  The area is larger by `MENDED_BY` on all sides.  Returns None
-    where nothing is to be mended.
+    rings: of [latitude, longitude], the outline first.  One that does not lie inside another is no hole: it is a part
+    of the area.  The area is larger by `MENDED_BY` on all sides.  Returns None where nothing is to be mended.
 
     >>> len(mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]]))  # both halves of a bow tie, joined in the middle
     1
@@ -188,15 +189,41 @@ def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[f
     """
     if any(len(ring) < 3 for ring in rings) or not all(math.isfinite(x) for ring in rings for at in ring for x in at):
         return None
-    shape = shapely.Polygon(rings[0], rings[1:])
-    if shape.is_valid:
+    if shapely.Polygon(rings[0], rings[1:]).is_valid:
         return None
-    made = shapely.make_valid(shape, method="structure", keep_collapsed=False)
+    made = _enclosed([shapely.Polygon(ring) for ring in rings])
     grown = made.buffer(MENDED_BY, join_style="mitre") if made.area > 0.0 else made
     parts = [one for one in shapely.get_parts(grown) if isinstance(one, shapely.Polygon) and not one.is_empty]
     return [
         [list(corner) for corner in ring.coords[:-1]] for part in parts for ring in (part.exterior, *part.interiors)
     ]
+
+
+def _enclosed(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
+    """The area of rings, each mended alone: a ring inside an odd number of others is a hole, in those that hold it.
+
+    Inside is what is beyond the other by `MENDED_BY` at most; of two rings that are the same, neither is.  A ring that
+    crosses another one, touches it from outside or lies apart from it is a part of the area.
+    """
+    made = shapely.make_valid(np.array(rings), method="structure", keep_collapsed=False)
+    made = made[shapely.area(made) > 0.0]
+    grown = shapely.buffer(made, MENDED_BY, join_style="mitre")
+    held = {(int(outer), int(inner)) for outer, inner in shapely.STRtree(made).query(grown, predicate="covers").T}
+    within: list[list[int]] = [[] for _ in made]
+    for outer, inner in held:
+        if (inner, outer) not in held:
+            within[inner].append(outer)
+    holes: list[list[int]] = [[] for _ in made]
+    for inner, outers in enumerate(within):
+        if len(outers) % 2:
+            for outer in outers:
+                holes[outer].append(inner)
+    parts = [
+        shapely.difference(made[k], shapely.union_all(made[holes[k]]))
+        for k in range(len(made))
+        if not len(within[k]) % 2
+    ]
+    return shapely.union_all(parts)
 
 
 def holes_lie_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:

@@ -83,6 +83,29 @@ def test_limits_the_wrong_way_round_are_swapped_and_said(tmp_path: Path) -> None
     ]
 
 
+@pytest.mark.parametrize(
+    ("limits", "wanted"),
+    [
+        ("AL GND\nAH 0", (None, None)),
+        ("AL 0ft AGL\nAH 0ft AGL", (None, None)),
+        ("AL 500ft AGL\nAH 0", (None, None)),
+        ("AL 1000m AMSL\nAH 1000m AMSL", (1000.0, None)),
+        ("AL FL95\nAH 9500ft AMSL", (9500 * 0.3048 - 400.0, None)),
+    ],
+)
+def test_limits_that_leave_no_height_lose_the_upper_one(
+    limits: str, wanted: tuple[float | None, float | None], tmp_path: Path
+) -> None:
+    path = tmp_path / "zones.openair"
+    path.write_text(f"AC P\nAN R1\n{limits}\n{SQUARE}", encoding="utf-8")
+    found = read_zone_file(path, "z.openair")
+    (zone,) = found.zones
+    assert (zone.floor_agl_m, zone.ceiling_agl_m) == (None, None)
+    assert (zone.floor_amsl_m, zone.ceiling_amsl_m) == pytest.approx(wanted)
+    said = "z.openair: upper limits of 0, or equal to the lower one, are taken for none: no ceiling: R1 (P)"
+    assert found.notes == [said]
+
+
 def test_a_circle_is_a_cylinder() -> None:
     entries = entries_of(f"{HEAD}V X=46:00:00N 008:00:00E\nDC 2.5")
     assert (entries["lat_deg"], entries["lon_deg"], entries["radius_m"]) == (46.0, 8.0, 2.5 * 1852.0)

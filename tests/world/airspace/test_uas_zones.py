@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import shapely
 
 from world.airspace.zone_files import FileZones, geojson_zones, read_zone_file
 from world.errors import ScenarioError
@@ -209,3 +210,83 @@ def test_limits_the_wrong_way_round_are_swapped_and_said(tmp_path: Path) -> None
         {"floor_agl_m": 10.0, "ceiling_agl_m": 120.0},
     ]
     assert found.notes == ["z.json: lower and upper limits that stand the wrong way round are swapped: lake 1/2"]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "datum", "wanted"),
+    [
+        (0, 0, "AGL", {}),
+        (0, 0, "AMSL", {}),
+        (-10, 0, "AMSL", {}),
+        # An upper limit that there is not, or 0 to 150 m the wrong way round: neither side may be opened.
+        (150, 0, "AGL", {}),
+        (150, 150, "AGL", {"floor_agl_m": 150.0}),
+        (150, 150, "AMSL", {"floor_amsl_m": 150.0}),
+    ],
+)
+def test_limits_that_leave_no_height_lose_the_upper_one(
+    low: float, high: float, datum: str, wanted: dict[str, float], tmp_path: Path
+) -> None:
+    references = {"lowerVerticalReference": datum, "upperVerticalReference": datum}
+    said = ["z.json: upper limits of 0, or equal to the lower one, are taken for none: no ceiling: lake"]
+    for data in (
+        ed269(volume(low=low, high=high, **references)),
+        ed318(POLYGON | {"layer": layer(low, high, datum)}),
+    ):
+        found = read(data, tmp_path)
+        assert [limits_of(zone) for zone in found.zones] == [wanted]
+        assert found.notes == said
+    # A metre of height is one.
+    assert read(ed269(volume(low=low, high=max(low, 0) + 1, **references)), tmp_path).notes == []
+
+
+@pytest.mark.parametrize("limit", ["nan", "-inf"])
+def test_a_limit_that_is_no_number_is_refused(limit: str, tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="a number is expected"):
+        read(ed269(volume(high=limit)), tmp_path)
+
+
+SQUARES = {
+    # Beside the square from 46.0, 8.0 to 46.1, 8.1: the corner and the size of another, and the area of both.
+    "sharing a corner": ((46.1, 8.1), 0.1, 0.02),
+    "sharing an edge": ((46.0, 8.1), 0.1, 0.02),
+    "overlapping": ((46.05, 8.05), 0.1, 0.0175),
+    "apart": ((46.3, 8.3), 0.1, 0.02),
+    "the same twice": ((46.0, 8.0), 0.1, 0.01),
+    "around it": ((45.9, 7.9), 0.3, 0.08),
+    "inside, along an edge": ((46.02, 8.0), 0.05, 0.0075),
+}
+
+
+def square(lat: float, lon: float, side: float) -> list[list[float]]:
+    """Corners as [longitude, latitude], the first again at the end."""
+    return [[lon + side * x, lat + side * y] for x, y in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))]
+
+
+@pytest.mark.parametrize("case", SQUARES)
+def test_a_second_ring_that_is_no_hole_is_a_part_of_the_area(case: str, tmp_path: Path) -> None:
+    """Areas in square degrees, by hand; the rings are laid over each other by shapely."""
+    corner, side, area = SQUARES[case]
+    rings = [square(46.0, 8.0, 0.1), square(*corner, side)]
+    found = read(ed269(volume({"type": "Polygon", "coordinates": rings})), tmp_path)
+    (zone,) = found.zones
+    made = shapely.Polygon()
+    for ring in zone.rings_deg or []:
+        made = made.symmetric_difference(shapely.Polygon(ring))
+    assert made.area == pytest.approx(area, rel=1e-3)
+    assert found.notes == ["z.json: outlines that cross themselves are taken as the area they enclose: lake"]
+
+
+def test_holes_of_a_mended_outline_stay_holes_and_islands_in_them_stay_land(tmp_path: Path) -> None:
+    """100 less 36 more 4 hundredths of a square degree, beside a square of 4; a hole that crosses itself is one too."""
+    rings = [square(46, 8, 1.0), square(46.2, 8.2, 0.6), square(46.4, 8.4, 0.2), square(47.0, 9.0, 0.2)]
+    (zone,) = read(ed269(volume({"type": "Polygon", "coordinates": rings})), tmp_path).zones
+    made = shapely.Polygon()
+    for ring in zone.rings_deg or []:
+        made = made.symmetric_difference(shapely.Polygon(ring))
+    assert made.area == pytest.approx(1.0 - 0.36 + 0.04 + 0.04, rel=1e-3)
+    # A bow tie in the square: two triangles of 0.6 by 0.3.
+    bow = [[8.2, 46.2], [8.8, 46.8], [8.8, 46.2], [8.2, 46.8], [8.2, 46.2]]
+    (zone,) = read(ed269(volume({"type": "Polygon", "coordinates": [rings[0], bow]})), tmp_path).zones
+    outline, *holes = sorted((shapely.Polygon(ring) for ring in zone.rings_deg or []), key=lambda one: -one.area)
+    assert outline.area - sum(hole.area for hole in holes) == pytest.approx(1.0 - 0.18, rel=1e-3)

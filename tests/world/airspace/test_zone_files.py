@@ -458,6 +458,14 @@ def test_limits_as_they_are_published(case: str, tmp_path: Path) -> None:
     assert found == pytest.approx(limits)
 
 
+def test_an_upper_limit_at_the_ground_is_refused(tmp_path: Path) -> None:
+    """It would keep nobody out, and nobody would be told."""
+    path = tmp_path / "z.geojson"
+    path.write_text(json.dumps(openaip((0, "FT", "GND"), (0, "FT", "GND"))), encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"upperCeiling: above 0 is expected: nothing lies below the ground$"):
+        zone_files.read_zone_file(path, "z.geojson")
+
+
 OPENAIR = "AC R\nAN LAKE\nAH 2200ft AMSL\nAL GND\nV X=46:00:00 N 008:00:00 E\nDC 1.10\n"
 
 
