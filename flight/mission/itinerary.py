@@ -35,6 +35,7 @@ class Loiter:
     radius: m, positive to the right, 0 for the aircraft's own.
     turns, seconds: how long, 0 for what does not count; neither is shortened, and the circle is left on the first
         tangent to the next position after them.
+    timed: whether the item is one for a time, be that none.
     to_height: until the item's height is reached.
     endless: whether the item asks for a circle without end, of which ``seconds`` are flown.
     on_course: whether the item asks to leave it on the course to what follows, as PX4 reads it; ArduPlane always does.
@@ -44,6 +45,7 @@ class Loiter:
     radius: float
     turns: float = 0.0
     seconds: float = 0.0
+    timed: bool = False
     to_height: bool = False
     endless: bool = False
     on_course: bool = False
@@ -62,7 +64,7 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     if item.command == Command.NAV_LOITER_TURNS:
         return Loiter(p3, turns=p1, on_tangent=p4 > 0.0)
     if item.command == Command.NAV_LOITER_TIME:
-        return Loiter(p3, seconds=p1, on_course=p2 > 0.0, on_tangent=p4 > 0.0)
+        return Loiter(p3, seconds=p1, timed=True, on_course=p2 > 0.0, on_tangent=p4 > 0.0)
     if item.command == Command.NAV_LOITER_TO_ALT:
         # Its radius is the second parameter.
         return Loiter(p2, to_height=True, on_course=p1 > 0.0, on_tangent=p4 > 0.0)

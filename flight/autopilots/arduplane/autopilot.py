@@ -187,24 +187,30 @@ class ArduPlane(Autopilot):
 
 
 # A radius of so many metres or less is none to ArduPlane.  A mission's item holds that of LOITER_TURNS in a byte: whole
-# metres, or from this on whole tens of them (`AP_Mission::mavlink_int_to_mission_cmd`).
+# metres, or from this on whole tens of them; those without end and to a height have sixteen bits
+# (`AP_Mission::mavlink_int_to_mission_cmd`).
 _NO_RADIUS, _BYTE = 1.0, 255.0
 
 
 def radius_read(loiter: Loiter) -> float:
-    """The radius that ArduPlane reads of a loiter's item, m, 0 for none: that of turns, and to a height.
+    """The radius that ArduPlane reads of a loiter's item, m, 0 for none: that of turns, to a height, and without end.
 
-    For a time, or without end, it flies WP_LOITER_RAD, and takes of the item no more than the side.
+    For a time, be that none, it flies WP_LOITER_RAD, and takes of the item no more than the side: of the four
+    `Plane::verify_loiter_*` that of a time alone hands no radius of the item to `Plane::update_loiter`.
 
     >>> radius_read(Loiter(-250.7, turns=3)), radius_read(Loiter(307.0, turns=3)), radius_read(Loiter(1.0, turns=3))
     (250.0, 300.0, 0.0)
-    >>> radius_read(Loiter(200.0, to_height=True)), radius_read(Loiter(200.0, seconds=60.0))
-    (200.0, 0.0)
+    >>> radius_read(Loiter(307.0, seconds=60.0, endless=True)), radius_read(Loiter(200.0, to_height=True))
+    (307.0, 200.0)
+    >>> radius_read(Loiter(200.0, seconds=60.0, timed=True)), radius_read(Loiter(200.0, timed=True))
+    (0.0, 0.0)
     """
-    if loiter.seconds or loiter.endless:
+    if loiter.timed:
         return 0.0
+    if not math.isfinite(loiter.radius):
+        return abs(loiter.radius)
     stated = float(math.floor(abs(loiter.radius)))
-    if loiter.turns and stated > _BYTE:
+    if not (loiter.endless or loiter.to_height) and stated > _BYTE:
         stated = 10.0 * min(_BYTE, math.floor(stated / 10.0))
     return stated if stated > _NO_RADIUS else 0.0
 

@@ -35,12 +35,15 @@ from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.program import ProgramFlight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import profile, project
+from flight.mission.itinerary import UNLIMITED
 from flight.simulation.local_map import Ground
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Progress, SimulatedFlight, Sink, fly_to_end
 from flight.simulation.tick import (
+    NEAR,
     NOT_A_NUMBER,
     PATH_ROW,
+    WIDER,
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
@@ -68,7 +71,8 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     """Do a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
     The commands that stand in it are the other program's.  The flight completes where it passes the end of the path,
-    once the program says that it has nothing before it but that; a return to launch completes in its circle.
+    once the program says that it has nothing before it but that; a return to launch completes in its circle, and a
+    loiter without end after `UNLIMITED` on its own.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -78,12 +82,14 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
     last = path.waypoint[settings.waypoints - 1]
+    before = path.waypoint[settings.waypoints - 2]
     if last.returns and settings.on_last_leg:
         end_return(work.true, last, memory, work.timing.dt)
+    elif settings.on_last_leg and before.circle != 0.0 and before.stays == math.inf:
+        end_circling(work.true, before, memory, work.timing.dt)
     elif settings.on_last_leg:
         across, beyond = beyond_end(work.true, path.waypoint[: settings.waypoints])
         memory.done = beyond >= 0.0
-        before = path.waypoint[settings.waypoints - 2]
         # What circles at a mission's end, as wide as it can, has not missed it.
         memory.returning = before.circle != 0.0 and before.item == last.item
         if memory.done:
@@ -110,6 +116,29 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
     memory.cross_track = aside
     memory.leg = pieces[k].leg + (1 if distance > pieces[k].leg_change else 0)
     memory.height_error = true.up - profile(nodes, distance)[0]
+
+
+@inner
+def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
+    """Count how long a loiter without end was circled, and end the flight after `UNLIMITED`.
+
+    Seconds count from where the aircraft, near the circle, first flies around its middle in its direction more than to
+    it or from it; from then on they count however wide the circle is flown.
+
+    true: a record of `flight.guidance.navigation_error.MOTION`.
+    b: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` are the seconds.
+    """
+    out_e, out_n = true.east - b.centre_east, true.north - b.centre_north
+    away = max(0.1, math.hypot(out_e, out_n))
+    outwards = (true.velocity_east * out_e + true.velocity_north * out_n) / away
+    clockwise = (true.velocity_east * out_n - true.velocity_north * out_e) / away
+    around = math.copysign(1.0, b.circle) * clockwise
+    if memory.circled > 0.0 or (away < max(NEAR, WIDER * abs(b.circle)) and around > abs(outwards)):
+        memory.circled += dt
+    # As wide as it is flown it has not missed the mission's end.
+    memory.returning = True
+    memory.done = memory.circled > UNLIMITED
 
 
 @inner

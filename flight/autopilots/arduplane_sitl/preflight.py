@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from flight.autopilots.arduplane_sitl.link import AutopilotLink
 from flight.live.mission_server import MissionType, to_message
 from flight.mission.items import Command, Frame, Home, MissionItem, command_name, on_grid
-from flight.mission.itinerary import UNLIMITED, loiter_of
+from flight.mission.itinerary import loiter_of
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from world.errors import FlightError
@@ -32,7 +32,8 @@ Floats = NDArray[np.float64]
 # What a flight from air to air cannot hold is made a waypoint where the route has it: a take-off, a landing.  A place
 # more, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it takes a waypoint as
 # reached a radius early, and returns to launch after the last.  A mission that ends with a return to launch has that at
-# its end, and its rally points go with it.
+# its end, and its rally points go with it; one that ends with a loiter without end has that, of which the flight's own
+# clock counts a minute.
 
 
 # From the end of the route to the place more, m.
@@ -48,7 +49,7 @@ class UploadedMission:
     """What goes to the autopilot.
 
     home: its home; alt is AMSL.
-    items: numbered from 1; the last is the place more, or a return to launch.
+    items: numbered from 1; the last is the place more, a return to launch, or a loiter without end.
     rally: the points that a return may go to, numbered from 0; none without a return.
     """
 
@@ -71,9 +72,9 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
             kept.append(item)
     if not any(item.has_position for item in kept):
         kept = _of_route(route, origin)
-    elif route.items[-1] == -1:
+    elif route.items[-1] == -1 and kept[-1].command != Command.NAV_LOITER_UNLIM:
         kept.append(_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
-    if route.return_from >= 0:
+    if route.return_from >= 0 or kept[-1].command == Command.NAV_LOITER_UNLIM:
         return UploadedMission(_home(setup), _renumbered(kept), setup.mission.rally)
     kept.append(_waypoint(kept[-1].seq + 1, _straight_on(route), 0.0, origin))
     return UploadedMission(_home(setup), _renumbered(kept))
@@ -91,11 +92,8 @@ def _place(
     if not item.has_position:
         centre = next(place for place in reversed(before) if place.has_position)
         lat, lon = centre.lat_deg, centre.lon_deg
-    command, params = item.command, tuple(0.0 if math.isnan(value) else value for value in item.params)
-    if command == Command.NAV_LOITER_UNLIM:
-        command, params = Command.NAV_LOITER_TIME, (UNLIMITED, *params[1:])
-    p1, p2, p3, p4 = params
-    return MissionItem(item.seq, int(command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(last[2]))
+    p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
+    return MissionItem(item.seq, int(item.command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(last[2]))
 
 
 def _of_route(route: Route, origin: GeoOrigin) -> list[MissionItem]:

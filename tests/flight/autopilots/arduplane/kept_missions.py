@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import load_parameters
+from flight.mission.items import Mission
 from flight.mission.itinerary import loiter_of
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
@@ -24,7 +25,7 @@ FOLDER = Path(__file__).with_name("kept_circles")
 Floats = NDArray[np.float64]
 
 CORNERS = ("corners-30", "corners-35")
-CIRCLES = ("turns-500", "turns-1300", "turns-2000", "time", "time-left", "to-height", "unlimited", "circles-wind")
+CIRCLES = ("turns-500", "turns-1300", "turns-2000", "time", "time-left", "to-height", "circles-wind")
 _ROLL_LIMITS = {"corners-35": 35.0}
 _WINDS = {"circles-wind": {"speed_mps": 4.0, "from_deg": 300.0}}
 # A waypoint is passed where the aircraft, this near to it, comes no nearer, m.
@@ -113,11 +114,15 @@ def middles(flight: str) -> list[Floats]:
 @functools.cache
 def kept_setup(flight: str) -> FlightSetup:
     """A flight's setup for the law, with exact navigation."""
-    mission = parse_mission(_text(flight), f"{flight}.waypoints")
+    return setup_by_law(parse_mission(_text(flight), f"{flight}.waypoints"), flight)
+
+
+def setup_by_law(mission: Mission, flight: str = "") -> FlightSetup:
+    """A mission's setup for the law, as the kept flights have theirs; flight: one of them, for its wind and limits."""
     assert mission.home is not None
     ends = {"east_m": 0.0, "north_m": -3000.0, "amsl_m": 500.0}
     spec = {
-        "name": flight,
+        "name": flight or "circles",
         "origin": {"lat_deg": mission.home.lat_deg, "lon_deg": mission.home.lon_deg},
         "terrain": {"kind": "flat", "amsl_m": 0.0},
         "area": {"east_m": [-20000, 20000], "north_m": [-20000, 20000], "ceiling_amsl_m": 4000},
@@ -125,7 +130,7 @@ def kept_setup(flight: str) -> FlightSetup:
         "destination": ends | {"north_m": 4000.0},
         "wind": _WINDS.get(flight, {}),
     }
-    scenario = from_spec(spec, flight)
+    scenario = from_spec(spec, flight or "circles")
     airframe = load_airframe(scenario)
     law = ArduPlane(load_parameters(airframe.aircraft))
     if flight in _ROLL_LIMITS:

@@ -1,9 +1,17 @@
 """Corners beyond 100 degrees and circles of four kinds, by planfly's law as ArduPlane itself flew them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import load_parameters
+from flight.simulation.simulate import simulate
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from planfly.airframe import load_airframe
+from planfly.pipeline import make_setup
 from tests.flight.autopilots.arduplane.kept_missions import (
     CIRCLES,
     CORNERS,
@@ -12,8 +20,10 @@ from tests.flight.autopilots.arduplane.kept_missions import (
     kept,
     kept_setup,
     middles,
+    setup_by_law,
     simulated,
 )
+from tests.mission_lines import mission, wp
 
 # Spheres beside the circles of the kept flights: how far from the middle, towards east and north, with 400 m.
 SPHERES = {
@@ -21,7 +31,6 @@ SPHERES = {
     "turns-1300": [(-670.0, 0.0)],
     "turns-2000": [(-680.0, 0.0)],
     "time": [(434.9, 434.9), (615.0, 0.0), (434.9, -434.9), (-434.9, -434.9), (-615.0, 0.0)],
-    "unlimited": [(434.9, 434.9), (615.0, 0.0), (434.9, -434.9), (-434.9, -434.9), (-615.0, 0.0), (0.0, 615.0)],
 }
 
 
@@ -44,7 +53,7 @@ def test_circles_have_the_radius_that_was_flown(flight: str, k: int) -> None:
     assert by_law(flight).radius(middle) == pytest.approx(kept(flight).radius(middle), rel=0.02)
 
 
-@pytest.mark.parametrize(("flight", "k"), [("time", 0), ("time-left", 0), ("unlimited", 0), ("circles-wind", 1)])
+@pytest.mark.parametrize(("flight", "k"), [("time", 0), ("time-left", 0), ("circles-wind", 1)])
 def test_circles_too_tight_for_the_bank_are_as_wide_as_they_were_flown(flight: str, k: int) -> None:
     """They are off their middle, by how they were come to: 63 m at 500 m, which take 116 m of radius."""
     middle = middles(flight)[k]
@@ -62,8 +71,7 @@ def test_circles_are_come_to_by_their_middle_and_left_when_arduplane_left_them(f
     for middle in middles(flight):
         law, real = by_law(flight), kept(flight)
         assert law.away(middle).min() == pytest.approx(real.away(middle).min(), abs=9.0)
-        if flight != "unlimited":
-            assert law.left(middle) == pytest.approx(real.left(middle), abs=2.5)
+        assert law.left(middle) == pytest.approx(real.left(middle), abs=2.5)
     assert by_law(flight).ended == "completed"
 
 
@@ -72,8 +80,7 @@ def test_spheres_beside_circles_are_kept_or_entered_as_by_arduplane(flight: str)
     """Within 4 m, which is what its satellites' error makes of a circle."""
     for east, north in SPHERES[flight]:
         law, real = (_outside(flown, east, north) for flown in (by_law(flight), kept(flight)))
-        # Of the circles without end one minute is flown.
-        assert law == pytest.approx(real, abs=6.0 if flight == "unlimited" else 4.0)
+        assert law == pytest.approx(real, abs=4.0)
         assert (law < 0.0) == (real < 0.0) or abs(real) < 2.0
 
 
@@ -96,9 +103,34 @@ def test_a_circle_that_a_parameter_makes_too_tight_is_no_fault_of_the_mission() 
     assert "WP_LOITER_RAD asks for less than the 116 m of the bank limit: flown wider" in item.reason
 
 
-@pytest.mark.parametrize("flight", ["time", "unlimited", "to-height"])
+@pytest.mark.parametrize("flight", ["time", "to-height"])
 def test_circles_that_harm_nothing_are_flyable(flight: str) -> None:
     done = simulated(flight)
     verdict = judge_flight(kept_setup(flight), done.track, done.ended)
     assert verdict.flyable, verdict.headline
     assert judge_geometry(kept_setup(flight)).flyable
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "radius"),
+    [
+        # Without end the item's radius is flown, beyond a byte in whole metres (`Plane::verify_loiter_unlim`): 307 m by
+        # the standard atmosphere's 1.2250 over 1.1901 kg/m^3 at 300 m.
+        (17, "0 0 307.9 0", 316.0),
+        # For a time WP_LOITER_RAD is, be that time none (`Plane::verify_loiter_time`): here 250 m.
+        (19, "60 0 307 0", 257.3),
+        (19, "0 0 307 0", 257.3),
+    ],
+)
+def test_without_end_the_items_radius_is_flown_and_for_a_time_never(command: int, params: str, radius: float) -> None:
+    onward = () if command == 17 else (wp(-3000, 1000),)
+    read = mission(wp(0, 0, 0.0), wp(0, 1500, 0.0, command=command, p=params), *onward)
+    setup = setup_by_law(read)
+    law = ArduPlane(load_parameters(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
+    airframe = replace(load_airframe(setup.scenario), autopilot=law)
+    setup = replace(make_setup(setup.scenario, airframe, read, 1), nav="perfect")
+    assert setup.route.arcs.max() == pytest.approx(radius, abs=0.5)
+    done = simulate(setup, airframe.aircraft)
+    assert done.ended == "completed"
+    track = Flown(done.track.time[::20], done.track.position[::20], np.zeros((0, 2)))
+    assert track.radius(np.array([0.0, 1500.0])) == pytest.approx(radius, rel=0.02)

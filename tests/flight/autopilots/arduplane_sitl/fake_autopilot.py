@@ -168,15 +168,22 @@ class Fake:
         v_north, v_east, v_down = state["velocity"]
         roll, pitch, _ = state["attitude"]
         p, q, _ = state["imu"]["gyro"]
-        while self.items[self.current].command != mavlink.MAV_CMD_NAV_WAYPOINT:
+        while self.items[self.current].command not in (mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_LOITER_UNLIM):
             self.current += 1
-        to_north, to_east, to_down = self.place(self.items[self.current])
+        item = self.items[self.current]
+        to_north, to_east, to_down = self.place(item)
         distance = math.hypot(to_north - north, to_east - east)
         ahead = (to_north - north) * v_north + (to_east - east) * v_east
         if (distance < 10.0 or (distance < 60.0 and ahead < 0.0)) and self.current + 1 < len(self.items):
             self.current += 1
-        turn = math.remainder(math.atan2(to_east - east, to_north - north) - math.atan2(v_east, v_north), math.tau)
-        bank = max(-0.5, min(0.5, 1.5 * turn))
+        wanted, level = math.atan2(to_east - east, to_north - north), 0.0
+        if item.command == mavlink.MAV_CMD_NAV_LOITER_UNLIM and distance < 2.0 * abs(item.param3):
+            # Around its middle: square to the way there on the rim, towards it outside, and banked for the circle.
+            side, radius = math.copysign(1.0, item.param3), abs(item.param3)
+            wanted += side * (math.atan(4.0 * (distance - radius) / radius) - 0.5 * math.pi)
+            level = side * math.atan((v_north**2 + v_east**2) / (9.80665 * radius))
+        turn = math.remainder(wanted - math.atan2(v_east, v_north), math.tau)
+        bank = max(-0.5, min(0.5, level + 1.5 * turn))
         climb = max(-3.0, min(3.0, 0.3 * (down - to_down)))
         aim = 0.06 + 0.05 * (climb + v_down)
         aileron = 0.6 * (bank - roll) - 0.1 * p

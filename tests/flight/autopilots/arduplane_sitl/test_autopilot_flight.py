@@ -18,6 +18,7 @@ from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.simulation.setup import FlightSetup
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
+from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
 from tests.soak import some
 from world.errors import FlightError
@@ -112,6 +113,20 @@ def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
     assert str(failed.value).startswith(f"{program}: {said}")
     assert "\n" not in str(failed.value)
     assert (children(), left_behind()) == (before, folders)
+
+
+def test_a_loiter_without_end_is_flown_with_its_own_radius_for_a_minute(fake_autopilot: MakeFake) -> None:
+    """The program circles on; the flight's clock counts from the circle on, and ends it there."""
+    setup = setup_of(wp(0, 0), wp(0, 1000, command=17, p="0 0 -250 0"))
+    flown, _ = fly_autopilot(setup, AEROSONDE, fake_autopilot("none"), {})
+    assert flown.ended == "completed"
+    away = np.hypot(*(flown.track.position[:, :2] - (0.0, 1000.0)).T)
+    # 750 m to the rim at 25 m/s are 30 s, then a minute, in the circle alone once it has settled.
+    assert 85.0 < flown.track.time[-1] < 105.0
+    assert away[flown.track.time > 45.0] == pytest.approx(250.0, rel=0.15)
+    around = np.unwrap(np.arctan2(*(flown.track.position[:, :2] - (0.0, 1000.0)).T))
+    # 60 s at 25 m/s on 250 m are 6 rad, to the left.
+    assert around[-1] - around[0] == pytest.approx(-6.0, abs=1.0)
 
 
 def test_a_dive_into_the_ground_is_a_flight_that_ended_so(fake_autopilot: MakeFake) -> None:

@@ -110,7 +110,7 @@ def test_a_jump_leads_to_the_item_that_it_named() -> None:
     assert [command for _, command, _ in kept] == [16, 16, 16, 177, 16, 16]
 
 
-def test_a_loiter_keeps_its_centre_and_its_turns_and_one_without_end_gets_the_routes() -> None:
+def test_a_loiter_keeps_its_centre_and_its_turns_and_one_without_end_stays_and_is_the_last() -> None:
     turns, endless = (2.0, 0.0, -150.0, 0.0), (0.0, 0.0, 150.0, 0.0)
     setup = setup_of(
         place(1, 0.0), place(2, 1500.0, 80.0, C.NAV_LOITER_TURNS, params=turns),
@@ -118,7 +118,9 @@ def test_a_loiter_keeps_its_centre_and_its_turns_and_one_without_end_gets_the_ro
     )  # fmt: skip
     first, second = uploaded_mission(setup).items[1:3]
     assert (first.command, first.params, round(first.alt)) == (18, turns, 100)
-    assert (second.command, second.params) == (19, (60.0, 0.0, 150.0, 0.0))
+    # ArduPlane flies the item's radius without end, but WP_LOITER_RAD for a time: no other item stands for this one.
+    assert (second.command, second.params) == (17, endless)
+    assert len(uploaded_mission(setup).items) == 3
     assert flown(setup)[1][2] == 1500
 
 
