@@ -130,6 +130,7 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
         mission=origin_of_mission,
         plan_heights=plan_heights,
         aircraft_known=known,
+        begins_in_flight=flight.begins,
         gaps=flight.gaps,
         faults=flight.faults,
         damage=flight.raw.damage,

@@ -148,6 +148,7 @@ class ImportedLog:
     missing: items of that mission that the log does not hold; None where it is judged in full.
     plan_heights: whether the mission states heights.
     aircraft_known: whether the aircraft was named; if not, none of its limits count.
+    begins_in_flight: whether the log begins after the flight did.
     gaps: pauses between rows, over the whole of what was imported.
     faults: of its rows.  damage: of the file.
     notes: what else a person should know, in sentences.
@@ -173,6 +174,7 @@ class ImportedLog:
     damage: Damage = field(default_factory=Damage)
     notes: tuple[str, ...] = ()
     missing: MissingItems | None = None
+    begins_in_flight: bool = False
 
 
 # Steps of JSBSim a second, but for campaigns.

@@ -284,6 +284,8 @@ def verdict_json(verdict: Verdict) -> str:
         "level": verdict.level,
         "flyable": verdict.flyable,
         "complete": verdict.complete,
+        "answer": verdict.answer,
+        "undecided": verdict.undecided,
         "summary": verdict.summary,
         "flown_by": None if verdict.program is None else asdict(verdict.program),
         "parameters": None if verdict.parameters is None else _parameters_data(verdict.parameters),
@@ -309,6 +311,7 @@ def _level_data(level: LevelAnswer) -> dict[str, Any]:
     return {
         "name": level.name,
         "flyable": level.flyable,
+        "undecided": level.undecided,
         "headline": level.headline,
         "disagreements": [disagreement_text(one) for one in differing],
         "differences": [asdict(one) for one in differing],

@@ -181,6 +181,9 @@ CHORD_TIME = 0.25
 ARRIVED = 10.0
 # s.  An imported flight that goes on for as long after its last waypoint has flown a part of the next leg.
 PARTLY_FLOWN = 2.0
+# s.  Where an imported log pauses for longer, nobody knows where the aircraft was: at a bank of 45 degrees it comes
+# g t^2 / 16 = 61 m aside and back in that time, which is within the corridor of a usual WP_RADIUS.
+LONGEST_UNSEEN = 10.0
 # m.  A flight that comes no nearer than this to any waypoint of a plan was flown somewhere else.
 ANOTHER_PLACE = 1000.0
 # m.  How near to a waypoint counts as having passed it, where the order of waypoints is asked: the corridor's half

@@ -109,6 +109,7 @@ class LevelDocument:
 
     name: str
     flyable: bool
+    undecided: bool
     headline: str
     disagreements: list[str]
     differences: list[DifferenceDocument]
@@ -167,6 +168,10 @@ class VerdictDocument:
     """flown, geometric (without a flight) or plan (no feasible plan, so nothing was flown)."""
     flyable: bool
     complete: bool
+    answer: str
+    """flyable, not flyable, incomplete or not judged in full; of an imported flight flown as planned or not."""
+    undecided: bool
+    """Whether nothing failed, and something was not judged that had to be."""
     summary: str
     """Lines for a person, of which the first answers the question."""
     flown_by: ProgramDocument | None

@@ -113,7 +113,10 @@ class AutopilotProcess:
 
         def begin() -> None:
             """Have the group guarded before the program runs: told afterwards, we may be killed in between."""
+            # Before this Python gives the signal its default, by which a guard that is gone would end us here.
+            signal.signal(signal.SIGPIPE, signal.SIG_IGN)
             guard.keep_group(os.getpid())
+            signal.signal(signal.SIGPIPE, signal.SIG_DFL)
             if sys.platform == "linux":
                 _die_with_parent()
 

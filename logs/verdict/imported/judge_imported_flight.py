@@ -26,7 +26,8 @@ from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between
 from logs.verdict.judge_geometry import track_findings
 from logs.verdict.places import FLIGHT, LevelAnswer, Place
 from logs.verdict.rules.registry import RULES
-from logs.verdict.summary import headline
+from logs.verdict.summary import headline, undecided_text
+from logs.verdict.tolerances import LONGEST_UNSEEN
 
 # ----------------------------------------------------------------------
 # The lines of a verdict on an imported flight: the answer, what was judged and what not, and what the log is.
@@ -221,11 +222,12 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     ends = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
     findings = (*findings, *(judge(setup, flown, log_complete) for judge in ends))
     failed = any(item.ok is False for item in findings)
-    unjudged = _ended_early(findings) if source.missing is None else missing_text(source.missing)
+    unjudged = "; ".join(filter(None, [_not_in_log(findings, source.missing), _unseen(flown), _not_known(findings)]))
     flyable = bool(flown) and not failed and not unjudged
     complete = not unjudged and all(item.ok is True for item in findings if item.rule == "completion")
     answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
-    own = LevelAnswer(setup.autopilot.level, flyable, "; ".join([*answer, *filter(None, [unjudged])]))
+    said = "; ".join([*answer, *filter(None, [unjudged])])
+    own = LevelAnswer(setup.autopilot.level, flyable, said, undecided=bool(unjudged) and not failed)
     lines = imported_lines(findings, setup, own, flown)
     return Verdict(
         findings,
@@ -242,10 +244,35 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     )
 
 
-def _ended_early(findings: Sequence[Finding]) -> str:
-    """That a log ends before its mission does, in words; "" where it does not, or says that the flight did."""
-    ends = [item.reason for item in findings if item.rule == "completion" and item.ok is None]
-    return f"not judged to the mission's end: {ends[0]}" if ends else ""
+def _not_in_log(findings: Sequence[Finding], missing: MissingItems | None) -> str:
+    """Which part of the mission is not in the log, be it items or flight, in words; "" for none."""
+    if missing is not None:
+        return missing_text(missing)
+    parts = [item.reason for item in findings if item.rule == "completion" and item.ok is None]
+    return f"not judged from end to end: {parts[0]}" if parts else ""
+
+
+def _unseen(flown: Sequence[FlownLegs]) -> str:
+    """When the log pauses for so long that nobody knows where the aircraft was, in words; "" for never."""
+    gaps = [gap for legs in flown for gap in gaps_between(legs, *_judged_times(legs))]
+    long = [gap for gap in gaps if gap.end - gap.start > LONGEST_UNSEEN]
+    if not long:
+        return ""
+    worst = max(long, key=lambda gap: gap.end - gap.start)
+    others = f", and in {len(long) - 1} more pauses" if len(long) > 1 else ""
+    return f"not judged from {worst.start:.1f} s to {worst.end:.1f} s{others}: the log has no rows"
+
+
+def _judged_times(legs: FlownLegs) -> tuple[float, float]:
+    """From when to when a stretch was flown on its legs, s."""
+    time = legs.aligned.track.time
+    return float(time[0]), float(time[-1])
+
+
+def _not_known(findings: Sequence[Finding]) -> str:
+    """What the aircraft is not known well enough for, in words; "" for nothing."""
+    text = undecided_text(findings)
+    return f"not judged in full: {text}" if text else ""
 
 
 def _of_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:

@@ -99,7 +99,11 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
             f"{len(done)} of {legs} legs flown that the log holds, the last of them to its end: {_lacking(missing)}"
         )
     elif legs - 1 in done:
-        known.append(f"{len(done)} of {legs} legs flown, the last of them to its end")
+        counted = f"{len(done)} of {legs} legs flown, the last of them to its end"
+        absent, doubts = _not_flown(setup, flown, done)
+        faults += [message(f"{_legs_text(absent)} not flown along the mission", f": {counted}")] if absent else []
+        unknown += [f"{'; '.join(doubts)}: {counted}"] if doubts else []
+        known += [] if absent or doubts else [counted]
     else:
         last = flown[-1]
         what = f"{len(done)} of {legs} legs flown"
@@ -133,6 +137,26 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
         unit="legs",
         method="waypoints passed in order, in the stretches that followed the mission",
     )
+
+
+def _not_flown(setup: FlightSetup, flown: Sequence[FlownLegs], done: set[int]) -> tuple[list[int], list[str]]:
+    """Legs that no stretch flew, and what the log does not show of others, in words."""
+    absent = [leg for leg in range(setup.route.legs) if leg not in done]
+    unseen = setup.source is not None and setup.source.begins_in_flight
+    before = [leg for leg in absent if unseen and leg < flown[0].first]
+    begun = [leg for leg in absent if leg not in before and any(one.partial and one.last - 1 == leg for one in flown)]
+    doubts = [f"the log begins in flight, and {_legs_text(before)} not in it"] if before else []
+    doubts += [f"{_legs_text(begun)} flown along the mission in part"] if begun else []
+    return [leg for leg in absent if leg not in before and leg not in begun], doubts
+
+
+def _legs_text(legs: Sequence[int]) -> str:
+    """Legs in words: "leg 3 is", "legs 3 to 10 are", "8 legs from 1 to 12 are"."""
+    first, last = legs[0], legs[-1]
+    if first == last:
+        return f"leg {first} is"
+    several = f"legs {first} to {last}" if last - first + 1 == len(legs) else f"{len(legs)} legs from {first} to {last}"
+    return f"{several} are"
 
 
 def _lacking(missing: MissingItems) -> str:

@@ -91,6 +91,8 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
 def _in_doubt(requirements: RouteRequirements, leg: int, commanded: float, fastest: float) -> str:
     """Why a speed of level flight is undecided, where the aircraft's fastest is not certain; "" if it is decided."""
     envelope = requirements.setup.envelope
+    if not envelope.fastest_sd:
+        return ""
     sure = envelope.surely()
     heights = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(sure.level_speeds(up)[1] for up in heights):
@@ -160,6 +162,8 @@ def _commanded(requirements: RouteRequirements, leg: int, commanded: float) -> t
     if math.isnan(requirements.ground_speed[leg]):
         faults.append(message(f"the wind leaves no way along leg {leg} at {commanded:.0f} m/s"))
     top = max(heights)
+    if math.isnan(slowest) or math.isnan(fastest):
+        faults.append(message(f"no level flight at {top:.0f} m"))
     if commanded < slowest:
         below = f"{commanded:.1f} m/s is below the slowest level flight, {slowest:.1f} m/s at {top:.0f} m"
         faults.append(message(below))

@@ -25,7 +25,7 @@ from logs.views.failures import Failures
 from logs.views.figures import View, draw, view_json
 from logs.views.moments import flight_moments
 from logs.views.report.page import CHART_SCRIPTS, page_library, picture_address, script_digest, script_text, style_text
-from logs.views.report.text import NOTHING, number
+from logs.views.report.text import NOTHING, badge_of, number
 from logs.views.scene import SceneView, script_json
 from world.files import write_whole
 from world.geometry import path_length
@@ -312,7 +312,7 @@ def _page(
     pictures = [(*_PICTURES[name.removesuffix(".png")], picture_address(data)) for name, data in files.items()]
     data, script = comparison_data(flights, views), script_text(CHART_SCRIPTS)
     verdicts = [
-        (name, verdict.flyable, verdict.headline)
+        (name, badge_of(verdict), verdict.headline)
         for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
     ]
     environment = Environment(

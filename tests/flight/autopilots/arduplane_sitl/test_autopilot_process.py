@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from flight.autopilots.arduplane_sitl import process
 from flight.autopilots.arduplane_sitl.process import AutopilotProcess, check_binary
+from flight.autopilots.guard import Guard
 from flight.mission.items import Home
 from world.errors import FlightError
 
@@ -113,6 +115,17 @@ def test_what_a_wrapper_has_started_is_asked_to_end_and_closes_its_log(tmp_path:
         process.end(lambda: False)
         assert process.keep_log(tmp_path / "kept.BIN")
     assert (tmp_path / "kept.BIN").read_text() == "log\nend\n"
+
+
+def test_a_guard_that_is_gone_keeps_no_program_from_running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Gone(Guard):
+        def keep_folder(self, folder: Path) -> None:
+            self._process.kill()
+            self._process.wait()
+
+    monkeypatch.setattr(process, "Guard", Gone)
+    with started(script(tmp_path, f"echo up > {tmp_path}/up; sleep 60")):
+        assert wait_for(tmp_path / "up") == "up\n"
 
 
 # Killed when the program runs, and we know nothing of it yet.

@@ -1,5 +1,6 @@
 """Imported flights: what is judged, what is not and why, and that what is wrong is wrong all the same."""
 
+import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from flight.simulation.setup import Damage, Heights, ImportedLog, RowFaults
 from logs.importers.raw_log import LogSeries, ModeChange, RawLog, example_raw_log
+from logs.verdict.findings import verdict_json
 from logs.verdict.imported.judge_imported_flight import damage_text, heights_text, rows_text
 from logs.verdict.judge_flight import judge_flight
 from planfly.imported_flights import ImportOptions
@@ -109,6 +111,18 @@ def test_a_gap_is_not_bridged_in_silence(tmp_path: Path) -> None:
     assert "Rows: 1 gap" in flight.verdict.summary
     completion = next(item for item in flight.verdict.findings if item.rule == "completion")
     assert "1 gaps of 5.4 s in all, the longest from 39.8 s to 45.2 s" in completion.reason
+    assert flight.verdict.flyable
+
+
+@pytest.mark.parametrize(("until", "undecided"), [(49.7, False), (50.3, True)])
+def test_a_pause_of_over_ten_seconds_leaves_a_flight_undecided(tmp_path: Path, until: float, undecided: bool) -> None:
+    """Rows every 0.2 s, the last before the pause at 39.8 s."""
+    time = example_raw_log().series["position"].time
+    flight = judged(tmp_path, with_rows((time < 39.9) | (time > until)), AEROSONDE)
+    assert flight.verdict.undecided is undecided
+    assert flight.verdict.flyable is not undecided
+    says = "not judged from 39.8 s to 50.4 s: the log has no rows"
+    assert flight.verdict.headline.startswith(says) is undecided
 
 
 def test_what_is_wrong_beside_a_gap_is_wrong(tmp_path: Path) -> None:
@@ -129,7 +143,31 @@ def test_only_stretches_in_auto_are_judged_each_with_its_time(tmp_path: Path) ->
 def test_a_stretch_that_begins_within_the_mission_is_judged_from_there(tmp_path: Path) -> None:
     flight = judged(tmp_path, with_modes((20.0, "FBWA"), (50.0, "AUTO")), AEROSONDE)
     assert {item.place.index for item in flight.verdict.findings if item.rule == "corridor"} == {1}
-    assert flight.verdict.complete
+    # The log begins in flight: the first leg may have been flown along the mission before.
+    assert outcome(flight, "completion") == [None]
+    assert flight.verdict.undecided
+    assert flight.verdict.headline.startswith("not judged from end to end: the log begins in flight, and leg 0 is not")
+    setup = flight.setup
+    assert setup.source is not None
+    on_the_ground = replace(setup, source=replace(setup.source, begins_in_flight=False))
+    verdict = judge_flight(on_the_ground, flight.track, "")
+    completion = next(item for item in verdict.findings if item.rule == "completion")
+    assert (completion.ok, completion.margin) == (False, -1)
+    assert completion.reason == "leg 0 is not flown along the mission: 1 of 2 legs flown, the last of them to its end"
+    assert verdict.answer == "incomplete"
+
+
+def test_what_the_aircraft_is_not_known_well_enough_for_is_left_open(tmp_path: Path) -> None:
+    flight = judged(tmp_path, options=AEROSONDE)
+    assert flight.verdict.answer == "flown as planned"
+    unsure = replace(flight.setup.envelope, source="a data sheet", fastest_sd=10.0)
+    limits = replace(flight.setup.limits, envelope=unsure)
+    verdict = judge_flight(replace(flight.setup, limits=limits), flight.track, "")
+    assert verdict.undecided
+    assert [level.undecided for level in verdict.levels] == [True]
+    assert verdict.headline.startswith("not judged in full: airspeeds on 2 legs are within what is not known")
+    told = json.loads(verdict_json(verdict))
+    assert (told["answer"], told["undecided"], told["flyable"]) == ("not judged in full", True, False)
 
 
 def test_a_log_that_ends_on_the_way_says_nothing_of_the_rest(tmp_path: Path) -> None:
@@ -138,7 +176,7 @@ def test_a_log_that_ends_on_the_way_says_nothing_of_the_rest(tmp_path: Path) -> 
     assert outcome(flight, "completion") == [None]
     assert not flight.verdict.flyable
     assert flight.verdict.undecided
-    assert flight.verdict.headline.startswith("not judged to the mission's end: ")
+    assert flight.verdict.headline.startswith("not judged from end to end: ")
     # The last waypoint was not reached, and that is no fault.
     assert outcome(flight, "waypoint") == [True, True, None]
 
@@ -154,7 +192,9 @@ def test_two_stretches_are_judged_together(tmp_path: Path) -> None:
     flight = judged(tmp_path, modes, AEROSONDE)
     judged_lines = [line for line in flight.verdict.lines if line.startswith("Judged:")]
     assert len(judged_lines) == 2
-    assert outcome(flight, "completion") == [True]
+    # Three seconds by hand on the first leg: neither as planned, nor not.
+    assert outcome(flight, "completion") == [None]
+    assert "leg 0 is flown along the mission in part" in flight.verdict.headline
     assert len(outcome(flight, "departure")) == 1
 
 

@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
@@ -42,6 +43,15 @@ def test_a_speed_off_its_command_is_told_and_no_fault(off: float, shown: bool) -
     assert ("off the commanded 25.0 m/s" in item.reason) is shown
     # It shows a limit only where the aircraft's are left out.
     assert (("speed", leg(0)) in failing(judge(setup, track, envelope=False))) is shown
+
+
+def test_where_there_is_no_level_flight_no_speed_is_one_of_it() -> None:
+    """As above an aircraft's ceiling, whether its limits are certain or not."""
+    for sd in (0.0, 2.0):
+        none = replace(envelope(), level_speed_max=np.full(3, np.nan), fastest_sd=sd)
+        item = of(judge_geometry(make_setup(STRAIGHT, table=none)), "speed", leg(0))
+        assert (item.ok, item.check) == (False, "")
+        assert item.reason.startswith("no level flight at 300 m")
 
 
 @pytest.mark.parametrize(("speed", "ok"), [(28.0, True), (30.0, None), (32.5, False), (16.5, True)])
