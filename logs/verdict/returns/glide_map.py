@@ -24,6 +24,7 @@ from aircraft.envelope import ground_speed
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from world.airspace.zone_kernels import ZoneRecords, edge_distance
+from world.highest_ground import highest_in_cells
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import Terrain
 from world.wind import mean_wind_speed
@@ -37,9 +38,11 @@ Cells = NDArray[np.int64]
 # ----------------------------------------------------------------------
 # The map: cells with their least heights.
 
-# Cells that a map has at most, their least size, m, and the samples along the side of one in which its highest ground
-# is looked for.
-MOST_CELLS, _LEAST_CELL, _MOST_SAMPLES = 700_000, 20.0, 8
+# Cells that a map has at most, and their least size, m.
+MOST_CELLS, _LEAST_CELL = 700_000, 20.0
+# The largest, m, or the pixels of the elevation file that its side is long: a larger one is as high as its highest
+# ground where most of it is valley.
+_LARGEST_CELL, _MOST_PIXELS = 240.0, 8
 # So far around the places and the flight the map goes, m.
 AROUND = 3000.0
 
@@ -89,21 +92,10 @@ def glide_map(
     (west, south), (east, north) = places.min(axis=0) - around, places.max(axis=0) + around
     spacing = max(1.0, terrain.spacing)
     cell = max(_LEAST_CELL, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MOST_CELLS))
-    samples = max(2, math.ceil(cell / spacing))
-    if samples > _MOST_SAMPLES:
+    if cell > max(_LARGEST_CELL, _MOST_PIXELS * spacing):
         return None
     columns, rows = math.ceil((east - west) / cell) + 1, math.ceil((north - south) / cell) + 1
-    # Samples lie on the cells' sides too, which those beside them share.
-    step = cell / samples
-    es = west - 0.5 * cell + step * np.arange(columns * samples + 1)
-    ns = south - 0.5 * cell + step * np.arange(rows * samples + 1)
-    heights = terrain.height(es[None, :], ns[:, None])
-    highest = np.full((rows, columns), -math.inf)
-    for i in range(samples + 1):
-        for j in range(samples + 1):
-            # NaN stays.
-            part = heights[i : i + rows * samples : samples, j : j + columns * samples : samples]
-            highest = np.maximum(highest, part)
+    highest = highest_in_cells(terrain, west - 0.5 * cell, south - 0.5 * cell, cell, rows, columns)
     middles = terrain.height(west + cell * np.arange(columns)[None, :], south + cell * np.arange(rows)[:, None])
     low, high = np.full(highest.shape, math.inf), np.full(highest.shape, -math.inf)
     made = GlideMap(west, south, cell, middles, highest + margin, low, high)
@@ -114,15 +106,17 @@ def glide_map(
 
 
 def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
-    """Widen the heights that cells lie in kill spheres at, by their middles."""
+    """Widen the heights that cells lie in kill spheres at: each by its place nearest to the sphere's middle."""
     row, column = made.cell_of(float(centre[0]), float(centre[1]))
-    steps = math.ceil(radius / made.cell)
+    steps = math.ceil(radius / made.cell) + 1
     rows = slice(max(0, row - steps), max(0, row + steps + 1))
     columns = slice(max(0, column - steps), max(0, column + steps + 1))
     shape = made.floor[rows, columns].shape
     norths = made.south + made.cell * (rows.start + np.arange(shape[0]))
     easts = made.west + made.cell * (columns.start + np.arange(shape[1]))
-    away = np.hypot(easts[None, :] - centre[0], norths[:, None] - centre[1])
+    beside = np.maximum(0.0, np.abs(easts[None, :] - centre[0]) - 0.5 * made.cell)
+    along = np.maximum(0.0, np.abs(norths[:, None] - centre[1]) - 0.5 * made.cell)
+    away = np.hypot(beside, along)
     half = np.sqrt(np.maximum(0.0, radius * radius - away**2))
     inside = away < radius
     low, high = made.low[rows, columns], made.high[rows, columns]

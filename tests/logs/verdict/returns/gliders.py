@@ -46,8 +46,8 @@ def height_needed(east: float, north: float, end: float, wind: float = 0.0, blow
     return height
 
 
-def ground(function: "np.ufunc | object", half: float = 6000.0, pitch: float = 50.0) -> Terrain:
-    """Ground of a function of east and north (m) within so far from the middle."""
-    line = np.arange(-half, half + 0.5 * pitch, pitch)
+def ground(function: "np.ufunc | object", half: float = 6000.0, pitch: float = 50.0, shift: float = 0.0) -> Terrain:
+    """Ground of a function of east and north (m) within so far from the middle; its pixels so far apart and shifted."""
+    line = np.arange(-half, half + 0.5 * pitch, pitch) + shift
     heights = np.asarray(function(line[None, :], line[:, None]) + np.zeros((line.size, line.size)))  # type: ignore[operator]
     return gridded(heights, line, line, source="made", sha256="", datum="mean sea level")

@@ -194,6 +194,69 @@ def test_a_map_that_would_hide_what_lies_in_its_cells_is_none() -> None:
     assert glide_map(ground(wall), far, MARGIN, NO_SPHERES, NO_RADII) is None
 
 
+@pytest.mark.parametrize("shift", [0.0, 17.0, -8.0])
+def test_over_a_crest_of_one_row_of_pixels_it_is_the_crest(shift: float) -> None:
+    """Pixels of 30 m, the crest 60 m over its neighbours, and cells of 45 m: nobody gets across lower than its top."""
+    terrain = ground(
+        lambda east, _north: np.where(np.abs(east - 1500.0 - shift) < 1.0, 560.0, 500.0), 18_000.0, 30.0, shift
+    )
+    made = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 17_900.0)
+    assert made is not None
+    assert 40.0 < made.cell < 50.0
+    column = made.cell_of(1500.0 + shift, 0.0)[1]
+    assert made.floor[50:-50, column] == pytest.approx(560.0 + MARGIN, abs=1e-3)
+    found = searched(terrain, made)
+    assert float(found.need[:, column + 1 :].min()) >= 560.0 + MARGIN - 1e-3
+
+
+def test_a_fine_elevation_file_gives_a_map_that_knows_each_pixel() -> None:
+    """Pixels of 1 m and cells of 20 m: a mast of 90 m, one pixel wide."""
+    terrain = ground(lambda east, north: np.where((east == 203.0) & (north == -118.0), 90.0, 0.0), 600.0, 1.0)
+    made = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, 580.0)
+    assert made is not None
+    assert made.cell == 20.0
+    assert made.floor[made.cell_of(203.0, -118.0)] == 90.0 + MARGIN
+    assert float(np.median(made.floor)) == MARGIN
+
+
+def flown(found: Needs, row: int, column: int) -> np.ndarray:
+    """The way (k, 3) of a glide from a cell's least height, m: straight from step to step, and looked at every 5 m."""
+    moves, made, places = steps()[0], found.made, []
+    while (m := found.onward[row, column]) >= 0:
+        i, j = row + int(moves[m].north), column + int(moves[m].east)
+        begin, end = ((*made.middle(*at), float(found.need[at])) for at in ((row, column), (i, j)))
+        # It begins where it has to, and what it loses ends at the next place or above it.
+        loss = made.cell * moves[m].length * SINK / math.sqrt(true_airspeed(end[2]) ** 2 - SINK**2)
+        share = np.linspace(0.0, 1.0, 2 + int(made.cell * moves[m].length / 5.0))[:, None]
+        places.append(np.array(begin) + share * (np.array([end[0], end[1], begin[2] - loss]) - np.array(begin)))
+        row, column = i, j
+    return np.concatenate(places)
+
+
+@pytest.mark.parametrize(("far", "radius"), [(5900.0, 400.0), (17_000.0, 900.0), (17_000.0, 90.0), (17_000.0, 28.0)])
+def test_no_way_cuts_into_a_sphere(far: float, radius: float) -> None:
+    """Ways from all around are laid over the sphere itself: they enter it by no more than a cell's loss of height.
+
+    It is about the corner of four cells, where ways from behind it come by: one of 28 m holds none of their middles.
+    """
+    terrain = ground(lambda east, _north: 0.0 * east, 18_000.0)
+    bare = glide_map(terrain, MIDDLE, MARGIN, NO_SPHERES, NO_RADII, far)
+    assert bare is not None
+    corner = np.array(bare.middle(*bare.cell_of(1510.0, 7.0))) + 0.5 * bare.cell
+    middle = np.array([*corner, height_needed(*corner, MARGIN)])
+    made = glide_map(terrain, MIDDLE, MARGIN, middle[None, :], np.array([radius]), far)
+    assert made is not None
+    found = searched(terrain, made)
+    deepest, near = -math.inf, 0
+    for bearing in range(0, 360, 3):
+        away = (radius + 300.0) * np.array([math.sin(math.radians(bearing)), math.cos(math.radians(bearing))])
+        way = flown(found, *made.cell_of(*(corner + away)))
+        depth = radius - float(np.linalg.norm(way - middle, axis=1).min())
+        deepest, near = max(deepest, depth), near + (depth > -50.0)
+    assert near > 5
+    assert deepest <= made.cell * math.sqrt(2.0) * SINK / AIRSPEED * 1.02
+
+
 def test_no_step_flies_lower_than_what_it_crosses_or_than_what_comes_next() -> None:
     """Over hills of some 300 m: from its least height each cell's own step is flown, and looked at 50 times."""
     hills = ground(lambda east, north: 150.0 * (2.0 + np.sin(east / 170.0) + np.cos(north / 130.0)), 3000.0)

@@ -1,0 +1,91 @@
+"""The highest ground in each cell of a map, exactly: of the bilinear surface between a raster's pixels.
+
+Between four pixels the surface has no summit of its own.  Its highest place in a square is at a pixel in the square, or
+on the square's sides.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.frames import PolyMapRecord, polymap
+from world.kernels import compiled, inner
+from world.terrain import Heights, Terrain, segment_clearance
+
+Floats = NDArray[np.float64]
+
+
+def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, rows: int, columns: int) -> Floats:
+    """Highest ground (rows, columns) in square cells, sides included, m; NaN where a part of one has no data.
+
+    west, south: m, of the outer corner of the first cell.  cell: the side of one, m.  Rows go north, columns east.
+
+    >>> from world.terrain import gridded
+    >>> line = np.arange(-100.0, 101.0, 50.0)
+    >>> heights = np.maximum(0.0, 50.0 - np.hypot(*np.meshgrid(line, line)))
+    >>> cone = gridded(heights, line, line, source="made", sha256="", datum="mean sea level")
+    >>> highest_in_cells(cone, -30.0, -10.0, 20.0, 1, 3).round(6).tolist()
+    [[40.0, 50.0, 40.0]]
+    """
+    out = np.full((rows, columns), -math.inf)
+    _fill_cells(terrain.heights, terrain.to_pixel.record, west, south, cell, out)
+    return out
+
+
+@compiled
+def _fill_cells(
+    heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float, out: Floats
+) -> None:  # pragma: no cover - compiled
+    rows, columns = out.shape
+    a, b = np.zeros(3), np.zeros(3)
+    for i in range(rows + 1):
+        for j in range(columns + 1):
+            a[0], a[1] = west + j * cell, south + i * cell
+            if j < columns:
+                b[0], b[1] = west + (j + 1) * cell, a[1]
+                side = -segment_clearance(heights, to_pixel, a, b)[0]
+                _raise(out, i - 1, j, side)
+                _raise(out, i, j, side)
+            if i < rows:
+                b[0], b[1] = a[0], south + (i + 1) * cell
+                side = -segment_clearance(heights, to_pixel, a, b)[0]
+                _raise(out, i, j - 1, side)
+                _raise(out, i, j, side)
+    for i in range(rows):
+        for j in range(columns):
+            if not math.isnan(out[i, j]):
+                _raise(out, i, j, _highest_pixel(heights, to_pixel, west + j * cell, south + i * cell, cell))
+
+
+@inner
+def _raise(out: Floats, i: int, j: int, height: float) -> None:  # pragma: no cover - compiled
+    """Raise a cell, if it is one, to a height; NaN stays."""
+    if 0 <= i < out.shape[0] and 0 <= j < out.shape[1] and (height > out[i, j] or math.isnan(height)):
+        out[i, j] = height
+
+
+@inner
+def _highest_pixel(
+    heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float
+) -> float:  # pragma: no cover - compiled
+    """Highest pixel in a cell, -inf for none; NaN where one has no data.  The cell is straight in pixels."""
+    col, row = polymap(to_pixel, west, south)
+    east_col, east_row = polymap(to_pixel, west + cell, south)
+    north_col, north_row = polymap(to_pixel, west, south + cell)
+    east_col, east_row, north_col, north_row = east_col - col, east_row - row, north_col - col, north_row - row
+    area = east_col * north_row - north_col * east_row
+    first_row = math.ceil(row + min(0.0, east_row) + min(0.0, north_row))
+    last_row = math.floor(row + max(0.0, east_row) + max(0.0, north_row))
+    first_col = math.ceil(col + min(0.0, east_col) + min(0.0, north_col))
+    last_col = math.floor(col + max(0.0, east_col) + max(0.0, north_col))
+    best = -math.inf
+    for i in range(max(0, first_row), min(heights.shape[0], last_row + 1)):
+        for j in range(max(0, first_col), min(heights.shape[1], last_col + 1)):
+            across = ((j - col) * north_row - (i - row) * north_col) / area
+            up = ((i - row) * east_col - (j - col) * east_row) / area
+            if 0.0 <= across <= 1.0 and 0.0 <= up <= 1.0 and not best >= heights[i, j]:
+                best = float(heights[i, j])
+                if math.isnan(best):
+                    return best
+    return best
