@@ -62,8 +62,13 @@ def load_airframe(scenario: Scenario) -> Airframe:
     autopilot = load_autopilot(scenario, aircraft)
     airspeed = _airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
-    limits = make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg))
+    limits = make_limits(scenario, envelope, airspeed, bank_limit(scenario, autopilot))
     return Airframe(aircraft, with_tracking(limits, autopilot, scenario), battery, autopilot)
+
+
+def bank_limit(scenario: Scenario, autopilot: Autopilot) -> float:
+    """Steepest bank that turns may take, rad: the scenario's, or that of whoever flies where it is less."""
+    return min(math.radians(scenario.flight.max_bank_deg), autopilot.bank_limit)
 
 
 def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
@@ -109,5 +114,5 @@ def _airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> f
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
     """An airframe within the limits and the bank of a scenario that differs in nothing else of the aircraft's."""
     old = airframe.limits
-    limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
+    limits = make_limits(scenario, old.envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))
     return replace(airframe, limits=replace(limits, tracking=old.tracking))

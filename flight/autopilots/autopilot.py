@@ -339,6 +339,11 @@ class Autopilot(ABC):
         """Bank limit (rad) that a person's file of parameters states; None for none."""
         return None
 
+    @property
+    def bank_limit(self) -> float:
+        """Steepest bank that it demands, rad; inf for whatever the aircraft's limits allow."""
+        return math.inf
+
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:

@@ -13,6 +13,8 @@ from logs.verdict.wording import deciding_text, disagreement_text, place_text, s
 SCHEMA = "planfly.verdict/3"
 # The check of a finding that is not judged because the aircraft is not known well enough.
 UNKNOWN_AIRCRAFT = "unknown aircraft"
+# And of one whose way a flight tells, and geometry does not.
+UNKNOWN_WAY = "unknown way"
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,8 @@ class Finding:
     suggestions: of a failed finding, the smallest changes of the plan that would pass it, the least change first.
     brief: the reason in a few words, for a headline.
     placed: whether the reason begins with the place.
-    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT` of what that leaves open; "" otherwise.
+    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT` or `UNKNOWN_WAY` of what those leave open; ""
+    otherwise.
     facts: what was measured beside it and is no fault.
     """
 
@@ -180,12 +183,12 @@ def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
 
 
 def left_open(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings that are not judged because the aircraft is not known well enough.
+    """The findings that are not judged because the aircraft is not known well enough, or a way without a flight.
 
     >>> left_open([make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)])[0].place.index
     1
     """
-    return tuple(item for item in findings if item.ok is None and item.check == UNKNOWN_AIRCRAFT)
+    return tuple(item for item in findings if item.ok is None and item.check in (UNKNOWN_AIRCRAFT, UNKNOWN_WAY))
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import condition_lines, corridor_line, navigation_text
-from logs.verdict.findings import Finding, Verdict, left_open
+from logs.verdict.findings import UNKNOWN_WAY, Finding, Verdict, left_open
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
 from logs.verdict.rules.mission_rule import lacks_landing
@@ -41,7 +41,7 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
-    """What the aircraft is not known well enough for, in words; "" for nothing.
+    """What the aircraft is not known well enough for, or only a flight tells, in words; "" for nothing.
 
     >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
     >>> from logs.verdict.places import Place
@@ -49,7 +49,15 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     >>> undecided_text([make_finding("slope", leg, ok=None, reason="", check=UNKNOWN_AIRCRAFT) for leg in legs])
     'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
     """
-    every = left_open(findings)
+    open_findings = left_open(findings)
+    ways = [place_text(item.place) for item in open_findings if item.check == UNKNOWN_WAY]
+    circles = f"where the circle at {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
+    known = _unknown_of_aircraft([item for item in open_findings if item.check != UNKNOWN_WAY])
+    return "; ".join(filter(None, [known, circles]))
+
+
+def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
+    """What of some findings the aircraft is not known well enough for, in words; "" for nothing."""
     found = [item for item in every if item.rule == "slope"]
     if len(found) < len(every):
         speeds = sum(item.rule == "speed" for item in every)

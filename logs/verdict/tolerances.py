@@ -21,6 +21,11 @@ CLEARANCE_TOLERANCE = 0.1
 HEIGHT_TOLERANCE = 0.1
 # m.  A loiter's radius: 1e-7 degrees at the circle's middle.
 RADIUS_TOLERANCE = 0.02
+# Share.  How much wider than stated a circle may be flown on the mean around it, beside `PASS`.
+WIDER_SHARE = 0.25
+# How far from its middle an autopilot that flies at that may get on a circle too tight for its bank, in radii of the
+# bank limit's arc: up to 2.09 on 20 flights of ArduPlane's law with circles of 10 to 100 m, in up to 12 m/s of wind.
+SWING = 2.25
 # m.  A leg shorter than this is a climb on the spot, with no course of its own.
 ON_THE_SPOT = 0.5
 # rad.  A turn sharper than this has no useful tangent length; a U-turn's is infinite.  Between

@@ -19,7 +19,7 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
-from planfly.airframe import Airframe, choose_seed, load_airframe, with_tracking
+from planfly.airframe import Airframe, bank_limit, choose_seed, load_airframe, with_tracking
 from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
 from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission
 from planfly.pipeline import Advance, OffNominal, make_plan, make_setup
@@ -258,5 +258,5 @@ def _limits(airframe: Airframe, scenario: Scenario, *, drawn: bool) -> Limits:
     # A drawn aircraft is one that is known: each of its flights is decided.
     known = replace(old.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = known if drawn else old.envelope
-    limits = make_limits(scenario, envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
+    limits = make_limits(scenario, envelope, old.airspeed, bank_limit(scenario, airframe.autopilot))
     return with_tracking(limits, airframe.autopilot, scenario)

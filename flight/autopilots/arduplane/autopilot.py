@@ -175,6 +175,11 @@ class ArduPlane(Autopilot):
         """ROLL_LIMIT_DEG of a person's file."""
         return self.parameters.roll_limit if "ROLL_LIMIT_DEG" in self.parameters.by_origin("file") else None
 
+    @property
+    def bank_limit(self) -> float:
+        """ROLL_LIMIT_DEG, whoever states it."""
+        return self.parameters.roll_limit
+
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:

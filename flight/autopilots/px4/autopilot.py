@@ -210,6 +210,11 @@ class Px4(Autopilot):
         """FW_R_LIM of a person's file."""
         return self.parameters["FW_R_LIM"] if "FW_R_LIM" in self.parameters.by_origin("file") else None
 
+    @property
+    def bank_limit(self) -> float:
+        """FW_R_LIM, whoever states it."""
+        return self.parameters["FW_R_LIM"]
+
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:

@@ -16,7 +16,16 @@ from logs.verdict.measures.route_requirements import (
     tighter_turn,
     turn_requirements,
 )
-from logs.verdict.tolerances import CLOSER, KINK_SHARE, KINK_WAYPOINTS, NAVIGATION_SIGMAS, PASS, PLAN_TOLERANCE, STEP
+from logs.verdict.tolerances import (
+    CLOSER,
+    KINK_SHARE,
+    KINK_WAYPOINTS,
+    NAVIGATION_SIGMAS,
+    PASS,
+    PLAN_TOLERANCE,
+    STEP,
+    SWING,
+)
 
 Floats = NDArray[np.float64]
 
@@ -85,7 +94,9 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     if requirements.setup.autopilot.loiter_rules.at_middle:
         arcs, tightest = requirements.setup.route.arcs[ends], requirements.tightest[ends]
         back = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
-        across = 2.0 * float(arcs.max()) + back + PASS
+        # A circle too tight for the bank leads as far as the bank limit makes it swing, whatever its radius.
+        wide = float(arcs.max())
+        across = wide + (SWING * back if wide < back else wide + back) + PASS
         if arcs.any() and across > max(turning, half):
             return across, "circle"
     if turning > half:

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.itinerary import loiter_of
-from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, make_finding, message, reason_of
+from logs.verdict.measures.circle_reach import within_reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Margin, Rule, located
-from logs.verdict.tolerances import PASS, RADIUS_TOLERANCE
+from logs.verdict.tolerances import BANK_TOLERANCE, PASS, RADIUS_TOLERANCE, SWING, WIDER_SHARE
 from logs.verdict.wording import place_text
 from world.geometry import tangent_length
 
@@ -108,34 +109,42 @@ def _loiter(
     known = bool(np.isfinite(requirements.turn_limit[inner]).all())
     tightest = float(requirements.tightest[inner].max()) if known else math.nan
     bad = [item for item in at if item.ok is False]
-    if requirements.setup.autopilot.loiter_rules.at_middle:
+    at_middle = requirements.setup.autopilot.loiter_rules.at_middle
+    if at_middle:
         missed = not _is_own(requirements, circle) if aligned is None else not _came_to(requirements, aligned, circle)
         bad = bad if missed else []
     faults = _too_small(requirements, circle, tightest) if known else []
     own = _is_own(requirements, circle)
     facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
-    if own and faults:
+    open_text, name = "", requirements.setup.autopilot.loiter_rules.radius_name
+    if own and faults and math.isfinite(tightest):
         # What its parameter makes too tight it flies wider, as it does at the end of a return.
-        name = requirements.setup.autopilot.loiter_rules.radius_name
-        facts.append(f"{name} asks for less than the {tightest:.0f} m of the bank limit: flown wider")
-        faults = []
+        bank = _bank_held(requirements, circle, tightest, at)
+        if bank <= requirements.limits.max_bank + BANK_TOLERANCE + 1e-9:
+            facts.append(f"{name} asks for less than the {tightest:.0f} m of the bank limit: flown wider")
+            faults = []
+            open_text = "" if aligned is not None else _in_the_way(requirements, circle, tightest)
+        else:
+            facts.append(f"{name}, held with {math.degrees(bank):.0f}° of bank")
     if aligned is not None and bad:
         faults.append(_not_held(circle, bad))
     elif bad and not faults:
         first = bad[0]
         text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
         faults.append(Message(text, _bare(first.place), placed))
-    mean = math.nan
-    if aligned is not None and aligned.passed[circle.last] and aligned.rows[circle.last] > aligned.rows[circle.first]:
-        rows = slice(int(aligned.rows[circle.first]), int(aligned.rows[circle.last]) + 1)
-        off = aligned.track.position[rows, :2] - circle.middle
-        radii = np.hypot(off[:, 0], off[:, 1])
-        mean = float(radii.mean())
+    radii = np.zeros(0) if aligned is None else _radii_flown(aligned, circle)
+    mean = float(radii.mean()) if radii.size else math.nan
+    if radii.size:
         facts.append(f"flown with {radii.min():.1f} to {radii.max():.1f} m")
+        if at_middle and not own and circle.turns >= 1.0 and mean > circle.radius * (1.0 + WIDER_SHARE) + PASS:
+            faults.append(message(f"flown with {mean:.0f} m where {circle.radius:.0f} m is asked for"))
     ok: bool | None = not (faults or bad)
     if ok and any(item.ok is None for item in at):
         ok = None
         facts.append("the flight did not get to its end")
+    if ok and open_text:
+        ok = None
+        facts.append(open_text)
     return make_finding(
         "loiter",
         requirements.waypoint(circle.first),
@@ -150,7 +159,17 @@ def _loiter(
         margin=circle.radius - tightest,
         unit="m",
         method="radius over the ground against the bank limit's in this wind; each corner as a turn",
+        check=UNKNOWN_WAY if ok is None and open_text else "",
     )
+
+
+def _radii_flown(aligned: AlignedTrack, circle: Circle) -> Floats:
+    """Distances from a circle's middle from its first corner to its last, (n,) m; none where it was not flown to it."""
+    first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
+    if not aligned.passed[circle.last] or last <= first:
+        return np.zeros(0)
+    off = aligned.track.position[first : last + 1, :2] - circle.middle
+    return np.asarray(np.hypot(off[:, 0], off[:, 1]))
 
 
 def _is_own(requirements: RouteRequirements, circle: Circle) -> bool:
@@ -158,6 +177,29 @@ def _is_own(requirements: RouteRequirements, circle: Circle) -> bool:
     rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
     asked = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     return rules.lines_up and rules.radius != 0.0 and asked is not None and rules.radius_of(asked) == 0.0
+
+
+def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float, at: list[Finding]) -> float:
+    """Bank that a circle tighter than the bank limit's (m) was held with, rad: the largest mean over a second.
+
+    Of the route alone, and where none was measured, that which holding it takes, within the autopilot's limit.
+    """
+    measured = [fact.value for item in at for fact in item.facts if fact.what == "bank"]
+    if measured:
+        return math.radians(max(measured))
+    needed = math.atan(math.tan(requirements.limits.max_bank) * tightest / circle.radius)
+    return min(requirements.setup.autopilot.bank_limit, needed)
+
+
+def _in_the_way(requirements: RouteRequirements, circle: Circle, tightest: float) -> str:
+    """What a circle that is flown wider than it is drawn could come too near to, in words; "" for nothing."""
+    heights = requirements.points[circle.first : circle.last + 1, 2]
+    reach = SWING * tightest
+    found = within_reach(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
+    if not found:
+        return ""
+    near = f"within the {reach:.0f} m of its middle that it may get to"
+    return f"{near}, {', '.join(found)}: only a flight tells where it is"
 
 
 def _came_to(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
@@ -203,7 +245,7 @@ RULE = Rule(
     title="loiters",
     asks="Can each circle be held at the bank limit in this wind, and was it flown to its end?",
     margin=Margin("radius", "m", 10.0),
-    tolerances=("RADIUS_TOLERANCE", "PASS"),
+    tolerances=("RADIUS_TOLERANCE", "PASS", "BANK_TOLERANCE", "SWING", "WIDER_SHARE"),
     merge=fold_loiters,
     log=LogNeeds(aircraft=True),
     phrase=_numbers,

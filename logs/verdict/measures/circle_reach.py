@@ -1,0 +1,124 @@
+"""What lies within reach of a circle that is flown wider than it is drawn.
+
+An autopilot that flies at a circle's middle and around it as wide as it can is, on a circle too tight for its bank,
+anywhere within `SWING` radii of the bank limit from the middle: how it comes to the circle decides where.  A line
+drawn around the middle says nothing of what stands beside it.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from logs.verdict.measures.path_moves import MOVE
+from logs.verdict.measures.path_sweeps import path_clearance
+from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.zone_visits import path_zones
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE, HEIGHT_TOLERANCE, ROUNDING
+from world.kernels import Records
+from world.threats import threat_label
+
+Floats = NDArray[np.float64]
+
+# Rings that a disc is looked at along: one in a step of the ground's raster, so many at most, and of so many corners.
+_FEWEST, _MOST, _CORNERS = 24, 120, 96
+# Heights between which a spiral climbs are looked at in steps of this, m, at most so many of them.
+_STEP, _LEVELS = 20.0, 12
+
+
+def within_reach(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+    """What a flight within a distance of a place could come too near to, in words; empty for nothing.
+
+    middle: (2,) east and north, m.  low, high: its least and greatest height, m AMSL.  reach: m.
+    """
+    return [
+        *_ground(requirements, middle, low, high, reach),
+        *_missiles(requirements, middle, low, high, reach),
+        *_zones(requirements, middle, low, high, reach),
+        *_edges(requirements, middle, reach),
+    ]
+
+
+def _ground(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+    ground, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
+    if ground is None:
+        return []
+    rings = _rings(middle, reach, ground.spacing)
+    above, _ = path_clearance(ground.heights, ground.to_pixel.record, _at(rings, low))
+    found = []
+    # What leaves the known terrain is NaN.
+    if np.isnan(above).any():
+        found.append("the terrain is not known")
+    least = float(np.nanmin(above, initial=math.inf))
+    if least < requirements.limits.min_clearance - CLEARANCE_TOLERANCE:
+        found.append(f"the ground is {least:.0f} m below")
+    if limits.max_height_m is not None:
+        # The greatest height above ground is the least of the same world upside down.
+        under, _ = path_clearance(-ground.heights, ground.to_pixel.record, _at(rings, -high))
+        most = -float(np.nanmin(under, initial=math.inf))
+        if most > limits.max_height_m + HEIGHT_TOLERANCE:
+            found.append(f"the ground is {most:.0f} m below, over the {limits.max_height_m:.0f} m allowed")
+    return found
+
+
+def _missiles(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+    scenario = requirements.setup.scenario
+    if scenario.external:
+        return []
+    threats, found = scenario.threats, []
+    for m, table in enumerate(scenario.spec.threats):
+        radius, (east, north, up) = float(threats.kill_radius[m]), threats.position[m]
+        beside = max(0.0, math.hypot(east - middle[0], north - middle[1]) - reach)
+        if radius > 0.0 and math.hypot(beside, max(0.0, low - up, up - high)) <= radius:
+            found.append(f"the missile {threat_label(table.name or '', m)} reaches it")
+    return found
+
+
+def _zones(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:
+    airspace = requirements.airspace
+    if not airspace.zones:
+        return []
+    terrain = requirements.setup.scenario.terrain
+    rings, found = _rings(middle, reach, 0.0), set[int]()
+    levels = 1 if high - low < ROUNDING else min(_LEVELS, 2 + int((high - low) / _STEP))
+    for up in np.linspace(low, high, levels):
+        visits = path_zones(_moves(_at(rings, float(up))), airspace.records, terrain)
+        found |= {z for z in range(len(airspace.zones)) if visits[z].depth > ROUNDING or visits[z].unknown}
+    return [f"{airspace.zones[z].kind} zone {airspace.zones[z].name or z} is not kept" for z in sorted(found)]
+
+
+def _edges(requirements: RouteRequirements, middle: Floats, reach: float) -> list[str]:
+    scenario = requirements.setup.scenario
+    if scenario.external:
+        return []
+    inside = min(float(min(at - low, high - at)) for at, (low, high) in zip(middle, scenario.bounds, strict=True))
+    return ["the area ends"] if inside < reach - ROUNDING else []
+
+
+def _rings(middle: Floats, reach: float, spacing: float) -> Floats:
+    """Points (n, 2) m along rings about a middle out to its reach, a raster's spacing apart."""
+    count = min(_MOST, max(_FEWEST, math.ceil(reach / spacing) if spacing > 0.0 else _FEWEST))
+    # A polygon outside its circle leaves nothing between the last ring and the reach.
+    radii = np.linspace(0.0, reach / math.cos(math.pi / _CORNERS), count + 1)
+    angles = np.linspace(0.0, 2.0 * math.pi, _CORNERS + 1)
+    east, north = np.outer(radii, np.sin(angles)).ravel(), np.outer(radii, np.cos(angles)).ravel()
+    return np.column_stack([middle[0] + east, middle[1] + north])
+
+
+def _at(places: Floats, up: float) -> Floats:
+    """Places (n, 2) at one height, (n, 3) m."""
+    return np.column_stack([places, np.full(len(places), up)])
+
+
+def _moves(points: Floats) -> Records:
+    """Straight moves from each of n points to the next, of a second each, (n - 1,) of `MOVE`."""
+    step = np.diff(points, axis=0)
+    run = np.hypot(step[:, 0], step[:, 1])
+    moves: Records = np.zeros(len(step), MOVE)
+    for axis, name in enumerate(("east", "north", "up")):
+        moves[name] = points[:-1, axis]
+    for axis, name in enumerate(("course_east", "course_north")):
+        moves[name] = np.divide(step[:, axis], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["length"], moves["climb"] = run, step[:, 2]
+    moves["time"], moves["lasts"] = np.arange(len(step)), 1.0
+    return moves
