@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Notes
+from flight.mission.items import TAKEOFFS, Notes
 from flight.mission.itinerary import MAX_STOPS, ItineraryStop, Loiter
 from world.errors import MissionError
 
@@ -119,6 +119,18 @@ class RoutePoint:
     arc: float = 0.0
 
 
+class Unjoined(NamedTuple):
+    """A stop of a mission that is not laid out where its item says, for no tangent joins it to a circle.
+
+    item, circle: seqs of its item and of the circle's.
+    is_circle: whether it is a circle itself, laid out on the other; else it lies inside that, and is left out.
+    """
+
+    item: int
+    circle: int
+    is_circle: bool
+
+
 @dataclass(frozen=True, slots=True)
 class Node:
     """A stop as a point, or as a circle about it; east, north, up in m.
@@ -144,14 +156,15 @@ def lay_circles(
     own_radius: OwnRadius,
     slopes: SpiralSlopes,
     rules: LoiterRules = USUAL_LOITERS,
-) -> list[RoutePoint]:
-    """Waypoints of a route through points and around circles.
+) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
+    """Waypoints of a route through points and around circles, and the stops that are not laid out as asked for.
 
     source: names the mission in errors.  own_radius, slopes: of the aircraft.  rules: of whoever flies.  Stops inside a
     circle before or after them are left out, with a note: no straight leg joins them.  Raises MissionError for a loiter
     too wide or too long to lay out.
     """
-    nodes = _nodes(source, stops, notes, own_radius, rules)
+    unjoined: list[Unjoined] = []
+    nodes = _nodes(source, stops, notes, own_radius, rules, unjoined)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
     up = float(stops[0].position[2])
@@ -173,23 +186,34 @@ def lay_circles(
             item = f"item {node.stop.item}"
             message = f"{source}: {item}: more than {MAX_STOPS:,} places, circles laid out"
             raise MissionError(message, file=source, field=item)
-    return points
+    return points, tuple(unjoined)
 
 
-def _nodes(source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius, rules: LoiterRules) -> list[Node]:
-    """Points and circles in flying order, each with a tangent to the next."""
+def _nodes(
+    source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius, rules: LoiterRules,
+    unjoined: list[Unjoined],
+) -> list[Node]:  # fmt: skip
+    """Points and circles in flying order, each with a tangent to the next; ``unjoined`` gets the others.
+
+    A flight that takes off inside its first circle begins on that: of take-offs nothing is flown.
+    """
     nodes: list[Node] = []
     for stop, (east, north, up) in stops:
         node = Node(stop, float(east), float(north), float(up))
         if stop.loiter is not None:
             node = replace(node, turn=_turn(source, stop, stop.loiter, float(up), notes, own_radius, rules))
             while nodes and nodes[-1].turn == 0.0 and nodes[-1].away(node) < abs(node.turn) + _CLEAR:
-                _left_out(nodes.pop().stop, node.stop, notes)
+                inside = nodes.pop().stop
+                _left_out(inside, node.stop, notes)
+                if nodes or (inside.item >= 0 and inside.command not in TAKEOFFS):
+                    unjoined.append(Unjoined(inside.item, stop.item, is_circle=False))
         before = nodes[-1] if nodes else None
         if before is not None and before.turn != 0.0 and not is_joined(before, node):
             if node.turn == 0.0:
                 _left_out(stop, before.stop, notes)
+                unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=False))
                 continue
+            unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=True))
             notes.add(
                 f"its circle has no tangent from that of item {before.stop.item}: flown on that circle", stop.item
             )

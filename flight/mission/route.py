@@ -18,6 +18,7 @@ from flight.mission.loiter_circles import (
     PlacedStop,
     RoutePoint,
     SpiralSlopes,
+    Unjoined,
     lay_circles,
 )
 from flight.mission.placing import HIGHEST, LOWEST, PlacedMission, place_stops
@@ -58,6 +59,7 @@ class Route:
     return_from: index of the waypoint at which a return to launch begins, -1 for none; what follows stands for the way
         that an autopilot finds by itself.
     return_to: the circle that the return ends in; None for no return.
+    unjoined: stops that whoever flies goes to, and that the waypoints lack, for no tangent joins them to a circle.
     """
 
     waypoints: Floats
@@ -73,6 +75,7 @@ class Route:
     landing_ground: float = math.nan
     return_from: int = -1
     return_to: ReturnCircle | None = None
+    unjoined: tuple[Unjoined, ...] = ()
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -272,14 +275,8 @@ def lay_route(
     mission, notes = placed.mission, Notes()
     kept = [_with_airspeed(place, default_airspeed, speeds_by_value) for place in placed.stops]
     returning = kept.pop() if placed.itinerary.returns else None
-    points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
-    if (
-        loiters.ends_in_circle
-        and returning is None
-        and placed.itinerary.landing is None
-        and kept[-1].stop.loiter is None
-    ):
-        notes.add(loiters.end_note(), kept[-1].stop.item)
+    points, unjoined = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
+    _note_circles(placed.itinerary, kept, loiters, notes)
     back: dict[str, Any] = {}
     if returning is not None:
         back = _lay_return(placed, returning.stop, points, rules, limits, notes)
@@ -308,8 +305,17 @@ def lay_route(
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground,
+        # Who flies on tangents leaves these out; who flies at the circle's middle does not.
+        unjoined=unjoined if loiters.at_middle else (),
         **back,
     )
+
+
+def _note_circles(itinerary: Itinerary, kept: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
+    """Note what is not flown of the circles of whoever flies; kept: the stops, without a return."""
+    last = kept[-1].stop
+    if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and last.loiter is None:
+        notes.add(loiters.end_note(), last.item)
 
 
 def _lay_return(

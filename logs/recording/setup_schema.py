@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from aircraft.envelope import Envelope
 from flight.autopilots.autopilot import AutopilotProgram, Origin, ParameterValue, StoredParameters
 from flight.mission.items import Home, Mission, MissionItem
+from flight.mission.loiter_circles import Unjoined
 from flight.mission.return_path import ReturnCircle
 from flight.mission.route import Route
 from world.errors import LogError
@@ -113,6 +114,7 @@ class RouteTable(SetupModel):
         tuple[Finite, Finite, Finite, Finite, Finite] | None,
         Field(alias="return_to_east_north_amsl_radius_slope_base_m"),
     ] = None
+    unjoined: Annotated[tuple[Unjoined, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
 
     def route(self, file: str) -> Route:
         """The route of the table.  Raises LogError for columns that do not fit, and for a leg without length."""

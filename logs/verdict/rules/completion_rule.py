@@ -115,6 +115,7 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
             faults.append(
                 message(f"{stretch_end_text(last.stretch)}, on the way to {_named(setup, last)}", f": {what}")
             )
+    unknown += [f"the way to item {stop.item} is not judged: it is not laid out" for stop in setup.route.unjoined]
     gaps = [gap for one in flown for gap in gaps_between(one, one.stretch.start, one.stretch.end)]
     if gaps:
         longest = max(gaps, key=lambda gap: gap.end - gap.start)

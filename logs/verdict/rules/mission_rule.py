@@ -72,7 +72,9 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         ("checkGeofence", _fence(setup)),
     )
     refuses = setup.autopilot.refuses
-    return [_finding(name, list(remarks), refuses) for name, remarks in checks]
+    found = [_finding(name, list(remarks), refuses) for name, remarks in checks]
+    # No autopilot has a name for this: it is what of a mission is not judged.
+    return found + ([_unjoined(setup)] if setup.route.unjoined else [])
 
 
 # What a check remarks: the verdict on it, the item (None: the whole mission), and why.  PX4's refusal is a verdict only
@@ -99,6 +101,31 @@ def _finding(check: str, said: list[_Remark], refuses: bool) -> Finding:
         source="PX4",
         method="mission items",
         check=check,
+    )
+
+
+def _unjoined(setup: FlightSetup) -> Finding:
+    """That an autopilot flies where the route does not: to a place inside a circle, or about another middle.
+
+    Of an imported flight it is no fault, and left open: `logs.verdict.rules.completion_rule.imported_completion`.
+    """
+    first, *others = setup.route.unjoined
+    who = setup.autopilot.title
+    if first.is_circle:
+        why = f"no tangent joins its circle to that of item {first.circle}"
+    else:
+        why = f"lies inside the circle of item {first.circle}"
+    more = f" (+{len(others)} more)" if others else ""
+    fault = message(why, f": {who} flies {'it as it is' if first.is_circle else 'there'}, which is not judged{more}")
+    return make_finding(
+        "mission",
+        Place("mission", item=first.item if first.item >= 0 else None),
+        ok=False if setup.source is None else None,
+        reason=fault.text,
+        faults=[fault],
+        source="route",
+        method="mission items and circles laid out",
+        check="unjoined",
     )
 
 

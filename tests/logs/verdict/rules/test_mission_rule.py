@@ -6,10 +6,12 @@ import pytest
 
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import default_parameters, parameters_of
+from logs.recording.setup_schema import RouteTable
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import Place
-from tests.mission_lines import setup_of, wp
+from tests.flight.autopilots.arduplane.kept_missions import setup_by_law
+from tests.mission_lines import mission, setup_of, wp
 
 GOOD = (wp(0, 500, command=22), wp(0, 1500), wp(1500, 1500))
 HOME_FAR = "36.5 -84.0 300"
@@ -234,3 +236,54 @@ def test_without_a_home_there_is_no_distance_to_the_first_waypoint() -> None:
     (finding,) = [item for item in judge_geometry(nowhere).findings if item.check == "checkDistanceToFirstWaypoint"]
     assert finding.ok
     assert "no home, so no distance to the first waypoint" in finding.reason
+
+
+# A waypoint 600 m from the middle of a circle of 1 km, after it and before it; circles of 200 m inside that of 1 km and
+# about its middle; one of 1 km that is left for a waypoint 1.5 km off, two 5 km apart, and twice one circle.
+_WIDE = wp(0, 0, 300, command=18, p="2 0 1000 0")
+UNJOINED = {
+    "after": (
+        (_WIDE, wp(0, 600, 100), wp(5000, 0, 300)),
+        (3, "lies inside the circle of item 2: ArduPlane flies there"),
+    ),
+    "before": (
+        (wp(0, 600, 100), _WIDE, wp(5000, 0, 300)),
+        (2, "lies inside the circle of item 3: ArduPlane flies there"),
+    ),
+    "inner": (
+        (_WIDE, wp(300, 0, 300, command=18, p="1 0 200 0"), wp(5000, 0, 300)),
+        (3, "no tangent joins its circle to that of item 2: ArduPlane flies it as it is"),
+    ),
+    "same-middle": (
+        (_WIDE, wp(0, 0, 300, command=18, p="1 0 200 0"), wp(5000, 0, 300)),
+        (3, "no tangent joins its circle to that of item 2"),
+    ),
+    "outside": ((_WIDE, wp(1500, 0, 300), wp(5000, 0, 300)), None),
+    "apart": ((_WIDE, wp(5000, 0, 300, command=18, p="1 0 200 0"), wp(9000, 0, 300)), None),
+    "twice": ((_WIDE, _WIDE, wp(5000, 0, 300)), None),
+}
+
+
+@pytest.mark.parametrize("name", UNJOINED)
+def test_what_no_tangent_joins_to_a_circle_fails_where_the_autopilot_flies_there(name: str) -> None:
+    lines, expected = UNJOINED[name]
+    setup = setup_by_law(mission(wp(0, -3000, 300), *lines))
+    verdict = judge_geometry(setup)
+    found = [(item.place.item, item.reason, item.ok) for item in verdict.findings if item.check == "unjoined"]
+    assert RouteTable.of(setup.route).route("a.json").unjoined == setup.route.unjoined
+    if expected is None:
+        assert not found
+        return
+    ((item, reason, ok),) = found
+    assert (item, ok, verdict.flyable) == (expected[0], False, False)
+    assert reason.startswith(expected[1])
+    assert reason.endswith("which is not judged")
+    # planfly's own guidance flies on tangents, and leaves it out with a note.
+    assert not setup_of(wp(0, -3000, 300), *lines).route.unjoined
+
+
+def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
+    around = (_WIDE, wp(5000, 0, 300))
+    assert not setup_by_law(mission(wp(0, 0, 300, command=22), *around)).route.unjoined
+    # A waypoint there is flown to.
+    assert setup_by_law(mission(wp(0, 0, 300), *around)).route.unjoined
