@@ -14,6 +14,7 @@ from aircraft.catalog import Aircraft
 from aircraft.path_limits import Limits, ground_speed_on
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim
+from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.gains import Gains
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.guidance.path import waypoint_records
@@ -24,6 +25,7 @@ from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, longest_circlin
 from flight.simulation.track import Rows, join_rows, quantised
 from flight.simulation.turbulence import start_gusts
 from world.geometry import leg_courses
+from world.kernels import Records
 from world.random_streams import NAVIGATION, TURBULENCE, stream
 from world.wind import W20
 
@@ -81,13 +83,15 @@ class Airborne(ABC):
         self._work.settings.slowest = 0.94 * aircraft.stall_speed
         self._work.settings.middle = self.map.middle
         self._work.settings.battery = setup.battery
-        patience = PATIENCE * self.path.length / _slowest_leg(setup, self._airspeeds) + PATIENCE_SECONDS
+        length = self.path.length + _wider_circles(setup, waypoints)
+        patience = PATIENCE * length / _slowest_leg(setup, self._airspeeds) + PATIENCE_SECONDS
         # A loiter for a time lasts as long as its item says, whatever circle is drawn for it.
         timed = waypoints[(waypoints["stays"] > 0.0) & (waypoints["stays"] < math.inf)]
         patience += sum(dict(zip(timed["item"].tolist(), timed["stays"].tolist(), strict=True)).values())
         if setup.route.return_to is not None:
             # An autopilot that returns by a law of its own may circle longer than its path does.
-            patience += longest_circling(setup.route.return_to.radius)
+            wider = true_by_equivalent(setup.route.return_to.up) ** 2
+            patience += longest_circling(wider * setup.route.return_to.radius)
         self.max_ticks = int(patience / self.dt)
 
     @abstractmethod
@@ -154,6 +158,28 @@ class Airborne(ABC):
         if route.arcs[ahead] > 0.0 and route.return_from < 0:
             return f"circled: at the loiter of item {route.items[ahead]}, {seconds}"
         return f"time limit: {seconds}"
+
+
+def _wider_circles(setup: FlightSetup, waypoints: Records) -> float:
+    """Length (m) of circles too tight for the bank beyond what is drawn of them.
+
+    An autopilot that flies at a circle's middle goes around it as wide as the bank makes it, and once more until what
+    follows lies ahead.  Circles that the wind leaves no way around add nothing: no time is long enough for them.
+
+    waypoints: of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    """
+    if not setup.autopilot.loiter_rules.at_middle:
+        return 0.0
+    longer = dict[int, float]()
+    for waypoint in waypoints[waypoints["circle"] != 0.0]:
+        drawn, speed, up = abs(float(waypoint["circle"])), float(waypoint["airspeed"]), float(waypoint["up"])
+        held = max(setup.limits.turn_radius(course, course + math.pi, up, speed) for course in (0.0, math.pi))
+        # Autopilots keep an equivalent airspeed: what they fly is faster, as the air is thinner.
+        held *= true_by_equivalent(up) ** 2
+        if drawn < held < math.inf and not waypoint["returns"]:
+            more = 2.0 * math.pi * (float(waypoint["turns"]) * (held - drawn) + held)
+            longer[int(waypoint["item"])] = max(more, longer.get(int(waypoint["item"]), 0.0))
+    return sum(longer.values())
 
 
 def _slowest_leg(setup: FlightSetup, airspeeds: Floats) -> float:

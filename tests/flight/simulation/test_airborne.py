@@ -11,6 +11,7 @@ from flight.guidance.gains import load_gains
 from flight.mission.items import Mission
 from flight.mission.return_path import ReturnCircle
 from flight.simulation.airborne import PATIENCE, PATIENCE_SECONDS, Airborne
+from tests.logs.verdict.rules.test_loiter_rule_own_radius import SPEED, loiter, radius_at
 from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
 from world.errors import FlightError
@@ -62,6 +63,29 @@ def test_a_return_may_take_five_minutes_more_for_its_circles() -> None:
     back = replace(setup, route=replace(setup.route, return_from=0, return_to=ReturnCircle(0.0, 3000.0, 500.0, 80.0)))
     plain, longer = (Gliding(one, AEROSONDE, load_gains(AEROSONDE)) for one in (setup, back))
     assert (longer.max_ticks - plain.max_ticks) * plain.dt == pytest.approx(300.0, abs=1.0)
+
+
+def test_a_returns_circles_are_as_wide_as_its_height_makes_them() -> None:
+    """3,000 m up they grow by the standard atmosphere's density, 1.225 / 0.9091 kg/m3, and take as much longer."""
+    setup, gains = MAKE([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]]), load_gains(AEROSONDE)
+    plain = Gliding(setup, AEROSONDE, gains).max_ticks
+    low, high = (
+        Gliding(replace(setup, route=replace(setup.route, return_from=0, return_to=circle)), AEROSONDE, gains).max_ticks
+        for circle in (ReturnCircle(0.0, 3000.0, up, 2000.0) for up in (0.0, 3000.0))
+    )
+    assert (high - plain) / (low - plain) == pytest.approx(1.225 / 0.9091, rel=1e-3)
+
+
+def test_turns_too_tight_for_the_bank_may_take_as_long_as_it_makes_them() -> None:
+    """40 turns and one to line up, of 116 m by 30 degrees; 60 m, 63 m at 500 m, are drawn, and held by 60 degrees."""
+    setup, gains = loiter("18 40 0 0 0", {"WP_LOITER_RAD": 60.0}), load_gains(AEROSONDE)
+    steep = replace(setup, limits=replace(setup.limits, max_bank=math.radians(60.0)))
+    wide, plain = (Gliding(one, AEROSONDE, gains) for one in (setup, steep))
+    held, drawn = radius_at(30.0), 60.0 * (SPEED / 25.0) ** 2
+    longer = PATIENCE * 2.0 * math.pi * (40.0 * (held - drawn) + held) / 25.0
+    assert (wide.max_ticks - plain.max_ticks) * plain.dt == pytest.approx(longer, rel=0.003)
+    tangents = replace(setup, autopilot=MAKE([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]]).autopilot)
+    assert Gliding(tangents, AEROSONDE, gains).max_ticks == pytest.approx(plain.max_ticks, rel=0.01)
 
 
 def test_a_loiter_may_take_as_long_as_its_item_says() -> None:

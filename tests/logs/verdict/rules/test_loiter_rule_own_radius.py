@@ -154,6 +154,37 @@ def test_a_stated_circle_needs_the_autopilots_own_bank() -> None:
     assert "20° bank" in item.reason
 
 
+def judged_with(setup: FlightSetup, item: str, **parameters: float) -> Verdict:
+    """A flight by the law with these parameters, judged as one of another setup."""
+    own = loiter(item, parameters)
+    done = simulate(own, load_airframe(own.scenario).aircraft)
+    return judge_flight(setup, done.track, done.ended)
+
+
+def test_a_stated_circle_flown_half_again_as_wide_fails() -> None:
+    """136 m, that 35 degrees hold, flown with 20 degrees: 184 m and more."""
+    item = of(
+        judged_with(loiter("18 3 0 130 0", {"ROLL_LIMIT_DEG": 35.0}), "18 3 0 130 0", ROLL_LIMIT_DEG=20.0), "loiter"
+    )
+    assert item.ok is False
+    assert item.flown is not None
+    assert item.flown > 1.25 * 136.0 + 10.0
+    assert "m is asked for" in item.reason
+
+
+def test_the_bank_that_was_flown_counts_before_the_one_that_could_be() -> None:
+    """At ROLL_LIMIT_DEG 55 a circle of 60 m would be held with 43 degrees: flown with 20, it was not."""
+    item = of(judged_with(loiter(TURNS, {"ROLL_LIMIT_DEG": 55.0, **OWN}), TURNS, ROLL_LIMIT_DEG=20.0), "loiter")
+    assert item.ok is True
+    assert "flown wider" in item.reason
+
+
+@pytest.mark.parametrize("radius", [10.0, 30.0])
+def test_a_circle_of_a_tiny_own_radius_keeps_its_corridor(radius: float) -> None:
+    verdict = flown(TIME, WP_LOITER_RAD=radius)
+    assert not [item for item in verdict.failed if item.rule == "corridor"]
+
+
 def test_an_own_circle_of_a_low_roll_limit_keeps_its_corridor() -> None:
     """At 20 degrees it swings as wide as 184 m make it, 274 m off its legs: that harms nothing here."""
     verdict = flown(TURNS, ROLL_LIMIT_DEG=20.0)

@@ -1,0 +1,73 @@
+"""What lies within reach of a circle: a hill, heights over ground, the terrain's end, missiles, zones, the edge."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from logs.verdict.measures.circle_reach import within_reach
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from tests.logs.verdict.rules.test_loiter_rule_own_radius import TIME, loiter, sphere
+
+REACH = 261.0
+
+
+def found(low: float, high: float, requirements: RouteRequirements | None = None, **tables: Any) -> list[str]:
+    """Within 261 m of home, over flat ground at 0 m."""
+    known = requirements or route_requirements(loiter(TIME, {}, **tables))
+    return within_reach(known, np.zeros(2), low, high, REACH)
+
+
+def with_ground(away: float, up: float) -> RouteRequirements:
+    """Flat ground with a block of this height, m or NaN, wherever it is farther east than that, m."""
+    setup = loiter(TIME, {})
+    ground = setup.scenario.terrain
+    assert ground is not None
+    _, columns = np.indices(ground.heights.shape)
+    heights = np.array(ground.heights)
+    # The map from places to pixels, at two places on the axis: the raster's columns lead east.
+    record = ground.to_pixel
+    here, _ = record(np.array([away]), np.array([0.0]))
+    heights[columns > here[0]] = up
+    return route_requirements(
+        replace(setup, scenario=replace(setup.scenario, terrain=replace(ground, heights=heights)))
+    )
+
+
+def test_the_lowest_height_counts_against_the_ground() -> None:
+    """Its least clearance is 30 m."""
+    limit = route_requirements(loiter(TIME, {})).limits.min_clearance
+    assert found(limit + 1.0, 900.0) == []
+    assert found(limit - 1.0, 900.0) == [f"the ground is {limit - 1.0:.0f} m below"]
+
+
+def test_the_highest_height_counts_against_the_greatest_above_ground() -> None:
+    limits = {"max_height_m": 600.0}
+    assert found(500.0, 599.0, limits=limits) == []
+    assert found(500.0, 610.0, limits=limits) == ["the ground is 610 m below, over the 600 m allowed"]
+
+
+@pytest.mark.parametrize(("up", "what"), [(490.0, "the ground is 10 m below"), (np.nan, "the terrain is not known")])
+def test_a_hill_counts_within_its_reach_only(up: float, what: str) -> None:
+    ground = route_requirements(loiter(TIME, {})).setup.scenario.terrain
+    assert ground is not None
+    pitch = 2.0 * ground.spacing
+    assert found(500.0, 500.0, with_ground(REACH - pitch, up)) == [what]
+    assert found(500.0, 500.0, with_ground(REACH + pitch, up)) == []
+
+
+def test_a_missile_counts_by_its_height_too() -> None:
+    """A sphere of 100 m about 500 m, 250 m away."""
+    assert found(650.0, 700.0, **sphere(250.0, 100.0)) == []
+    assert found(590.0, 700.0, **sphere(250.0, 100.0)) == ["the missile m reaches it"]
+    assert found(300.0, 390.0, **sphere(250.0, 100.0)) == []
+    assert found(300.0, 410.0, **sphere(250.0, 100.0)) == ["the missile m reaches it"]
+
+
+def test_a_zone_counts_at_any_height_of_a_spiral() -> None:
+    zone = {"name": "z", "kind": "exclusion", "east_m": 150.0, "north_m": 60.0, "radius_m": 50.0}
+    zone |= {"floor_amsl_m": 600.0, "ceiling_amsl_m": 640.0}
+    assert found(500.0, 590.0, zones=[zone]) == []
+    assert found(500.0, 700.0, zones=[zone]) == ["exclusion zone z is not kept"]
+    assert found(500.0, 620.0, zones=[zone]) == ["exclusion zone z is not kept"]
