@@ -31,6 +31,7 @@ WAYPOINT = record_dtype(
     ("leaves_on_course", np.bool_),  # whether its item asks to leave it on the course to what follows
     ("leaves_on_tangent", np.bool_),  # whether the line to what follows is to begin on its rim, not in its middle
     ("returns", np.bool_),  # whether the leg to it stands for a return; circle, centre and up are then of its target
+    ("stop", np.int64),  # which of the route's stops it belongs to: a jump back leads to another of the same item
     "slope_base",  # m, as of `flight.mission.return_path.ReturnCircle`
 )
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.

@@ -270,7 +270,7 @@ def waypoint_records(route: Route, mission: Mission | None = None) -> Records:
     waypoints["fly_over"], waypoints["acceptance"] = route.fly_over & (route.acceptance == 0.0), route.acceptance
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
     waypoints["up"] = route.waypoints[:, 2]
-    waypoints["item"] = route.items
+    waypoints["item"], waypoints["stop"] = route.items, route.stops
     _set_circles(waypoints[1:-1], route)
     _set_loiters(waypoints, {} if mission is None else {item.seq: item for item in mission.items})
     if route.return_to is not None:
@@ -294,9 +294,9 @@ def _set_circles(corners: Records, route: Route) -> None:
     corners["centre_east"] = corners["east"] + out * np.cos(middle)
     corners["centre_north"] = corners["north"] - out * np.sin(middle)
     # A loiter's height is that of its item, which the last of its corners has.
-    items = route.items[1:-1]
+    stops = route.stops[1:-1]
     for i in range(len(corners) - 2, -1, -1):
-        if corners[i].circle != 0.0 and corners[i + 1].circle != 0.0 and items[i] == items[i + 1]:
+        if corners[i].circle != 0.0 and corners[i + 1].circle != 0.0 and stops[i] == stops[i + 1]:
             corners[i].up = corners[i + 1].up
 
 

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,8 @@ class Route:
     return_from: index of the waypoint at which a return to launch begins, -1 for none; what follows stands for the way
         that an autopilot finds by itself.
     return_to: the circle that the return ends in; None for no return.
+    stops: (w,) number of the stop that the waypoint belongs to, never less than the one before: a jump back leads to
+        another stop of the same item.  Where it is not given, waypoints of one item in a row are one.
     unjoined: stops that whoever flies goes to, and that the waypoints lack, for no tangent joins them to a circle.
     """
 
@@ -75,13 +78,17 @@ class Route:
     landing_ground: float = math.nan
     return_from: int = -1
     return_to: ReturnCircle | None = None
+    stops: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     unjoined: tuple[Unjoined, ...] = ()
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
         if not len(self.arcs):
             object.__setattr__(self, "arcs", np.zeros(len(self.waypoints)))
-        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs"):
+        if len(self.stops) != len(self.waypoints):
+            changes = np.flatnonzero(np.diff(self.items))
+            object.__setattr__(self, "stops", np.searchsorted(changes, np.arange(len(self.items))))
+        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops"):
             array = np.array(getattr(self, name))
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -182,6 +189,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
         items=np.pad(route.items, (head, tail), constant_values=-1),
         arcs=np.pad(route.arcs, (head, tail)),
+        stops=np.concatenate([np.arange(head), route.stops + head, route.stops[-1:] + head + np.arange(1, tail + 1)]),
         started=started,
         return_from=route.return_from + (head if route.return_from >= 0 else 0),
     )
@@ -302,6 +310,7 @@ def lay_route(
         + placed.notes
         + notes.lines(),
         arcs=arcs,
+        stops=np.cumsum([False, *(a is not b for a, b in pairwise(stops))]),
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground,

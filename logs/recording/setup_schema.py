@@ -106,6 +106,7 @@ class RouteTable(SetupModel):
     started: str
     notes: tuple[str, ...]
     arcs: Annotated[_Column, Field(alias="arcs_m")] = []
+    stops: Annotated[list[Annotated[int, Field(ge=0, lt=2**31)]], _LISTED] = []
     endless: Annotated[int, Field(alias="endless_jump")] = -1
     takeoff_ground: Annotated[_Height, Field(alias="takeoff_ground_m")] = None
     landing_ground: Annotated[_Height, Field(alias="landing_ground_m")] = None
@@ -121,7 +122,13 @@ class RouteTable(SetupModel):
         waypoints = np.array(self.waypoints)
         if not (leg_runs(waypoints) > 0.0).all():
             raise self.fault(file, "waypoints", "a leg without horizontal length")
-        for field in ("airspeed", "acceptance", "fly_over", "items", *(["arcs"] if self.arcs else [])):
+        for field in (
+            "airspeed",
+            "acceptance",
+            "fly_over",
+            "items",
+            *(name for name in ("arcs", "stops") if getattr(self, name)),
+        ):
             length, expected = len(getattr(self, field)), len(waypoints) - (field == "airspeed")
             if length != expected:
                 raise self.fault(file, field, f"{length} values: {expected} are expected")
@@ -131,7 +138,8 @@ class RouteTable(SetupModel):
         known = {field: math.nan if height is None else height for field, height in heights.items()}
         circle = None if self.return_to is None else ReturnCircle(*self.return_to)
         items = np.array(self.items, dtype=np.int64)
-        return _made(Route, self, waypoints=waypoints, items=items, return_to=circle, **known)
+        stops = np.array(self.stops, dtype=np.int64)
+        return _made(Route, self, waypoints=waypoints, items=items, stops=stops, return_to=circle, **known)
 
 
 class EnvelopeTable(SetupModel):

@@ -464,7 +464,7 @@ def fly_as_ardupilot(
     b = waypoints[own.leg + 1]
     if b.circle != 0.0 and not b.returns:
         # A loiter is over by ArduPlane's own account; what circles at a mission's end has not missed it.
-        memory.returning = b.item == waypoints[-1].item
+        memory.returning = b.stop == waypoints[-1].stop
         stays = b.stays == math.inf and own.stayed > UNLIMITED
         memory.done = memory.returning and (own.over or stays)
     if own.returning:

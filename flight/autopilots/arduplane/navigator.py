@@ -187,7 +187,7 @@ def _loiter(
     if not own.over and _is_over(estimated, b, own):
         own.over, own.waited = True, 0.0
     after = own.leg + 2
-    while after < waypoints.shape[0] and waypoints[after].item == b.item:
+    while after < waypoints.shape[0] and waypoints[after].stop == b.stop:
         after += 1
     if after >= waypoints.shape[0]:
         return

@@ -91,7 +91,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
         across, beyond = beyond_end(work.true, path.waypoint[: settings.waypoints])
         memory.done = beyond >= 0.0
         # What circles at a mission's end, as wide as it can, has not missed it.
-        memory.returning = before.circle != 0.0 and before.item == last.item
+        memory.returning = before.circle != 0.0 and before.stop == last.stop
         if memory.done:
             memory.cross_track = across
     return end_tick(work)

@@ -130,7 +130,7 @@ def _loiter(
         if after < waypoints.shape[0] and on_rim and past_corner(estimated, b):
             begin_leg(estimated, waypoints, own.leg + 1, own)
         return
-    while after < waypoints.shape[0] and waypoints[after].item == b.item:
+    while after < waypoints.shape[0] and waypoints[after].stop == b.stop:
         after += 1
     if after >= waypoints.shape[0] or own.reached_for <= b.stays + SWITCH_DELAY:
         return
@@ -142,7 +142,7 @@ def _loiter(
 def is_last(waypoints: Records, own: Record) -> bool:  # pragma: no cover - compiled
     """Whether nothing comes after what is flown to now, a loiter's own corners left aside."""
     b = waypoints[own.leg + 1]
-    last: bool = own.leg + 2 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].item == b.item)
+    last: bool = own.leg + 2 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].stop == b.stop)
     return last
 
 
@@ -220,7 +220,7 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
         out = bearing - math.copysign(math.acos(min(1.0, share)), a.circle)
         own.from_east += abs(a.circle) * math.sin(out)
         own.from_north += abs(a.circle) * math.cos(out)
-    if not (a.circle != 0.0 and a.item == b.item):
+    if not (a.circle != 0.0 and a.stop == b.stop):
         own.circling, own.at_rim, own.begun_up = False, False, estimated.up
         own.reached_for = 0.0
     own.nearest = math.inf

@@ -151,6 +151,7 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
         fly_over=route.fly_over[points],
         items=route.items[points],
         arcs=route.arcs[points],
+        stops=route.stops[points],
         endless=-1,
         takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
         landing_ground=route.landing_ground if last == route.legs else math.nan,

@@ -137,7 +137,7 @@ def test_after_a_loiter_the_slope_begins_at_its_top() -> None:
     way = waypoints((-60.0, -60.0, 500.0), (0.0, 0.0, 500.0), (EAST, NORTH, 100.0))
     for name, loiter, ahead in (("centre_east", 120.0, EAST), ("centre_north", 0.0, NORTH), ("circle", 120.0, 60.0)):
         way[name][:2], way[name][2] = loiter, ahead
-    way["returns"][2], way["item"] = True, (1, 1, 2)
+    way["returns"][2], way["stop"] = True, (1, 1, 2)
     here = flying(0.0, 1.0, course=math.atan2(EAST, NORTH))
     own = navigated(memory(loitering=True, over=True), here, way)
     assert own.leg == 1

@@ -112,13 +112,13 @@ def test_far_from_a_loiter_it_flies_to_its_centre() -> None:
 
 
 # A circle of 200 m about the origin, left for a place 5 km north of it.
-CIRCLE = {"circle": 200.0, "item": 1, "stays": math.nan, "turns": 1.0}
+CIRCLE = {"circle": 200.0, "stop": 1, "stays": math.nan, "turns": 1.0}
 
 
 def circle_route(**fields: Any) -> np.ndarray:
     """From 5 km south to a loiter at sea level, and on."""
     way = waypoints((0, -5000, 0), (0, 200, 0), (0, 5000, 0))
-    way["item"] = (0, 1, 2)
+    way["stop"] = (0, 1, 2)
     for name, value in (CIRCLE | fields).items():
         way[name][1] = value
     return way
@@ -214,7 +214,7 @@ def test_beside_a_loiter_the_turn_is_that_from_or_to_its_middle() -> None:
     """A right angle to the middle, though the route goes on by the tangent with half of that: it turns 90 m before."""
     for north, leg in ((-1091.0, 0), (-1089.0, 1)):
         way = waypoints((0, -3000, 500), (0, -1000, 500), (200, -800, 500), (5000, -1000, 500), turn=RIGHT_ANGLE / 2)
-        way["circle"][2], way["centre_east"][2], way["centre_north"][2], way["item"] = 200.0, 900.0, -1000.0, range(4)
+        way["circle"][2], way["centre_east"][2], way["centre_north"][2], way["stop"] = 200.0, 900.0, -1000.0, range(4)
         own = memory(from_north=-3000.0)
         navigate_legs(flying(0.0, north), way, parameters(), own, 1.0, 0.1)
         assert own.leg == leg

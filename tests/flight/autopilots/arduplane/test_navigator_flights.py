@@ -134,3 +134,32 @@ def test_without_end_the_items_radius_is_flown_and_for_a_time_never(command: int
     assert done.ended == "completed"
     track = Flown(done.track.time[::20], done.track.position[::20], np.zeros((0, 2)))
     assert track.radius(np.array([0.0, 1500.0])) == pytest.approx(radius, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("lines", "around", "visits"),
+    [
+        # Six times 40 s at 25 m/s on 262 m of radius at 500 m are 3.64 circles; a turn more at each end at most.
+        ((wp(0, 0, 500, 19, p="40 0 250 0"), "2 177 2 5 0 0 0 0 0", wp(0, 3000, 500)), 3.64, 1),
+        # Once around, back to the first waypoint, and around again, where the mission ends.
+        ((wp(0, 0, 500, 18, p="1 0 250 0"), "2 177 1 1 0 0 0 0 0"), 2.0, 2),
+    ],
+)
+def test_loiters_that_a_jump_leads_back_to_are_flown_each_time(
+    lines: tuple[str, ...], around: float, visits: int
+) -> None:
+    setup = setup_by_law(mission(wp(0, -2000, 500), *lines, home="36.5 -84.2 0"))
+    law = ArduPlane(load_parameters(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
+    airframe = replace(load_airframe(setup.scenario), autopilot=law)
+    setup = replace(make_setup(setup.scenario, airframe, setup.mission, 1), nav="perfect")
+    done = simulate(setup, airframe.aircraft)
+    assert done.ended == "completed"
+    east, north = done.track.position[:, 0], done.track.position[:, 1]
+    near = np.hypot(east, north) < 400.0
+    assert int((np.diff(near.astype(int)) == 1).sum()) == visits
+    turned = sum(
+        float(np.ptp(np.unwrap(np.arctan2(east[part], north[part]))))
+        for part in np.split(np.arange(len(near)), np.flatnonzero(np.diff(near.astype(int))) + 1)
+        if near[part[0]] and len(part) > 1
+    )
+    assert around - 0.3 < turned / (2.0 * np.pi) < around + 1.3

@@ -38,7 +38,7 @@ def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
     made = np.zeros(len(points), WAYPOINT)
     made["east"], made["north"], made["up"] = np.array(points).T
     made["airspeed"] = 25.0
-    made["item"], made["stays"] = np.arange(len(points)), math.nan
+    made["stop"], made["stays"] = np.arange(len(points)), math.nan
     for name, value in fields.items():
         made[name] = value
     return made

@@ -119,7 +119,7 @@ def test_a_circle_at_the_gate_is_not_left_for_being_wider_than_the_switch_distan
     assert (next_one.leg, bool(next_one.circling)) == (1, False)
 
 
-CIRCLE = {"circle": 100.0, "centre_east": 0.0, "centre_north": 1000.0, "item": 1}
+CIRCLE = {"circle": 100.0, "centre_east": 0.0, "centre_north": 1000.0, "stop": 1}
 
 
 def to_a_loiter(**fields: Any) -> np.ndarray:
