@@ -66,6 +66,7 @@ class LoiterRules:
     climb, sink: its fastest in circles, m/s.
     short: by how much a height may be missed, m.
     ends_in_circle: whether after a mission's last waypoint it circles about that without end.
+    before_return: how it leaves a circle that a return to launch follows, where that is not flown, a note for people.
 
     >>> LoiterRules().radius, LoiterRules().at_middle
     (0.0, False)
@@ -82,6 +83,7 @@ class LoiterRules:
     sink: float = math.inf
     short: float = 0.0
     ends_in_circle: bool = False
+    before_return: str = ""
 
     def end_note(self) -> str:
         """What comes after the mission's end, a note for people.

@@ -325,6 +325,8 @@ def _note_circles(itinerary: Itinerary, kept: list[PlacedStop], loiters: LoiterR
     last = kept[-1].stop
     if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and last.loiter is None:
         notes.add(loiters.end_note(), last.item)
+    if loiters.before_return and itinerary.returns and last.loiter is not None:
+        notes.add(loiters.before_return, last.item)
 
 
 def _lay_return(

@@ -153,6 +153,7 @@ class ArduPlane(Autopilot):
             climb=made.tecs_climb_max,
             sink=made.tecs_sink_max or math.inf,
             short=REACHED_HEIGHT,
+            before_return=_BEFORE_RETURN,
         )
 
     @property
@@ -190,6 +191,9 @@ class ArduPlane(Autopilot):
         """The law, whoever flew before, with other parameters."""
         return ArduPlane(self.parameters.changed(**values))
 
+
+# `Plane::verify_loiter_heading` lines up with the place of the next item; a return has none, which is 0 N 0 E.
+_BEFORE_RETURN = "ArduPlane leaves its circle heading for 0° N 0° E, and returns from there: flown heading for home"
 
 # A radius of so many metres or less is none to ArduPlane.  A mission's item holds that of LOITER_TURNS in a byte: whole
 # metres, or from this on whole tens of them; those without end and to a height have sixteen bits

@@ -163,3 +163,13 @@ def test_loiters_that_a_jump_leads_back_to_are_flown_each_time(
         if near[part[0]] and len(part) > 1
     )
     assert around - 0.3 < turned / (2.0 * np.pi) < around + 1.3
+
+
+def test_the_course_on_which_arduplane_leaves_a_circle_before_a_return_is_said() -> None:
+    """Its item has no place, and 0 degrees north, 0 east is headed for."""
+    around, onward, back = wp(0, 0, 500, 18, p="1 0 250 0"), wp(0, 3000, 500), "3 20 0 0 0 0 0 0 0"
+    for lines, said in (((around, back), True), ((around, onward, back), False), ((around, onward), False)):
+        notes = setup_by_law(mission(wp(0, -2000, 500), *lines)).route.notes
+        assert (
+            any(note.startswith("item 2: ArduPlane leaves its circle heading for 0° N 0° E") for note in notes) == said
+        )
