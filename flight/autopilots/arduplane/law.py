@@ -116,6 +116,17 @@ def min_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover 
 
 
 @inner
+def stall_bank(airspeed: float, slowest: float) -> float:  # pragma: no cover - compiled
+    """Bank that an airspeed bears without a stall, rad: 25 degrees at the least.
+
+    airspeed, slowest: what is flown and the least of straight flight, both equivalent or both true, m/s.
+    """
+    spare = max(1.0, airspeed / slowest)
+    bank: float = max(_MIN_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare))))
+    return bank
+
+
+@inner
 def roll_demand(
     side_acceleration: float, pitch: float, airspeed: float, parameters: Record
 ) -> float:  # pragma: no cover - compiled
@@ -126,8 +137,7 @@ def roll_demand(
     wanted = wanted_bank(side_acceleration, pitch, parameters)
     if parameters.stall_prevention <= 0.0:
         return wanted
-    spare = max(1.0, airspeed / parameters.airspeed_min)
-    limit = max(_MIN_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare))))
+    limit = stall_bank(airspeed, parameters.airspeed_min)
     demanded: float = min(limit, max(-limit, wanted))
     return demanded
 

@@ -48,11 +48,13 @@ class PointMass(NamedTuple):
     record: of `POINT_MASS`.
     excess: (t, v, h) specific excess power, by throttle, m/s.
     power: (3, v, h) electric power at idle, in level flight and at full throttle, W.
+    glides: whether its excess power with the throttle closed is that of trims.
     """
 
     record: Record
     excess: Floats
     power: Floats
+    glides: bool = True
 
 
 def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
@@ -60,7 +62,8 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
 
     airspeed: commanded, m/s, equivalent.  Beyond the grid of the trims its edge counts.
     """
-    speeds, excess, alpha, lift = _trimmed(aircraft)
+    speeds, trims, alpha, lift = _trimmed(aircraft)
+    excess = filled_excess(trims)
     has_power = bool(envelope.power_level.size)
     power = np.full((3, len(speeds), len(_HEIGHTS)), np.nan)
     if has_power:
@@ -73,14 +76,14 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
     record.induced = _induced_drag(speeds, excess[0, :, 0])
     record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
     record.wind_east, record.wind_north = -math.sin(wind.from_course), -math.cos(wind.from_course)
-    return PointMass(record, excess, power)
+    return PointMass(record, excess, power, bool(np.isfinite(trims[0]).any()))
 
 
 @functools.lru_cache(maxsize=8)
 def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     """Airspeeds (v,), specific excess power (t, v, h) and the angle of attack, without lift and times V^2 with it.
 
-    Where there is no trim the nearest throttle's counts.
+    Excess power is NaN where there is no trim.
     """
     simulator = Fdm(aircraft)
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _SPEEDS)
@@ -97,13 +100,37 @@ def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
                 excess[t, v, h] = speed * math.sin(found.climb)
                 if h == 0:
                     alphas[v] = found.alpha
-            _fill(excess[:, v, h])
-        for row in excess[:, :, h]:
-            _fill(row)
     _fill(alphas)
     terms = np.stack([np.ones(_SPEEDS), speeds**-2.0], axis=1)
     alpha, lift = np.linalg.lstsq(terms, np.nan_to_num(alphas), rcond=None)[0]
     return speeds, excess, float(alpha), float(lift)
+
+
+def filled_excess(trims: Floats) -> Floats:
+    """Specific excess power (t, v, h) by throttle, airspeed and height, m/s, of trims that are NaN where there is none.
+
+    There the nearest throttle's counts, then the nearest airspeed's, then the nearest height's.  But a closed throttle
+    is filled from closed ones alone, as far as there are any: a more open one has thrust, and would be no glide.
+
+    >>> trims = np.array([[[-2.0], [np.nan]], [[1.0], [0.5]]])
+    >>> filled_excess(trims)[0].tolist(), filled_excess(trims)[1].tolist()
+    ([[-2.0], [-2.0]], [[1.0], [0.5]])
+    """
+    excess, closed = trims.copy(), trims[:1].copy()
+    _fill_along(excess, 0)
+    for table in (excess, closed):
+        _fill_along(table, 1)
+        _fill_along(table, 2)
+    if np.isfinite(closed).any():
+        excess[:1] = closed
+    return excess
+
+
+def _fill_along(table: Floats, axis: int) -> None:
+    """Fill each line along an axis."""
+    lines = np.moveaxis(table, axis, -1)
+    for at in np.ndindex(lines.shape[:-1]):
+        _fill(lines[at])
 
 
 def _fill(values: Floats) -> None:

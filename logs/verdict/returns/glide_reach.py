@@ -1,8 +1,9 @@
 """What a flying aircraft can glide to: it flies on for a moment, turns to the way that leads there, and glides.
 
 The way there is that of a search backwards (`logs.verdict.returns.glide_map`), which knows no turns.  So the turn is
-flown first, to either side, in the mean wind: at the airspeed that the aircraft has, banked as far as its autopilot
-banks, with the sink of that.  What its speed above that of the glide would give back is not counted.
+flown first, to either side, in the mean wind: banked as far as its autopilot banks and its airspeed bears, as much
+faster as the load in that bank makes it, with the sink of that.  What its speed above that of the glide would give back
+is not counted, nor what it takes to get as fast as the turn.
 """
 
 import math
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
+from flight.autopilots.arduplane.law import stall_bank
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
 from flight.autopilots.arduplane.swift_return import REACTION, Surroundings
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -38,8 +40,9 @@ def heights_left(
     """What is left (n,) of each start's height over the least from which a place is reached, m, and that place.
 
     starts: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.  airspeed: of the glide, equivalent, m/s.
-    bank: of the turn, rad.  What is left is negative where the place is out of reach, -inf where no way leads there.
-    The place is a cell of the map, counted through all rows, as in `logs.verdict.returns.glide_map.Needs`.
+    bank: of the turn, rad; only what the airspeed bears of it is flown.  What is left is negative where the place is
+    out of reach, -inf where no way leads there.  The place is a cell of the map, counted through all rows, as in
+    `logs.verdict.returns.glide_map.Needs`.
     """
     left, reached = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
     made = needs.made
@@ -66,6 +69,7 @@ def _look_ahead(
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Fill what is left and what is reached, for each start the better of both turns."""
     here = np.zeros(1, _TURNING)[0]
+    fastest = aircraft.slowest + (excess.shape[1] - 1) * aircraft.speed_step
     for n in range(starts.shape[0]):
         start = starts[n]
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
@@ -73,12 +77,13 @@ def _look_ahead(
         air_east, air_north = start.velocity_east - wind_east, start.velocity_north - wind_north
         slowest = glider.airspeed * true_by_equivalent(start.up)
         speed = max(slowest, math.hypot(air_east, air_north))
-        tilt = math.tan(glider.bank)
+        bank = min(glider.bank, stall_bank(speed, slowest))
+        tilt = math.tan(bank)
         straight = -excess_power(excess, 0.0, speed, start.up, aircraft)
-        # In the turn it flies at the same angle of attack, which the load makes faster.
-        fast = speed / math.sqrt(math.cos(glider.bank))
+        # In the turn it flies at the same angle of attack, which the load makes faster, but no faster than it may.
+        fast = max(speed, min(speed / math.sqrt(math.cos(bank)), fastest))
         sink = aircraft.induced / fast * tilt * tilt - excess_power(excess, 0.0, fast, start.up, aircraft)
-        lasts = _PART * speed / (GRAVITY * tilt)
+        lasts = _PART * fast / (GRAVITY * tilt)
         # To the middle of a cell beside, whatever the course.
         worst = -excess_power(excess, 0.0, slowest, start.up, aircraft) / max(1.0, 0.95 * slowest - wind)
         for side in (-1.0, 1.0):
@@ -87,7 +92,7 @@ def _look_ahead(
             here.north = start.north + REACTION * start.velocity_north
             here.up = start.up - REACTION * max(straight, -start.velocity_up)
             for part in range(_PARTS):
-                over_east, over_north = speed * math.sin(yaw) + wind_east, speed * math.cos(yaw) + wind_north
+                over_east, over_north = fast * math.sin(yaw) + wind_east, fast * math.cos(yaw) + wind_north
                 here.course = math.atan2(over_east, over_north)
                 if not _is_clear(here, floor, spheres, radii, glider):
                     break

@@ -7,6 +7,7 @@ from logs.verdict.returns.judge_glides import MARGIN, REACHES, Glide, GlideRange
 
 _NOT_JUDGED: dict[NotJudged, str] = {
     "terrain": "there is no elevation file",
+    "trim": "the model has no trim with the throttle closed",
     "far": "the way is too long for a map of what lies around it",
 }
 _FROM: dict[Reach, str] = {

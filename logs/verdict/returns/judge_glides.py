@@ -41,8 +41,9 @@ REACHES: tuple[Reach, ...] = ("home", "site", "flat", "nothing", "unknown")
 # How ArduPlane's own return ends without thrust: at its target; there, but lower over the ground than `MARGIN`; in the
 # ground; in a kill sphere; off the elevation data; or it is not flown, for it would follow the terrain.
 OwnEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
-# Why nothing is judged: there is no elevation file, or the mission reaches too far for a map of it.
-NotJudged = Literal["", "terrain", "far"]
+# Why nothing is judged: there is no elevation file; the model has no trim with the throttle closed; or the mission
+# reaches too far for a map of it.
+NotJudged = Literal["", "terrain", "trim", "far"]
 
 
 class GlideSite(NamedTuple):
@@ -177,6 +178,8 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     terrain, around = world.scenario.terrain, world.around
     if terrain is None:
         return Glides((), sites, airspeed, fuel=fuel, not_judged="terrain")
+    if not world.aircraft.glides:
+        return Glides((), sites, airspeed, fuel=fuel, not_judged="trim")
     if not len(starts):
         return Glides((), sites, airspeed, fuel=fuel)
     rows = starts.rows

@@ -16,10 +16,13 @@ AIRSPEED, SINK, BANK = 18.0, 1.8, math.radians(30.0)
 NO_SPHERES, NO_RADII = np.zeros((0, 3)), np.zeros(0)
 
 
-def glider(wind: float = 0.0, blows_to: float = 0.0, fast_sink: float = SINK) -> PointMass:
+def glider(
+    wind: float = 0.0, blows_to: float = 0.0, fast_sink: float = SINK, induced: float = 0.0, growth: float = 0.0
+) -> PointMass:
     """One that sinks 1.8 m/s at any airspeed and in any bank, in a wind (m/s) that blows on a course (degrees).
 
-    fast_sink: from 24 m/s on, m/s.
+    fast_sink: from 24 m/s on, m/s.  induced: of `POINT_MASS`, which a bank adds to.  growth: of the sink by airspeed,
+    from 26 m/s to 30 m/s, the fastest.
     """
     record: Record = np.zeros(1, POINT_MASS)[0]
     record.airspeed, record.slowest, record.speed_step, record.height_step = 25.0, AIRSPEED, 2.0, 2000.0
@@ -27,6 +30,8 @@ def glider(wind: float = 0.0, blows_to: float = 0.0, fast_sink: float = SINK) ->
     record.wind_east, record.wind_north = math.sin(math.radians(blows_to)), math.cos(math.radians(blows_to))
     excess = np.full((21, 7, 3), -SINK)
     excess[:, 3:] = -fast_sink
+    excess[:, 4:] -= growth * np.array([0.0, 2.0, 4.0])[None, :, None]
+    record.induced = induced
     return PointMass(record, excess, np.zeros((3, 7, 3)))
 
 

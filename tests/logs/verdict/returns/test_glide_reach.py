@@ -26,18 +26,21 @@ from world.kernels import Records
 from world.terrain import Terrain
 
 MARGIN, TOP, CRUISE, REACTION = 30.0, 2000.0, 26.0, 3.0
+# In a turn, at the same angle of attack: m/s; how long half a circle lasts, s.
+FAST = CRUISE / math.sqrt(math.cos(BANK))
+HALF = math.pi * FAST / (9.80665 * math.tan(BANK))
 
 
 def left_of(
     terrain: Terrain, *, up: float = 800.0, course: float = 0.0, wind: float = 0.0, blows_to: float = 0.0,
     east: float = 0.0, north: float = 0.0, speed: float = CRUISE, sphere: tuple[float, ...] = (),
-    fast_sink: float = SINK,
+    fast_sink: float = SINK, induced: float = 0.0, growth: float = 0.0, bank: float = BANK,
 ) -> tuple[float, tuple[float, float, float]]:  # fmt: skip
     """What is left of a start's height to reach a place 3 km north of the middle, and which place that is."""
     spheres, radii = (np.array([sphere[:3]]), np.array([sphere[3]])) if sphere else (NO_SPHERES, NO_RADII)
     made = glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0)
     assert made is not None
-    aircraft = glider(wind, blows_to, fast_sink)
+    aircraft = glider(wind, blows_to, fast_sink, induced, growth)
     needs = least_heights(made, np.array([made.cell_of(0.0, 3000.0)]), glide_slopes(aircraft, AIRSPEED, 0.0, TOP), TOP)
     start: Records = np.zeros(1, RETURN_START)
     to = math.radians(blows_to)
@@ -45,7 +48,7 @@ def left_of(
     start["velocity_east"] = speed * math.sin(math.radians(course)) + wind * math.sin(to)
     start["velocity_north"] = speed * math.cos(math.radians(course)) + wind * math.cos(to)
     around = Surroundings(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
-    left, reached = heights_left(start, needs, aircraft, around, AIRSPEED, BANK)
+    left, reached = heights_left(start, needs, aircraft, around, AIRSPEED, bank)
     return float(left[0]), place_of(made, int(reached[0])) if reached[0] >= 0 else (math.nan,) * 3
 
 
@@ -64,8 +67,8 @@ def test_straight_ahead_it_costs_the_way_alone() -> None:
 @pytest.mark.parametrize("course", [90.0, -90.0, 150.0, -150.0])
 def test_behind_it_the_turn_costs_its_time_and_its_way(course: float) -> None:
     left, _ = left_of(plane(), course=course)
-    rate = 9.80665 * math.tan(BANK) / CRUISE
-    radius, turned = CRUISE / rate, math.radians(abs(course))
+    rate = 9.80665 * math.tan(BANK) / FAST
+    radius, turned = FAST / rate, math.radians(abs(course))
     # Ahead 78 m, then the arc: where it ends, beside and along the first course.
     along, beside = REACTION * CRUISE + radius * math.sin(turned), radius * (1.0 - math.cos(turned))
     to = math.radians(abs(course))
@@ -79,15 +82,62 @@ def test_behind_it_the_turn_costs_its_time_and_its_way(course: float) -> None:
 
 def test_it_sinks_in_its_turn_as_it_does_at_its_airspeed() -> None:
     """5.4 m/s at 26 m/s, and 1.8 m/s in the glide: 3.6 m/s more for as long as it flies on and turns."""
-    lasts = REACTION + math.pi * CRUISE / (9.80665 * math.tan(BANK))
+    lasts = REACTION + HALF
     slow, fast = (left_of(plane(), course=180.0, fast_sink=sink)[0] for sink in (SINK, 3.0 * SINK))
     assert slow - fast == pytest.approx(2.0 * SINK * lasts, abs=6.0)
+
+
+def turning_back(
+    bank: float, fast: float, sink: float, speed: float = CRUISE, allowed: float = 0.0
+) -> tuple[float, float]:
+    """What is left where half a circle ends right below the place, and what would be by plain sums.
+
+    bank: rad, fast: m/s, sink: m/s, in the turn.  allowed: bank, rad, where it is more.
+    """
+    rate = 9.80665 * math.tan(bank) / fast
+    left, _ = left_of(
+        plane(), course=180.0, east=2.0 * fast / rate, speed=speed, induced=120.0, growth=2.0, bank=max(bank, allowed)
+    )
+    needed = height_needed(0.0, 3000.0 + REACTION * speed, MARGIN)
+    return left, 800.0 - SINK * REACTION - sink * math.pi / rate - needed
+
+
+def test_a_turn_takes_the_time_and_the_induced_drag_of_its_load() -> None:
+    """In 40 degrees 29.7 m/s instead of 26, of induced drag as much more as the load's square: 1.7 times it."""
+    bank = math.radians(40.0)
+    fast = CRUISE / math.sqrt(math.cos(bank))
+    sink = SINK + 2.0 * (fast - CRUISE) + 120.0 / fast * math.tan(bank) ** 2
+    left, expected = turning_back(bank, fast, sink)
+    assert left == pytest.approx(expected, abs=4.0)
+
+
+def test_a_turn_is_as_wide_as_the_airspeed_of_its_load_makes_it() -> None:
+    """In 40 degrees 214 m, where 26 m/s would make 164 m: between slopes at 210 m it does not get around."""
+    left = [
+        left_of(
+            ground(lambda east, _north, at=at: np.where(np.abs(east) > at, 1200.0, 0.0), pitch=10.0),
+            course=180.0, bank=math.radians(40.0),
+        )[0]
+        for at in (210.0, 230.0)
+    ]  # fmt: skip
+    assert left[0] == -math.inf
+    assert left[1] > 0.0
+
+
+@pytest.mark.parametrize("speed", [CRUISE, true_airspeed(800.0)])
+def test_it_banks_no_further_than_its_airspeed_bears_and_turns_no_faster_than_it_may(speed: float) -> None:
+    """Of 80 degrees at 26 m/s 58.8 are left, at 30 m/s, the fastest; at its least airspeed 25 degrees."""
+    bank = max(math.radians(25.0), math.acos((true_airspeed(800.0) / speed) ** 2))
+    fast = min(30.0, speed / math.sqrt(math.cos(bank)))
+    sink = SINK + 2.0 * max(0.0, fast - 26.0) + 120.0 / fast * math.tan(bank) ** 2
+    left, expected = turning_back(bank, fast, sink, speed, math.radians(80.0))
+    assert left == pytest.approx(expected, abs=4.0)
 
 
 def test_in_wind_it_turns_with_the_wind() -> None:
     """It drifts 10 m/s times the turn's time, towards the place or away from it."""
     still = left_of(plane(), course=180.0)[0]
-    time = REACTION + math.pi * CRUISE / (9.80665 * math.tan(BANK))
+    time = REACTION + HALF
     for blows_to in (0.0, 180.0):
         sign = 1.0 if blows_to == 0.0 else -1.0
         away = 3000.0 + REACTION * CRUISE
@@ -100,14 +150,13 @@ def test_in_wind_it_turns_with_the_wind() -> None:
 
 @pytest.mark.parametrize("blows_to", [90.0, 270.0])
 def test_across_the_wind_it_turns_into_it(blows_to: float) -> None:
-    """10 m/s from the side for 17.5 s: of the 239 m that a turn leads aside 175 m are taken back."""
-    lasts = REACTION + math.pi * CRUISE / (9.80665 * math.tan(BANK))
-    aside = 2.0 * CRUISE**2 / (9.80665 * math.tan(BANK)) - 10.0 * lasts
+    """10 m/s from the side for 18.5 s: of the 276 m that a turn leads aside 185 m are taken back."""
+    lasts = REACTION + HALF
+    aside = 2.0 * FAST**2 / (9.80665 * math.tan(BANK)) - 10.0 * lasts
     away = 600.0 + REACTION * CRUISE
     needed = height_needed(math.copysign(aside, blows_to - 180.0), -away, MARGIN, 10.0, blows_to)
-    # A slope lets it turn to that side alone.
-    side = 1.0 if blows_to == 90.0 else -1.0
-    slope = ground(lambda east, _north: np.where(side * east > 250.0, 1200.0, 0.0))
+    # Between slopes it gets around into the wind alone: with it, it would be 461 m aside.
+    slope = ground(lambda east, _north: np.where(np.abs(east) > 250.0, 1200.0, 0.0))
     left, _ = left_of(slope, course=180.0, wind=10.0, blows_to=blows_to, north=2400.0)
     assert left == pytest.approx(800.0 - SINK * lasts - needed, abs=9.0)
 

@@ -114,6 +114,11 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     assert (found.each, found.not_judged) == ((), "terrain")
     assert glides_headline(found) == "not judged: there is no elevation file"
     assert glide_notes(found) == []
+    world = return_world(setup)
+    without = replace(world, aircraft=world.aircraft._replace(glides=False))
+    assert glides_headline(judge_glides(without, planned_starts(setup, 20.0))) == (
+        "not judged: the model has no trim with the throttle closed"
+    )
     follows = judged(setup, 20.0, TERRAIN_FOLLOW=1)
     assert {one.own.end for one in follows.each} == {"not flown"}
     assert {one.reach for one in follows.each} == {"home", "flat"}
