@@ -66,6 +66,7 @@ class LoiterRules:
     climb, sink: its fastest in circles, m/s.
     short: by how much a height may be missed, m.
     ends_in_circle: whether after a mission's last waypoint it circles about that without end.
+    unflown: what of its circles is not flown, a note for people, "" for nothing.
     before_return: how it leaves a circle that a return to launch follows, where that is not flown, a note for people.
 
     >>> LoiterRules().radius, LoiterRules().at_middle
@@ -83,6 +84,7 @@ class LoiterRules:
     sink: float = math.inf
     short: float = 0.0
     ends_in_circle: bool = False
+    unflown: str = ""
     before_return: str = ""
 
     def end_note(self) -> str:

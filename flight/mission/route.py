@@ -323,6 +323,8 @@ def lay_route(
 def _note_circles(itinerary: Itinerary, kept: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
     """Note what is not flown of the circles of whoever flies; kept: the stops, without a return."""
     last = kept[-1].stop
+    if loiters.unflown and (itinerary.returns or any(place.stop.loiter is not None for place in kept)):
+        notes.add(loiters.unflown)
     if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and last.loiter is None:
         notes.add(loiters.end_note(), last.item)
     if loiters.before_return and itinerary.returns and last.loiter is not None:

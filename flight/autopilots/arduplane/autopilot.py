@@ -153,6 +153,7 @@ class ArduPlane(Autopilot):
             climb=made.tecs_climb_max,
             sink=made.tecs_sink_max or math.inf,
             short=REACHED_HEIGHT,
+            unflown=_limited_circles(made.navl1_lim_bank),
             before_return=_BEFORE_RETURN,
         )
 
@@ -227,3 +228,13 @@ def radius_read(loiter: Loiter) -> float:
 def _growth(up: float) -> float:
     """By how much a circle is wider at a height (m AMSL): as the square of true by equivalent airspeed."""
     return float(true_by_equivalent(up)) ** 2
+
+
+def _limited_circles(bank: float) -> str:
+    """That a bank limit of circles (deg) is not flown; "" where ArduPlane has none.
+
+    With one, `AP_L1_Control::loiter_radius` lets no circle grow with height that the bank can hold as it is.
+    """
+    if bank <= 0.0:
+        return ""
+    return f"NAVL1_LIM_BANK {bank:g} is not flown: circles are as wide as without it, where ArduPlane's may be narrower"

@@ -13,6 +13,7 @@ from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.path import find_on_path, profile
 from flight.mission.itinerary import UNLIMITED
 from flight.simulation.tick import (
+    FAR,
     NOT_A_NUMBER,
     PATH_ROW,
     WORKSPACE,
@@ -474,12 +475,16 @@ def fly_as_ardupilot(
     b = waypoints[own.leg + 1]
     if b.circle != 0.0 and not b.returns:
         # A loiter is over by ArduPlane's own account; what circles at a mission's end has not missed it.
-        memory.returning = b.stop == waypoints[-1].stop
+        last = b.stop == waypoints[-1].stop
+        # A height that it gave up to reach is one that it has missed.
+        memory.returning = last and (not b.to_height or abs(estimated.up - b.up) <= FAR)
         stays = b.stays == math.inf and own.stayed > UNLIMITED
-        memory.done = memory.returning and (own.over or stays)
+        memory.done = last and (own.over or stays)
     if own.returning:
         end_return(estimated, waypoints[own.leg + 1], memory, dt)
     memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
+    if memory.done and b.to_height:
+        memory.height_error = estimated.up - b.up
     factor = true_by_equivalent(estimated.up)
     if not own.begun:
         _begin(state, estimated, waypoints, memory, parameters, own)

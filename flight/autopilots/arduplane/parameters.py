@@ -55,6 +55,7 @@ class Definition(NamedTuple):
 DEFINITIONS = {
     "navl1_period": Definition("NAVL1_PERIOD", 17.0, 1.0, 60.0),
     "navl1_damping": Definition("NAVL1_DAMPING", 0.75, 0.3, 2.0),
+    "navl1_lim_bank": Definition("NAVL1_LIM_BANK", 0.0, 0.0, 89.0),
     "navl1_xtrack_i": Definition("NAVL1_XTRACK_I", 0.02, 0.0, 1.0),
     "wp_radius": Definition("WP_RADIUS", 90.0, 0.0, 32767.0),
     "wp_max_radius": Definition("WP_MAX_RADIUS", 0.0, 0.0, 32767.0),
@@ -167,6 +168,7 @@ class ArduPilotParameters:
     source: str = ""
     navl1_period: float = field(init=False)
     navl1_damping: float = field(init=False)
+    navl1_lim_bank: float = field(init=False)
     navl1_xtrack_i: float = field(init=False)
     wp_radius: float = field(init=False)
     wp_max_radius: float = field(init=False)

@@ -173,3 +173,28 @@ def test_the_course_on_which_arduplane_leaves_a_circle_before_a_return_is_said()
         assert (
             any(note.startswith("item 2: ArduPlane leaves its circle heading for 0° N 0° E") for note in notes) == said
         )
+
+
+def test_a_bank_limit_of_circles_is_said_not_to_be_flown() -> None:
+    around, onward, back = wp(0, 0, 500, 18, p="1 0 250 0"), wp(0, 3000, 500), "3 20 0 0 0 0 0 0 0"
+    lines = {"circle": (around, onward), "return": (onward, back), "neither": (onward,)}
+    for name, bank, said in (("circle", 30, True), ("return", 30, True), ("neither", 30, False), ("circle", 0, False)):
+        read = mission(wp(0, -2000, 500), *lines[name])
+        setup = setup_by_law(read)
+        law = ArduPlane(load_parameters(load_aircraft("aerosonde"))).with_parameters(NAVL1_LIM_BANK=float(bank))
+        airframe = replace(load_airframe(setup.scenario), autopilot=law)
+        notes = make_setup(setup.scenario, airframe, read, 1).route.notes
+        assert any(note.startswith("NAVL1_LIM_BANK 30 is not flown") for note in notes) == said
+
+
+@pytest.mark.parametrize(("climb", "ended"), [(0.1, "missed"), (5.0, "completed")])
+def test_a_last_loiter_whose_height_was_given_up_has_not_been_flown(climb: float, ended: str) -> None:
+    """Three circles of 60 m at 25 m/s take 45 s, which are 4.5 m at 0.1 m/s: less than 5 m, so it gives up."""
+    setup = setup_by_law(mission(wp(0, -2000, 500), wp(0, 0, 700, 31, p="0 55 0 0"), home="36.5 -84.2 0"))
+    made = ArduPlane(load_parameters(load_aircraft("aerosonde")))
+    law = made.with_parameters(TECS_CLMB_MAX=climb, ROLL_LIMIT_DEG=55.0)
+    airframe = replace(load_airframe(setup.scenario), autopilot=law)
+    setup = replace(make_setup(setup.scenario, airframe, setup.mission, 1), nav="perfect")
+    done = simulate(setup, airframe.aircraft)
+    assert done.ended.startswith(ended)
+    assert (abs(done.track.position[-1, 2] - 700.0) < 10.0) == (ended == "completed")
