@@ -76,7 +76,8 @@ def test_damaged_copies_are_refused_or_told(tmp_path: Path, capsys: Output, name
         assert source is not None
         # What is told is what was found.
         assert ("Lost: " in out) == (source.damage.lossy or source.damage.cut), seed
-        assert (code == 3) == source.damage.lossy, seed
+        # A flight whose log pauses for long is judged as far as it is seen.
+        assert (code == 3) == (source.damage.lossy or out.startswith("not judged from ")), (seed, out)
         assert untold(name, flown.track.time, source, out) == "", (seed, out)
     assert set(codes) & {0, 3, 4}, "none was read"
     refused = codes.count(2)
