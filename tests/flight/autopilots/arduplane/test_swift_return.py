@@ -29,8 +29,8 @@ from world.wind import Wind
 
 # Law less flight of ArduPlane, where the least clearance before the circle is compared, m (issue 35).
 CLEARANCE = {"default": (-5.0, 5.0), "climbs": (-13.0, 8.0), "rally": (-10.0, 10.0)}
-# Point mass against the whole law in JSBSim, m: of the one flight that climbs first they are 10.0 m apart, the law 4.3 m
-# below ArduPlane's flight and the point mass 5.7 m above it.
+# Point mass against the whole law in JSBSim, m: of the one flight that climbs first they are 10.0 m apart, the law
+# 4.3 m below ArduPlane's flight and the point mass 5.7 m above it.
 APART = {"default": 3.0, "climbs": 11.0, "rally": 3.0}
 ASIDE, HEIGHT, ARRIVAL = 80.0, 20.0, 4.0
 
