@@ -19,6 +19,7 @@ timeline, instruments, movie         a flight again, from its log
 play_to_foxglove, play_to_stations   the same in other programs
 import_log, refly, recover           another program's log; its mission flown in JSBSim; a damaged log
 returns                              will it come home, from everywhere on its way
+survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely it is to fly; the largest wind from each direction
 serve                                a MAVLink vehicle for ground stations
 scenarios, aircraft                  what is embedded
@@ -95,6 +96,8 @@ if TYPE_CHECKING:
     from planfly.api.running import RunResult as RunResult
     from planfly.api.running import run as run
     from planfly.api.serving import serve as serve
+    from planfly.api.surveying import SurveyFound as SurveyFound
+    from planfly.api.surveying import survey as survey
     from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
     from planfly.campaigns.dispersions import SpreadError as SpreadError
     from planfly.campaigns.find_winds import WindsFound as WindsFound
@@ -198,6 +201,10 @@ _HOMES = {
             "run",
         ),
         "planfly.api.serving": ("serve",),
+        "planfly.api.surveying": (
+            "SurveyFound",
+            "survey",
+        ),
         "planfly.campaigns.campaign_result": ("CampaignResult",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_winds": ("WindsFound",),

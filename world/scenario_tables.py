@@ -296,6 +296,8 @@ class LimitsTable(ScenarioTable):
     """[limits]: a number, or "aircraft" for what the envelope allows.
 
     corridor_m: half width of the corridor about the legs; where it is not given, what the autopilot needs.
+    surveys: whether a survey is judged by its photo "lines", its turn-arounds left to the autopilot, or as any "path";
+    by its lines where it is not given.
     max_height_m: above ground; none where it is not given.
     """
 
@@ -307,6 +309,7 @@ class LimitsTable(ScenarioTable):
     min_clearance_m: Annotated[float, within(0.0, 5000.0)] = 30.0
     max_height_m: Annotated[float, within(0.0, 9000.0, above=True)] | None = None
     corridor_m: Annotated[float, within(1.0, 5000.0)] | None = None
+    surveys: Literal["lines", "path"] | None = None
 
     @model_validator(mode="after")
     def _a_band_between(self) -> "LimitsTable":

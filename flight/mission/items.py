@@ -153,6 +153,15 @@ def is_located(command: int, frame: int) -> bool:
     return frame != Frame.MISSION and (command <= _LAST_NAV or command in FENCES or command in _LOCATED_DO)
 
 
+def is_navigation(command: int) -> bool:
+    """Whether a command is a step of the flight, and what stands behind it waits until it is done.
+
+    >>> is_navigation(Command.NAV_WAYPOINT), is_navigation(Command.DO_SET_CAM_TRIGG_DIST)
+    (True, False)
+    """
+    return command <= _LAST_NAV
+
+
 def command_name(command: int) -> str:
     """MAVLink name of a command without "MAV_CMD_", or its number where planfly does not know it.
 

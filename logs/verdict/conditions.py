@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import find_aircraft
 from flight.simulation.setup import FlightSetup
+from logs.verdict.measures.route_requirements import surveys_of
 from world.errors import FlightError
 
 _NAV = {
@@ -63,6 +64,9 @@ def corridor_line(setup: FlightSetup) -> str:
     A flight that keeps to such a corridor may have flown beside its lines all along.
     """
     limits, autopilot = setup.scenario.limits, setup.autopilot
+    # How far a survey's lines were kept to is judged line by line.
+    if surveys_of(setup):
+        return ""
     gap = least_gap(setup.route.waypoints)
     if limits.corridor_m is not None or gap is None or gap[0] >= setup.corridor:
         return ""

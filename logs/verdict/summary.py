@@ -50,8 +50,12 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     'slopes on leg 0, to item 1, and leg 1, to item 2, are within what is not known of the aircraft'
     """
     open_findings = left_open(findings)
-    ways = [place_text(item.place) for item in open_findings if item.check == UNKNOWN_WAY]
-    circles = f"where the circle at {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
+    ways = [
+        f"{'the turn-around on' if item.place.kind == 'leg' else 'the circle at'} {place_text(item.place)}"
+        for item in open_findings
+        if item.check == UNKNOWN_WAY
+    ]
+    circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
     known = _unknown_of_aircraft([item for item in open_findings if item.check != UNKNOWN_WAY])
     return "; ".join(filter(None, [known, circles]))
 

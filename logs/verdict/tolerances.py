@@ -175,6 +175,27 @@ STALL_TOLERANCE = 0.2
 # Share of the battery or the tank that is to be left at the end: the reserve.
 RESERVE = 0.2
 
+# Surveys
+
+# Share of a photo line that is to be flown as a photo needs it: on the line, level, at the planned height over ground,
+# and with the camera on.  A line in twenty metres of which one is lost still overlaps as usual surveys do.
+PHOTO_SHARE = 0.95
+# Share of the spacing of lines.  So far beside its line a photo may be taken: two neighbours that are both off by it
+# are half again as far apart, which of 60 % of overlap leaves 40 %.
+PHOTO_ASIDE = 0.25
+# rad.  So far a photo may be banked: at 60 m above ground its middle is then 10 m aside.
+PHOTO_BANK = math.radians(10.0)
+# Share of the planned height over ground, and m.  So far a photo may be above or below it: what a photo shows, and
+# how much it overlaps, goes with the height.
+PHOTO_HEIGHT, PHOTO_HEIGHT_LEAST = 0.1, 5.0
+# rad.  Whoever flies along a line flies on a course within this of the line's.
+PHOTO_COURSE = math.radians(30.0)
+# m.  Steps that a photo line is looked at in.
+PHOTO_STEP = 1.0
+# Radii of the bank limit's arc.  So far beyond its waypoints a turn-around may lead that is too tight to be flown as
+# drawn: a turn back onto a line beside the one before takes 1 + sqrt(3) radii, and rolling takes the rest.
+TURN_AROUND_RADII = 3.25
+
 # The track beside its route
 
 # m.  A waypoint further than this from the track draws no row to itself.

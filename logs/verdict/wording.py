@@ -7,7 +7,7 @@ from logs.verdict.tolerances import ON_THE_SPOT
 from world.threats import threat_label
 
 # How a unit stands after a number.
-UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
+UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs", "%": " %"}
 # Longest statement of a headline, characters.
 _LONGEST = 80
 

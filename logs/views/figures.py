@@ -19,6 +19,7 @@ from logs.views.map import MapChart, flight_map, map_json
 from logs.views.moments import waypoint_names
 from logs.views.profile import profile_chart
 from logs.views.scene import SceneView, scene_data
+from logs.views.surveys import survey_chart
 from logs.views.time_series import control_chart, energy_chart, exposure_chart, time_chart
 from logs.views.turns import turn_chart
 
@@ -143,6 +144,17 @@ FIGURES = (
         caption=_text(
             "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's, and of a waypoint "
             "what counts as reached. Ringed: fails."
+        ),
+    ),
+    FigureEntry(
+        "survey", "Photo lines", _of_flight(survey_chart), file=False,
+        alternative=_text(
+            "Each survey's photo lines from above, laid level: what can be used, what is lost, and "
+            "the flown track."
+        ),
+        caption=_text(
+            "Broad: flown on the line, level, at its height over ground and with the camera on. Marked: lost. The axes "
+            "have different scales."
         ),
     ),
     FigureEntry(

@@ -48,6 +48,7 @@ COMMANDS = (
     Command("serve", _FLY),
     Command("check", _LOOK, "VerdictDocument"),
     Command("returns", _LOOK, "ReturnsAnswer"),
+    Command("survey", _LOOK, "SurveyAnswer"),
     Command("report", _LOOK, "ReportAnswer"),
     Command("compare", _LOOK, "CompareAnswer"),
     Command("replay", _LOOK, "ReplayAnswer"),

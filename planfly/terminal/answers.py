@@ -8,13 +8,17 @@ from pydantic import ConfigDict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
+from flight.mission.surveys import PhotoLine
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Verdict, verdict_json
+from logs.verdict.measures.photo_lines import LineMeasure
 from logs.verdict.returns.glides_text import glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import MARGIN
 from logs.verdict.returns.judge_returns import ReturnRange
 from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.aircraft import AircraftNumbers
 from planfly.api.returning import ReturnsFound, Suggested
+from planfly.survey_remedies import SurveyRemedy
 from world.frames import to_geo
 
 # ----------------------------------------------------------------------
@@ -729,6 +733,86 @@ class ReturnsAnswer:
     suggestions: list[ReturnSuggestion]
     """Of --suggest."""
     notes: list[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class PhotoLineEntry:
+    """A photo line, as flown; all but its items null where it was not.  Shares are of its length."""
+
+    first_item: int
+    last_item: int
+    length_m: float | None
+    usable: float | None
+    away: float | None
+    """Not flown along, or too far beside the line; of the rest, banked too much; then too far off its height over
+    ground; then with the camera off."""
+    banked: float | None
+    high: float | None
+    dark: float | None
+    lost_m: list[tuple[float, float]]
+    """Stretches that cannot be used, from its begin."""
+    photos: int | None
+    missed: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class SurveyRemedyEntry:
+    """A change with which the survey was flown, and all lines can be used."""
+
+    kind: str
+    """turn-around, every, course, parameter or airspeed."""
+    name: str
+    """Of the parameter."""
+    current: float
+    value: float
+    unit: str
+    length_m: float
+    """Of the way."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class SurveyAnswer:
+    """planfly survey: each survey's photo lines, in flying order."""
+
+    schema: Literal["planfly.survey/1"] = "planfly.survey/1"
+    exit_code: int
+    what: str
+    headline: str
+    usable: bool
+    surveys: list[list[PhotoLineEntry]]
+    remedies: list[SurveyRemedyEntry]
+    """Of --suggest."""
+    files: list[str]
+
+
+def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | None) -> PhotoLineEntry:
+    """A photo line as an answer has it."""
+    first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
+
+    def share(value: float | None) -> float | None:
+        return None if value is None else round(value, 4)
+
+    return PhotoLineEntry(
+        first_item=first,
+        last_item=last,
+        length_m=None if one is None else round(one.length, 1),
+        usable=share(None if one is None else one.good),
+        away=share(None if one is None else one.away),
+        banked=share(None if one is None else one.banked),
+        high=share(None if one is None else one.high),
+        dark=share(None if one is None else one.dark),
+        lost_m=[] if one is None else [(round(low, 1), round(high, 1)) for low, high in one.lost],
+        photos=None if one is None else one.photos,
+        missed=None if one is None else one.missed,
+    )
+
+
+def survey_remedy_entry(one: SurveyRemedy) -> SurveyRemedyEntry:
+    """What would help as an answer has it."""
+    return SurveyRemedyEntry(
+        kind=one.kind, name=one.name, current=round(one.current, 3), value=round(one.value, 3), unit=one.unit,
+        length_m=round(one.length, 1),
+    )  # fmt: skip
 
 
 def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:

@@ -19,6 +19,7 @@ FUNCTIONS = {
     "serve": ("serve",),
     "check": ("judge", "fly_by_each"),
     "returns": ("returns",),
+    "survey": ("survey",),
     "report": ("report", "foxglove_layout"),
     "compare": ("compare",),
     "replay": ("timeline", "instruments", "movie", "play_to_foxglove", "play_to_stations"),

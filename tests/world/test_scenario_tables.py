@@ -113,6 +113,7 @@ def test_every_default() -> None:
             "min_clearance_m": 30.0,
             "max_height_m": None,
             "corridor_m": None,
+            "surveys": None,
         },
         "planner": {
             "algorithm": None,

@@ -22,6 +22,7 @@ from aircraft.path_limits import (
 from flight.guidance.path import FlyByPath, path_polyline
 from flight.mission.fences import fence_zones
 from flight.mission.route import Route
+from flight.mission.surveys import Survey, camera_spacing, find_surveys
 from flight.simulation.setup import FlightSetup
 from logs.verdict.places import Place
 from logs.verdict.tolerances import LARGEST_OFFSET, OFF_SPEED, U_TURN
@@ -237,6 +238,7 @@ class RouteRequirements:
     ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
     envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
     airspace: the zones of scenario and mission.
+    surveys: those of a mission that a person brought, where the scenario judges surveys by their lines.
     """
 
     setup: FlightSetup
@@ -262,6 +264,7 @@ class RouteRequirements:
     path: PlannedPath
     envelope: bool
     airspace: Airspace
+    surveys: tuple[Survey, ...]
 
     @property
     def limits(self) -> Limits:
@@ -289,6 +292,14 @@ class RouteRequirements:
     def _item(self, waypoint: int) -> int | None:
         item = int(self.setup.route.items[waypoint])
         return None if item < 0 else item
+
+    def turns_around(self, waypoint: int) -> bool:
+        """Whether a waypoint is part of a survey's turn-around, its ends included: the autopilot's business."""
+        return any(a <= waypoint <= b for survey in self.surveys for a, b in survey.turn_arounds())
+
+    def leads_around(self, leg: int) -> bool:
+        """Whether a leg is part of a survey's turn-around."""
+        return any(a <= leg < b for survey in self.surveys for a, b in survey.turn_arounds())
 
     def leg_unit(self, leg: int) -> Floats:
         """East and north components of a leg's course, (2,)."""
@@ -348,7 +359,15 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
         path=_planned_path(setup.path, route, speeds),
         envelope=envelope,
         airspace=airspace_of(setup),
+        surveys=surveys_of(setup),
     )
+
+
+def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
+    """The surveys of a setup's mission; none of a plan of planfly's own, or where surveys are judged as any path."""
+    if setup.plan is not None or setup.scenario.limits.surveys == "path":
+        return ()
+    return find_surveys(setup.route, camera_spacing(setup.mission, setup.route))
 
 
 def true_route(setup: FlightSetup) -> Route:

@@ -13,8 +13,16 @@ from logs.verdict.tolerances import ROUNDING
 def corridor_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge how far from the legs the flight of each leg got; ``geometric``: how far its planned turns lead."""
-    return [_corridor(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
+    """Judge how far from the legs the flight of each leg got; ``geometric``: how far its planned turns lead.
+
+    In a survey only a corridor that somebody stated counts: how far from its lines a flight was the survey rule tells.
+    """
+    stated = requirements.setup.scenario.limits.corridor_m is not None
+    return [
+        _corridor(requirements, aligned, leg, geometric)
+        for leg in range(requirements.legs)
+        if stated or not any(survey.first <= leg < survey.last for survey in requirements.surveys)
+    ]
 
 
 def _corridor(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:

@@ -34,6 +34,8 @@ def slope_findings(
     """Judge each leg; ``geometric`` judges the route alone, without a flight."""
     out = []
     for leg in range(requirements.legs):
+        if requirements.leads_around(leg):
+            continue
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:
             measure = measure_slope(requirements, aligned, leg)

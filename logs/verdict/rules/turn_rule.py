@@ -36,7 +36,11 @@ def turn_findings(
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
-    return [_judge(requirements, i, measure, aligned) for i, measure in enumerate(measures, 1)]
+    return [
+        _judge(requirements, i, measure, aligned)
+        for i, measure in enumerate(measures, 1)
+        if not requirements.turns_around(i)
+    ]
 
 
 def _judge(

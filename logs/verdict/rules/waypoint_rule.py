@@ -25,10 +25,11 @@ def waypoint_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge how close the track came to each waypoint; ``geometric``: how close the planned path passes."""
+    asked = [i for i in range(len(requirements.points)) if not requirements.turns_around(i)]
     if geometric:
-        return [_planned(requirements, i) for i in range(len(requirements.points))]
+        return [_planned(requirements, i) for i in asked]
     apexes = requirements.apexes()
-    return [_flown(requirements, aligned, i, apexes) for i in range(len(requirements.points))]
+    return [_flown(requirements, aligned, i, apexes) for i in asked]
 
 
 def _planned(requirements: RouteRequirements, i: int) -> Finding:

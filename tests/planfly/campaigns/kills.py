@@ -58,13 +58,18 @@ def is_fork_server(process: psutil.Process | None) -> bool:
 
 
 @contextlib.contextmanager
-def workers_killed(kills: int, begun: threading.Event, seed: int = 5) -> Iterator[list[int]]:
-    """Kill workers of this process, one after another, from when flights come in on; the list of those killed."""
+def workers_killed(
+    kills: int, begun: threading.Event, seed: int = 5, pause: tuple[float, float] = (0.3, 1.2)
+) -> Iterator[list[int]]:
+    """Kill workers of this process, one after another, from when flights come in on; the list of those killed.
+
+    pause: before each, s, at least and at most; what is flown has to last for all of them.
+    """
     moments, over, killed = random.Random(seed), threading.Event(), list[int]()
 
     def kill() -> None:
         begun.wait()
-        while len(killed) < kills and not over.wait(moments.uniform(0.3, 1.2)):
+        while len(killed) < kills and not over.wait(moments.uniform(*pause)):
             workers = spawned_processes()
             if workers:
                 killed.append(moments.choice(workers))

@@ -230,8 +230,10 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
 
 def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> None:
     kills, count = scaled(20, 2), scaled(1200, 70)
+    # Seventy flights of two workers sleep for 1.75 s.
+    pause = (0.3, 1.2) if SOAK else (0.1, 0.4)
     begun, goal = threading.Event(), Goal(None, False, count)
-    with open_store(base, goal, tmp_path, resume=False) as store, workers_killed(kills, begun) as killed:
+    with open_store(base, goal, tmp_path, resume=False) as store, workers_killed(kills, begun, pause=pause) as killed:
         fly_campaign(base, goal, Workers(2), store, lambda *_: begun.set(), fly=slow_flight)
     assert len(killed) == kills
     assert table(tmp_path / DATABASE) == expected(base, tmp_path / "one", count)

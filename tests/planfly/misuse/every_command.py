@@ -14,6 +14,7 @@ from pathlib import Path
 from logs.recording.reader import read_log
 from planfly.commands.registry import COMMANDS
 from tests.planfly.commands.imported_log_files import FLIGHTS
+from tests.planfly.commands.test_survey import FIELD_SURVEY
 from tests.planfly.conftest import FIELD
 from tests.stopwatch import processes_of
 
@@ -56,6 +57,7 @@ EVERY = {
         Given(("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")),
         Given(("check", "flight.mcap", "--json", "new.json"), (0, 4), "new.json"),
         Given(("returns", "plan.json", "--every", "20", "--json", "new.json"), (0, 4), "new.json"),
+        Given(("survey", "lines.waypoints", "--aircraft", "x8", "--out", "out"), (0, 4), "out"),
         Given(("report", "flight.mcap", "--out", "out"), (0, 4), "out"),
         Given(("compare", "flight.mcap", "flight.mcap", "--out", "out"), target="out"),
         Given(("replay", "flight.mcap", "--speed", "1000")),
@@ -82,6 +84,7 @@ def make_inputs(folder: Path, flight: Path, broken: Path, *, imported: bool) -> 
     folder.mkdir()
     (folder / "field.toml").write_text(FIELD, encoding="utf-8")
     (folder / "short.waypoints").write_text(SHORT, encoding="ascii")
+    shutil.copy(FIELD_SURVEY, folder / "lines.waypoints")
     for path in (flight / "flight.mcap", flight / "plan.json", broken, FLIGHTS / "tight.BIN"):
         shutil.copy(path, folder)
     if not imported:

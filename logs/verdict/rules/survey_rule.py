@@ -1,0 +1,198 @@
+"""The survey rule: how much of each photo line is flown so that its photos can be used.
+
+A survey's turn-arounds are the autopilot's own business, as long as they keep ground, threats and zones: the rules of
+turns, slopes, waypoints and, unless somebody stated a corridor, of the corridor leave them alone.
+"""
+
+import math
+
+import numpy as np
+
+from flight.mission.surveys import PhotoLine, Survey
+from logs.verdict.findings import UNKNOWN_WAY, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.measures.circle_reach import within_reach
+from logs.verdict.measures.photo_lines import LineMeasure, measure_line
+from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import Place
+from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
+from logs.verdict.tolerances import PHOTO_BANK, PHOTO_SHARE, PLAN_TOLERANCE, TURN_AROUND_RADII
+
+
+def _lost(item: Finding) -> str:
+    """A photo line in a headline: how much of it can be used."""
+    return short_of_limit("photo line", item)
+
+
+def survey_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
+    """Judge each photo line; ``geometric``: by what the turns at its ends leave of it, and each turn-around's room."""
+    out = []
+    for survey in requirements.surveys:
+        for number, line in enumerate(survey.lines, 1):
+            if geometric:
+                out.append(_planned(requirements, survey, line, number))
+            else:
+                out.append(_flown(requirements, aligned, survey, line, number))
+        if geometric:
+            out += _turn_arounds(requirements, survey)
+    return out
+
+
+def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
+    """Turn-arounds too tight to be flown as drawn that have something within reach: only a flight tells their way."""
+    out = []
+    for number, (first, last) in enumerate(survey.turn_arounds(), 1):
+        if not any(_too_tight(requirements, i) for i in range(first, last + 1)):
+            continue
+        points, radii = requirements.points[first : last + 1], requirements.tightest[first : last + 1]
+        middle = points[:, :2].mean(axis=0)
+        radius = float(radii[np.isfinite(radii)].max(initial=0.0))
+        reach = float(np.hypot(*(points[:, :2] - middle).T).max()) + TURN_AROUND_RADII * radius
+        low, high = float(points[:, 2].min()), float(points[:, 2].max())
+        if found := within_reach(requirements, middle, low, high, reach):
+            reason = (
+                f"turn-around {number} is too tight to be flown as drawn, and within {reach:.0f} m of it"
+                f" {'; '.join(found)}: only a flight tells"
+            )
+            place, method = requirements.leg(first), "what lies around it"
+            out.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
+    return out
+
+
+def _too_tight(requirements: RouteRequirements, i: int) -> bool:
+    """Whether a corner has no room for its turn."""
+    turn = abs(float(requirements.turns[i]))
+    return 0 < i < requirements.legs and turn > turn_limit(requirements, i)[0] + PLAN_TOLERANCE
+
+
+def _named(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> str:
+    items = [int(requirements.setup.route.items[i]) for i in (line.first, line.last)]
+    return f"photo line {number} of {len(survey.lines)} (items {items[0]} to {items[1]})"
+
+
+def _place(requirements: RouteRequirements, line: PhotoLine) -> Place:
+    return requirements.leg(line.first)
+
+
+def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> Finding:
+    """What the turns at a line's ends leave of it, where the line ends at its turns."""
+    length = float(requirements.runs[line.first : line.last].sum())
+    cut_in = _taken(float(requirements.after[line.first]), length) if line.first == line.begins else 0.0
+    cut_out = _taken(_left_early(requirements, line), length) if line.last == line.ends else 0.0
+    share = max(0.0, length - cut_in - cut_out) / length
+    ok = share >= PHOTO_SHARE
+    name = _named(requirements, survey, line, number)
+    faults, facts = [], [f"{name}: its turns leave {100.0 * share:.0f} % of its {length:.0f} m straight"]
+    if not ok:
+        faults.append(
+            message(
+                f"{name}: the turns at its ends leave {100.0 * share:.0f} % of its {length:.0f} m straight",
+                f" ({cut_in:.0f} m at its begin, {cut_out:.0f} m at its end)",
+            )
+        )
+    return _finding(requirements, line, ok, faults, facts, share, geometric=True)
+
+
+def _left_early(requirements: RouteRequirements, line: PhotoLine) -> float:
+    """How far before a line's end its turn begins, m."""
+    setup, last = requirements.setup, line.last
+    if setup.autopilot.follows_path or not 0 < last < requirements.legs:
+        return float(requirements.before[last])
+    turn = abs(float(requirements.turns[last]))
+    stated = float(setup.route.acceptance[last]) if setup.autopilot.reads_acceptance else 0.0
+    return stated or setup.autopilot.turn_distance(turn, float(requirements.points[last, 2]))
+
+
+def _taken(metres: float, length: float) -> float:
+    return min(metres, length) if math.isfinite(metres) else length
+
+
+def _flown(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine, number: int
+) -> Finding:
+    name = _named(requirements, survey, line, number)
+    measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
+    if measure is None:
+        return _finding(requirements, line, None, [], [f"{name}: not flown"], math.nan, geometric=False)
+    ok = measure.good >= PHOTO_SHARE
+    faults = [] if ok else [_fault(measure, name)]
+    facts = [] if not ok else [f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used"]
+    if measure.missed:
+        facts.append(f"{measure.missed} of {measure.photos} photos missed")
+    return _finding(requirements, line, ok, faults, facts, measure.good, geometric=False, measure=measure)
+
+
+def lost_text(measure: LineMeasure) -> str:
+    """What the lost parts of a line lack, the largest first; "" where next to nothing is lost."""
+    lacks = {
+        f"not along it within {measure.allowed_aside:.0f} m": measure.away,
+        f"banked beyond {math.degrees(PHOTO_BANK):.0f}°": measure.banked,
+        f"more than {measure.allowed_off:.0f} m off its height over ground": measure.high,
+        "with the camera off": measure.dark,
+    }
+    parts = sorted(((share, what) for what, share in lacks.items() if share >= 0.005), reverse=True)
+    return ", ".join(f"{100.0 * share:.0f} % {what}" for share, what in parts)
+
+
+def _fault(measure: LineMeasure, name: str) -> Message:
+    """How much of a line can be used, what the rest lacks, and how much of its ends is lost."""
+    ends = f"; its first {measure.late:.0f} m and last {measure.early:.0f} m are lost"
+    return message(
+        f"{name}: {100.0 * measure.good:.0f} % of its {measure.length:.0f} m can be used",
+        f": {lost_text(measure)}{ends if max(measure.late, measure.early) >= 1.0 else ''}",
+    )
+
+
+def _finding(
+    requirements: RouteRequirements,
+    line: PhotoLine,
+    ok: bool | None,
+    faults: list[Message],
+    facts: list[str],
+    share: float,
+    *,
+    geometric: bool,
+    measure: LineMeasure | None = None,
+) -> Finding:
+    numbers = []
+    if measure is not None:
+        numbers = [
+            Fact("distance from the line", measure.aside, "m"),
+            Fact("height error", measure.off, "m"),
+            Fact("lost at its begin", measure.late, "m"),
+            Fact("lost at its end", measure.early, "m"),
+            Fact("photos missed", float(measure.missed), ""),
+        ]
+    return make_finding(
+        "survey",
+        _place(requirements, line),
+        ok=ok,
+        reason=reason_of(faults, facts),
+        faults=faults,
+        planned=100.0 * share if geometric else 100.0,
+        flown=None if geometric else 100.0 * share,
+        limit=100.0 * PHOTO_SHARE,
+        source="default",
+        margin=100.0 * (share - PHOTO_SHARE),
+        unit="%",
+        method="the turns' arcs" if geometric else "on the line, level, at its height, camera on",
+        facts=numbers,
+    )
+
+
+RULE = Rule(
+    name="survey",
+    title="photo lines",
+    noun="photo line",
+    asks="How much of each photo line of a survey is flown so that its photos can be used?",
+    margin=Margin("share of the photo line", "%", 5.0),
+    tolerances=(
+        *("PHOTO_SHARE", "PHOTO_ASIDE", "PHOTO_BANK", "PHOTO_HEIGHT", "PHOTO_HEIGHT_LEAST", "PHOTO_COURSE"),
+        *("PHOTO_STEP", "TURN_AROUND_RADII"),
+    ),
+    judge=survey_findings,
+    phrase=_lost,
+    log=LogNeeds(("attitude",), planned_heights=True, full_leg=True),
+)

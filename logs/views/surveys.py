@@ -1,0 +1,97 @@
+"""The photo lines of a survey from above: what of each can be used, what is lost, and the track beside them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.surveys import Survey
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.measures.photo_lines import LineMeasure, measure_line
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.track_alignment import align_track
+from logs.views.charts import Chart, Label, Layer, Panel
+
+Floats = NDArray[np.float64]
+
+# Beyond this number of lines every second is numbered, and so on; points of a track that are drawn.
+_NUMBERED, _POINTS = 24, 8000
+
+
+def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
+    """Each survey of a flight, its lines laid level; None where there is none, or nothing was flown of it."""
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, track)
+    if aligned is None or not requirements.surveys:
+        return None
+    panels = []
+    for number, survey in enumerate(requirements.surveys, 1):
+        measured = [measure_line(requirements, aligned, survey, line) for line in survey.lines]
+        rows = slice(int(aligned.rows[survey.first]), int(aligned.rows[survey.last]) + 1)
+        name = "survey" if len(requirements.surveys) == 1 else f"survey {number}"
+        panels.append(_panel(requirements, survey, measured, aligned.track.position[rows], name))
+    return Chart(
+        f"{setup.scenario.name}: photo lines",
+        "along the first line",
+        "m",
+        tuple(panels),
+        tall=360,
+        inches=4.6,
+        legend="below",
+    )
+
+
+def _panel(
+    requirements: RouteRequirements, survey: Survey, measured: list[LineMeasure | None], position: Floats, name: str
+) -> Panel:
+    origin = requirements.points[survey.first, :2]
+    unit = np.array([np.sin(survey.course), np.cos(survey.course)])
+    axes = np.stack([unit, [-unit[1], unit[0]]], axis=1)
+
+    def laid(places: Floats) -> Floats:
+        found: Floats = (places[:, :2] - origin) @ axes
+        return found
+
+    used, lost = [np.zeros((0, 2))], [np.zeros((0, 2))]
+    labels = []
+    step = -(-len(survey.lines) // _NUMBERED)
+    for number, (line, measure) in enumerate(zip(survey.lines, measured, strict=True), 1):
+        corners = laid(requirements.points[line.first : line.last + 1])
+        for to, stretches in ((lost, _lost(measure)), (used, _used(measure))):
+            for low, high in stretches:
+                to.append(_part(corners, low, high))
+        if (number - 1) % step == 0:
+            labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
+    thin = laid(position[:: max(1, len(position) // _POINTS)])
+    layers = (
+        Layer("line", "photo line, flown as photos need it", "planned", *_parted(used), quiet=True),
+        Layer("line", "photo line, lost", "fail", *_parted(lost), quiet=True),
+        Layer("line", "flown track", "flown", thin[:, 0], thin[:, 1], quiet=True),
+    )
+    return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
+
+
+def _lost(measure: LineMeasure | None) -> tuple[tuple[float, float], ...]:
+    """Stretches of a line that are lost, as shares of its length are not known: all of one that was not flown."""
+    return ((0.0, np.inf),) if measure is None else measure.lost
+
+
+def _used(measure: LineMeasure | None) -> list[tuple[float, float]]:
+    """Stretches of a line that can be used, m."""
+    if measure is None:
+        return []
+    edges = [0.0, *(metres for stretch in measure.lost for metres in stretch), measure.length]
+    return [(low, high) for low, high in zip(edges[::2], edges[1::2], strict=True) if high > low]
+
+
+def _part(corners: Floats, low: float, high: float) -> Floats:
+    """The part of a line (n, 2) between two distances along it, m."""
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    at = np.concatenate([[low], run[(run > low) & (run < high)], [min(high, run[-1])]])
+    return np.stack([np.interp(at, run, corners[:, axis]) for axis in range(2)], axis=1)
+
+
+def _parted(parts: list[Floats]) -> tuple[Floats, Floats]:
+    """Lines one behind another, with a gap between each two."""
+    gap = np.full((1, 2), np.nan)
+    together = np.vstack([piece for part in parts if len(part) for piece in (part, gap)] or [np.zeros((0, 2))])
+    return together[:, 0], together[:, 1]

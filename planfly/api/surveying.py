@@ -1,0 +1,190 @@
+"""Will the photos come out?  The lines of a survey as they are flown, and what would help those that are lost."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from flight.mission.surveys import Survey
+from flight.mission_files.formats import mission_text
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.reader import FlightLog, read_log
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.measures.photo_lines import LineMeasure, measure_line
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
+from logs.views.surveys import survey_chart
+from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
+from planfly.api.planning import Wind, changed_scenario
+from planfly.arguments import check_arguments
+from planfly.crash_safe_log import flight_text
+from planfly.first_start import with_warm_up
+from planfly.kernel_units.unit_kernels import FLYING
+from planfly.open_mission import is_log
+from planfly.pipeline import fly_and_judge
+from planfly.stages import stage
+from planfly.survey_remedies import SurveyRemedy, survey_remedies
+from planfly.survey_text import line_text, lines_headline, remedy_text, survey_text, usable
+from planfly.targets import SURVEY_FILES, clean_folder, refuse_folder
+from world.errors import MissionError
+from world.files import write_whole
+from world.scenario_tables import Guidance, Navigation
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class SurveyFound:
+    """What `planfly.survey` returns.
+
+    setup, track, verdict: of the flight.
+    surveys: of the mission, in flying order.
+    lines: of each survey, how its lines were flown; None for one that was not.
+    remedies: what would help, each flown; none where none was asked for, or nothing is lost.
+    files: written, none where no folder was named.
+    """
+
+    setup: FlightSetup
+    track: Track
+    verdict: Verdict
+    surveys: tuple[Survey, ...]
+    lines: tuple[tuple[LineMeasure | None, ...], ...]
+    remedies: tuple[SurveyRemedy, ...] = ()
+    files: tuple[Path, ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        """Whether enough of every line can be used."""
+        return all(usable(one) for lines in self.lines for one in lines)
+
+    @property
+    def headline(self) -> str:
+        """All lines in a line."""
+        return lines_headline([one for lines in self.lines for one in lines])
+
+    @property
+    def lines_of_lines(self) -> tuple[str, ...]:
+        """Each survey, and its lines, in words."""
+        out = []
+        for survey, lines in zip(self.surveys, self.lines, strict=True):
+            out.append(survey_text(survey))
+            out += [line_text(number, one) for number, one in enumerate(lines, 1)]
+        return tuple(out)
+
+    @property
+    def lines_of_remedies(self) -> tuple[str, ...]:
+        """What would help, in words."""
+        return tuple(remedy_text(one, self.setup.path.length) for one in self.remedies)
+
+    def __repr__(self) -> str:
+        return f"<SurveyFound {self.setup.scenario.name}: {self.headline}>"
+
+
+# Why a flight takes no other world.
+_AS_FLOWN = "a flight's photo lines are those that were flown"
+
+
+@with_warm_up(*FLYING)
+def survey(
+    what: FlightLog | FlownMission | str | Path,
+    *,
+    suggest: bool = False,
+    out: str | Path | None = None,
+    overwrite: bool = True,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    seed: int | None = None,
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    at: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
+    nav: Navigation | None = None,
+) -> SurveyFound:
+    """Fly a survey, and tell how much of each photo line can be used.
+
+    what: the path of a .waypoints or .plan, which is flown; or what `planfly.fly` gave, or a flight log or its path.
+    suggest: whether to look for what would let all lines be used, of a mission: longer turn-arounds, every so-manieth
+    line, another course, a parameter of the autopilot, a slower flight; each is flown before it is named.
+    out: folder for a picture of the lines, and for each other layout that would help as a .waypoints; None writes none.
+    overwrite: whether results in it are replaced.
+    scenario, terrain, fence, seed, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
+    mission, as of `planfly.fly`.
+    Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
+    """
+    check_arguments(seed=seed)
+    given = {"scenario": scenario, "terrain": terrain, "fence": fence or None, "seed": seed, "nav": nav}
+    changes: dict[str, Any] = {
+        "wind": wind, "turbulence": turbulence, "at": at, "aircraft": aircraft, "airspeed": airspeed, "params": params,
+        "guidance": guidance, "autopilot_law": autopilot_law,
+    }  # fmt: skip
+    if out is not None:
+        refuse_folder(Path(out), overwrite)
+    if isinstance(what, str | Path) and is_log(Path(what)):
+        refuse(str(what), given | changes | {"suggest": suggest or None}, _AS_FLOWN)
+        what = read_log(Path(what))
+    if isinstance(what, FlightLog | FlownMission):
+        refuse("flight", given | changes | {"suggest": suggest or None}, _AS_FLOWN)
+        found = _measured(what.setup, what.track, judge_flight(what.setup, what.track, what.ended or ""))
+        return _written(found, out, overwrite)
+    change = partial(changed_scenario, **changes, nav=nav)
+    opened = opened_mission(what, scenario, terrain, seed, fence, change)
+    _found_surveys(opened.setup)
+    with stage(f"flying {flight_text(opened.setup)}") as advance:
+        flown = fly_and_judge(opened.setup, opened.airframe, None, advance, reference=False)
+    found = _measured(flown.setup, flown.track, flown.verdict)
+    if suggest and not found.usable:
+        with stage("looking for what would help") as advance:
+            counted = count(1)
+            remedies = survey_remedies(
+                flown.setup, opened.airframe, flown.verdict, lambda text: advance(next(counted), 0.0, text)
+            )
+        found = replace(found, remedies=remedies)
+    return _written(found, out, overwrite)
+
+
+def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
+    """Write the picture of the lines, and the missions that would help, where a folder is named."""
+    if out is None:
+        return found
+    folder, chart = clean_folder(out, SURVEY_FILES, overwrite=overwrite), survey_chart(found.setup, found.track)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = []
+    if chart is not None:
+        # Imported here: matplotlib takes most of a second.
+        from logs.views.drawing import draw_chart, png_bytes
+
+        write_whole(folder / "survey.png", png_bytes(draw_chart(chart)))
+        files.append(folder / "survey.png")
+    for remedy in found.remedies:
+        if f"{remedy.kind}.waypoints" in SURVEY_FILES:
+            path = folder / f"{remedy.kind}.waypoints"
+            write_whole(path, mission_text(remedy.mission, "waypoints"))
+            files.append(path)
+    return replace(found, files=tuple(files))
+
+
+def _found_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
+    """The surveys of a mission.  Raises MissionError for one without."""
+    surveys = route_requirements(setup).surveys
+    if not surveys:
+        source = setup.mission.source
+        raise MissionError(
+            f"{source}: no survey: at least three parallel lines beside each other are expected", file=source
+        )
+    return surveys
+
+
+def _measured(setup: FlightSetup, track: Track, verdict: Verdict) -> SurveyFound:
+    surveys, requirements = _found_surveys(setup), route_requirements(setup)
+    aligned = align_track(requirements, track) if len(track) else None
+    lines = tuple(
+        tuple(None if aligned is None else measure_line(requirements, aligned, one, line) for line in one.lines)
+        for one in surveys
+    )
+    return SurveyFound(setup, track, verdict, surveys, lines)

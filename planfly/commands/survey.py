@@ -1,0 +1,75 @@
+"""``planfly survey``: how much of each photo line can be used."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import planfly
+from planfly.terminal.arguments import MISSIONS, completed, files, number
+from planfly.terminal.command_parser import LineParser, coloured
+from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
+from planfly.terminal.options import call, flown_by_options, result_options, steering_options, world_options
+from planfly.terminal.output import give_answer
+
+if TYPE_CHECKING:
+    from planfly import SurveyFound
+
+
+def survey_options(line: LineParser) -> None:
+    """The parser of ``planfly survey``."""
+    parser = line.command(
+        "survey",
+        "fly a survey: say how much of each photo line can be used, and what would help those that are lost",
+        "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot-law ardupilot --wind 5,250",
+        "planfly survey field.waypoints --suggest --out better",
+    )
+    completed(
+        parser.add_argument("what", metavar="MISSION|LOG", help=".waypoints or .plan, or a flight log (.mcap)"),
+        files(*MISSIONS, "mcap"),
+    )
+    parser.group("the survey").add_argument(
+        "--suggest",
+        action="store_true",
+        help="look for turn-arounds, an order or a course of the lines, a parameter or an airspeed with which all can "
+        "be used: each is flown",
+    )
+    world_options(parser)
+    flown_by_options(parser)
+    steering_options(parser).add_argument(
+        "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: 1)"
+    )
+    result_options(parser, "folder for a picture of the lines, and for each mission that would help (default: none)")
+
+
+def survey(args: argparse.Namespace) -> int:
+    """Judge every photo line: 0 where all can be used, 4 where one cannot."""
+    found = call(planfly.survey, args)
+    code = FLYABLE if found.usable else NOT_FLYABLE
+    print(f"survey    {coloured(found.headline, 'good' if found.usable else 'bad')}")
+    for text in found.lines_of_lines:
+        print(f"  {text}")
+    for text in found.lines_of_remedies:
+        print(coloured("  would help: ", "hint") + text)
+    if args.suggest and not found.usable and not found.remedies:
+        print("  no turn-around, order, course, parameter or airspeed was found that would help")
+    for path in found.files:
+        print(f"  written {path}")
+    give_answer(args, lambda: _answer(str(args.what), found, code))
+    return code
+
+
+def _answer(what: str, found: "SurveyFound", code: int) -> object:
+    from planfly.terminal.answers import SurveyAnswer, photo_line_entry, survey_remedy_entry
+
+    return SurveyAnswer(
+        exit_code=code,
+        what=what,
+        headline=found.headline,
+        usable=found.usable,
+        surveys=[
+            [photo_line_entry(found.setup, line, one) for line, one in zip(survey.lines, lines, strict=True)]
+            for survey, lines in zip(found.surveys, found.lines, strict=True)
+        ],
+        remedies=[survey_remedy_entry(one) for one in found.remedies],
+        files=[str(Path(path)) for path in found.files],
+    )

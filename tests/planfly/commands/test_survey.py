@@ -1,0 +1,55 @@
+"""``planfly survey``: a survey without turn-arounds, what it prints, answers and writes; and what would help."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import planfly
+from planfly.cli import main
+
+FIELD_SURVEY = Path(__file__).with_name("field.waypoints")
+BY = ["--aircraft", "x8", "--autopilot-law", "ardupilot"]
+
+
+def test_each_line_is_told_and_what_would_help_is_flown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = ["survey", str(FIELD_SURVEY), *BY, "--suggest", "--out", "better", "--json", "answer.json"]
+    assert main(asked) == 4
+    out = capsys.readouterr().out
+    assert "survey    0 of 4 photo lines can be used" in out
+    assert "4 lines, 60 m apart, the first on course 0°" in out
+    assert "would help: turn-arounds of" in out
+    answer = json.loads((tmp_path / "answer.json").read_text(encoding="utf-8"))
+    [lines] = answer["surveys"]
+    assert [(one["first_item"], one["last_item"]) for one in lines] == [(2, 4), (6, 8), (10, 12), (14, 16)]
+    for one in lines:
+        parts = sum(one[name] for name in ("usable", "away", "banked", "high", "dark"))
+        assert parts == pytest.approx(1.0, abs=0.001)
+        assert sum(high - low for low, high in one["lost_m"]) == pytest.approx(500.0 * (1.0 - one["usable"]), abs=2.0)
+    assert (tmp_path / "better" / "survey.png").read_bytes().startswith(b"\x89PNG")
+    # What is said to help does: flown again from its file, all lines can be used.
+    assert "turn-around" in {one["kind"] for one in answer["remedies"]}
+    assert main(["survey", "better/turn-around.waypoints", *BY]) == 0
+    assert "4 of 4 photo lines can be used" in capsys.readouterr().out
+
+
+def test_a_flight_and_its_log_say_the_same(tmp_path: Path) -> None:
+    flown = planfly.fly(FIELD_SURVEY, aircraft="x8", autopilot_law="ardupilot", log=tmp_path / "f.mcap")
+    assert [item.rule for item in flown.verdict.findings if item.ok is False] == ["survey"] * 4
+    of_flight, of_log = planfly.survey(flown), planfly.survey(tmp_path / "f.mcap")
+    assert of_flight.lines_of_lines == of_log.lines_of_lines
+    assert repr(of_log) == f"<SurveyFound field.waypoints: {of_log.headline}>"
+
+
+def test_what_is_no_survey_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = FIELD_SURVEY.read_text(encoding="ascii").splitlines()
+    short = tmp_path / "short.waypoints"
+    short.write_text("\n".join(rows[:10]) + "\n", encoding="ascii")
+    assert main(["survey", str(short), "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert "no survey: at least three parallel lines beside each other are expected" in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists()
