@@ -18,7 +18,7 @@ from planfly.reference_flights import deciding_parameter
 from world.errors import PlanflyError
 from world.scenario import with_flight
 
-RemedyKind = Literal["turn-around", "every", "course", "parameter", "airspeed"]
+RemedyKind = Literal["side", "turn-around", "every", "course", "parameter", "airspeed"]
 
 # Turn-arounds that are tried, m; lines that are left out; shares of the airspeed.
 TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 150.0, 200.0, 300.0, 400.0)
@@ -71,6 +71,7 @@ def survey_remedies(
     tried = _Trials(setup, airframe, verdict, told)
     longer = tried.turn_around(worst)
     found = [
+        tried.side(worst),
         longer,
         tried.every(worst, math.inf if longer is None else longer.value),
         tried.course(worst),
@@ -119,6 +120,14 @@ class _Trials:
         now = turn_around_of(self._setup.route, survey)
         found = self._least(survey, 1, [one for one in TURN_AROUNDS if one > now + 1.0])
         return None if found is None else SurveyRemedy("turn-around", "", now, found[0], "m", *found[1], found[0])
+
+    def side(self, survey: Survey) -> SurveyRemedy | None:
+        """The lines from the other side, which turns into the wind where it was turned with it."""
+        if self._setup.scenario.wind.speed <= 0.0:
+            return None
+        now = turn_around_of(self._setup.route, survey)
+        passed = self._laid(survey, SurveyLayout(now, backwards=True), "the lines from the other side")
+        return None if passed is None else SurveyRemedy("side", "", 0.0, 1.0, "", *passed, now)
 
     def every(self, survey: Survey, at_most: float) -> SurveyRemedy | None:
         """The least number of lines to go on by, with turn-arounds shorter than these (m) that pass with it."""

@@ -53,6 +53,8 @@ def survey_text(survey: Survey) -> str:
 def remedy_text(remedy: SurveyRemedy, length: float) -> str:
     """What would help, and what it costs of way.  length: of the route as it is, m."""
     match remedy.kind:
+        case "side":
+            change = "the lines from the other side"
         case "turn-around":
             change = f"turn-arounds of {remedy.value:.0f} m instead of {remedy.current:.0f} m"
         case "every":

@@ -32,7 +32,7 @@ COMPARE_FILES = (
     "compare.html",
 )
 # What `planfly.survey` may write: the picture of the lines, and missions that would help.
-SURVEY_FILES = ("survey.png", "turn-around.waypoints", "every.waypoints", "course.waypoints")
+SURVEY_FILES = ("survey.png", "side.waypoints", "turn-around.waypoints", "every.waypoints", "course.waypoints")
 # Stretches of a flight that are flown again, and what is written of each: of those after the first with its number.
 REFLOWN = 9
 REFLY_FILES = tuple(

@@ -26,6 +26,8 @@ CORNER = math.pi / 4.0
 TIGHTEST, WIDEST = 10.0, 20_000.0
 # A stop must be this far (m) outside a circle to have a tangent to it.
 _CLEAR = 2.0
+# Places nearer to each other than this, m, are one; heights that differ by no more than this, m, are flown as one.
+_SAME_PLACE, _SAME_HEIGHT = 1.0, 10.0
 # Slope (tangent) of a spiral where no aircraft is known.
 PLAIN_SLOPE = 0.05
 
@@ -207,17 +209,23 @@ def _nodes(
         if stop.loiter is not None:
             node = replace(node, turn=_turn(source, stop, stop.loiter, float(up), notes, own_radius, rules))
             while nodes and nodes[-1].turn == 0.0 and nodes[-1].away(node) < abs(node.turn) + _CLEAR:
-                inside = nodes.pop().stop
-                _left_out(inside, node.stop, notes)
-                if nodes or (inside.item >= 0 and inside.command not in TAKEOFFS):
-                    unjoined.append(Unjoined(inside.item, stop.item, is_circle=False))
+                inside = nodes.pop()
+                _left_out(inside.stop, node.stop, notes)
+                # Who flies at the middle comes past a place there, and needs no take-off's.
+                on_the_way = inside.away(node) < _SAME_PLACE and abs(inside.up - node.up) <= _SAME_HEIGHT
+                if inside.stop.item >= 0 and inside.stop.command not in TAKEOFFS and not on_the_way:
+                    unjoined.append(Unjoined(inside.stop.item, stop.item, is_circle=False))
         before = nodes[-1] if nodes else None
         if before is not None and before.turn != 0.0 and not is_joined(before, node):
             if node.turn == 0.0:
                 _left_out(stop, before.stop, notes)
                 unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=False))
                 continue
-            unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=True))
+            # Two circles of one item's radius about one place differ by what their heights make of it.
+            wide, own = abs(before.turn) / rules.growth(before.up), abs(node.turn) / rules.growth(node.up)
+            one_side = math.copysign(1.0, before.turn) == math.copysign(1.0, node.turn)
+            if before.away(node) >= _SAME_PLACE or abs(wide - own) >= _SAME_PLACE or not one_side:
+                unjoined.append(Unjoined(stop.item, before.stop.item, is_circle=True))
             notes.add(
                 f"its circle has no tangent from that of item {before.stop.item}: flown on that circle", stop.item
             )

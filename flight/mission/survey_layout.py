@@ -31,11 +31,13 @@ class SurveyLayout(NamedTuple):
     turn_around: m from each line's end to where its turn begins, and from there to the next line's begin; 0 for none.
     every: 2 for every second line on the way there and the others on the way back, 3 for every third, and so on.
     course: of the lines, rad; None for the one they have.
+    backwards: whether to begin with the line on the other side.
     """
 
     turn_around: float
     every: int = 1
     course: float | None = None
+    backwards: bool = False
 
 
 class _Line(NamedTuple):
@@ -83,7 +85,7 @@ def with_layout(
     before, after = list(mission.items[:first]), list(mission.items[last + len(_trailing(mission, last)) + 1 :])
     _drop_extension(before, after, route, seqs, survey)
     made = list(before)
-    for line in _ordered(lines, layout.every):
+    for line in _ordered(lines, layout):
         made += _with_ends(line, layout.turn_around, origin)
     # Two items of one number cannot be told apart: all are numbered anew.
     numbered = [replace(item, seq=k) for k, item in enumerate([*made, *after], 1)]
@@ -122,18 +124,18 @@ def _drop_extension(
         items[:] = [item for item in items if item.seq not in beyond or item.command != Command.NAV_WAYPOINT]
 
 
-def _ordered(lines: Sequence[_Line], every: int) -> list[_Line]:
-    """Lines in the order of flight, each the other way round than the one before; the first as it is."""
+def _ordered(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
+    """Lines in the order of flight, each the other way round than the one before; the first as the first is."""
     start, end = lines[0].ends
     unit = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
     right = np.array([unit[1], -unit[0]])
     offsets = [float((line.ends.mean(axis=0) - start) @ right) for line in lines]
     aside = sorted(range(len(lines)), key=lambda k: offsets[k])
-    if offsets[0] > 0.5 * (min(offsets) + max(offsets)):
+    if (offsets[0] > 0.5 * (min(offsets) + max(offsets))) is not layout.backwards:
         aside.reverse()
     out: list[_Line] = []
-    for begin in range(every):
-        for k in aside[begin::every]:
+    for begin in range(layout.every):
+        for k in aside[begin :: layout.every]:
             line, ahead = lines[k], len(out) % 2 == 0
             out.append(line if (float((line.ends[1] - line.ends[0]) @ unit) > 0.0) == ahead else _reversed(line))
     return out

@@ -138,14 +138,16 @@ def find_surveys(route: Route, camera: Floats) -> tuple[Survey, ...]:
 
 
 def _straight_runs(route: Route) -> list[tuple[int, int]]:
-    """First and last waypoint of each straight run; a circle's corners are none."""
+    """First and last waypoint of each straight run; a circle's corners, take-off, landing and a return are none."""
     courses, arcs, end = leg_courses(route.waypoints), route.arcs, len(route.waypoints) - 1
     last = route.return_from if route.return_from >= 0 else end
+    lands, takes_off = math.isfinite(route.landing_ground), math.isfinite(route.takeoff_ground)
     runs, first = [], 0
     for k in range(1, last + 1):
         if k < last and abs(float(wrap(courses[k] - courses[first]))) <= _STRAIGHT and arcs[k] == 0.0:
             continue
-        if arcs[first] == 0.0 or arcs[k] == 0.0:
+        on_ground = (takes_off and first == 0) or (lands and k == end)
+        if not on_ground and (arcs[first] == 0.0 or arcs[k] == 0.0):
             runs.append((first, k))
         first = k
     return runs

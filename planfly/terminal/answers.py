@@ -760,7 +760,7 @@ class SurveyRemedyEntry:
     """A change with which the survey was flown, and all lines can be used."""
 
     kind: str
-    """turn-around, every, course, parameter or airspeed."""
+    """side, turn-around, every, course, parameter or airspeed."""
     name: str
     """Of the parameter."""
     current: float

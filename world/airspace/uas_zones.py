@@ -156,7 +156,7 @@ def _limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[st
         return None
     try:
         height = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         height = math.nan
     # A limit of infinity is one that there is not.
     if not height > -math.inf:
@@ -174,7 +174,7 @@ def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
     """Rings of [latitude, longitude] of a polygon's coordinates."""
     try:
         rings = [[[float(corner[1]), float(corner[0])] for corner in ring] for ring in coordinates]
-    except (TypeError, ValueError, IndexError, KeyError) as error:
+    except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
         raise _refused(source, "", "coordinates", "lists of [longitude, latitude] are expected") from error
     if not rings:
         raise _refused(source, "", "coordinates", "at least one ring is expected")
@@ -184,7 +184,7 @@ def _rings(coordinates: Any, source: str) -> list[list[list[float]]]:
 def _circle(centre: Any, radius: Any, source: str) -> dict[str, float]:
     try:
         return {"lat_deg": float(centre[1]), "lon_deg": float(centre[0]), "radius_m": float(radius)}
-    except (TypeError, ValueError, IndexError, KeyError) as error:
+    except (TypeError, ValueError, IndexError, KeyError, OverflowError) as error:
         raise _refused(source, "", "circle", "a centre [longitude, latitude] and a radius, m, are expected") from error
 
 
@@ -218,7 +218,7 @@ def _times(applicability: Any, source: str) -> list[str]:
                 start = end = None
             schedule = one.get("schedule") or one.get("dailyPeriod") or [{}]
             periods += [_daily(start, end, daily) for daily in schedule]
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
+        except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             allowed = "dates and times by ISO 8601, and days MON to SUN or ANY, are expected"
             raise _refused(source, "", "applicability", allowed) from error
     if any(period == Period() for period in periods):

@@ -254,13 +254,15 @@ def _not_in_log(findings: Sequence[Finding], missing: MissingItems | None) -> st
 
 def _unseen(flown: Sequence[FlownLegs]) -> str:
     """When the log pauses for so long that nobody knows where the aircraft was, in words; "" for never."""
-    gaps = [gap for legs in flown for gap in gaps_between(legs, *_judged_times(legs))]
-    long = [gap for gap in gaps if gap.end - gap.start > LONGEST_UNSEEN]
+    long = []
+    for legs in flown:
+        time = legs.aligned.track.time
+        long += [(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(np.diff(time) > LONGEST_UNSEEN)]
     if not long:
         return ""
-    worst = max(long, key=lambda gap: gap.end - gap.start)
+    start, end = max(long, key=lambda pause: pause[1] - pause[0])
     others = f", and in {len(long) - 1} more pauses" if len(long) > 1 else ""
-    return f"not judged from {worst.start:.1f} s to {worst.end:.1f} s{others}: the log has no rows"
+    return f"not judged from {start:.1f} s to {end:.1f} s{others}: the log has no rows"
 
 
 def _judged_times(legs: FlownLegs) -> tuple[float, float]:

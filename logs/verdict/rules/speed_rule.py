@@ -157,7 +157,8 @@ def _commanded(requirements: RouteRequirements, leg: int, commanded: float) -> t
     """Level-flight speeds that hold all along a leg, and what is wrong with the commanded one."""
     heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(up) for up in heights]
-    slowest, fastest = max(low for low, _ in speeds), min(high for _, high in speeds)
+    # Without level flight at one height there is none all along the leg: NaN stays.
+    slowest, fastest = float(np.max([low for low, _ in speeds])), float(np.min([high for _, high in speeds]))
     faults = []
     if math.isnan(requirements.ground_speed[leg]):
         faults.append(message(f"the wind leaves no way along leg {leg} at {commanded:.0f} m/s"))

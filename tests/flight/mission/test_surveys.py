@@ -79,6 +79,18 @@ def test_what_is_no_survey(places: list[Place]) -> None:
     assert surveys(places) == ()
 
 
+def test_a_final_approach_beside_the_lines_is_none_of_them() -> None:
+    places = [wp(east, north) for east, north in grid(count=3)]
+    landing = [wp(200.0, 900.0, 60.0), wp(200.0, 0.0, 0.0, command=21)]
+    read = mission(*places, *landing, home="36.5 -84.2 0")
+    route = make_route(read, ORIGIN, None, 15.0, False)
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert len(found.lines) == 3
+    # The same as waypoints is a line.
+    [found] = surveys([*grid(count=3), (200.0, 900.0), (200.0, 0.0)])
+    assert len(found.lines) == 4
+
+
 def test_two_surveys_of_one_mission() -> None:
     crossed = [(east + 2000.0, north) for east, north in grid(turned_deg=90.0)]
     first, second = surveys([*grid(), *crossed])
@@ -132,6 +144,18 @@ def test_every_second_line_goes_there_and_the_others_come_back() -> None:
     assert places_of(made)[:, 1] == pytest.approx(
         [0.0, 800.0, 800.0, 0.0, 0.0, 800.0, 800.0, 0.0, 0.0, 800.0], abs=0.05
     )
+
+
+def test_lines_are_flown_from_the_other_side() -> None:
+    read, route = with_camera(*grid(count=4))
+    [found] = find_surveys(route, camera_spacing(read, route))
+    made = with_layout(read, route, found, SurveyLayout(0.0, backwards=True), ORIGIN)
+    assert made is not None
+    assert places_of(made)[::2, 0] == pytest.approx([180.0, 120.0, 60.0, 0.0], abs=0.05)
+    assert places_of(made)[:, 1] == pytest.approx([0.0, 800.0, 800.0, 0.0, 0.0, 800.0, 800.0, 0.0], abs=0.05)
+    assert [item.command for item in made.items] == [16, 206, 16, 206] * 4
+    # The camera is on along lines, and off between them, whichever way round they are.
+    assert camera_spacing(made, make_route(made, ORIGIN, None, 15.0, False)).tolist() == [25.0, 0.0] * 4
 
 
 def test_lines_on_another_course_cover_the_same_area() -> None:

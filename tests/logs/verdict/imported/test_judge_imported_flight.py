@@ -170,6 +170,20 @@ def test_what_the_aircraft_is_not_known_well_enough_for_is_left_open(tmp_path: P
     assert (told["answer"], told["undecided"], told["flyable"]) == ("not judged in full", True, False)
 
 
+@pytest.mark.parametrize(("seconds", "seen"), [(9.0, True), (11.0, False)])
+def test_rows_seldom_enough_leave_a_flight_open_though_none_is_missing(
+    tmp_path: Path, seconds: float, seen: bool
+) -> None:
+    """A track of one row each so many seconds has no pause; where the aircraft was between them nobody knows."""
+    time = example_raw_log().series["position"].time
+    _, first = np.unique(np.floor(time / seconds), return_index=True)
+    kept = np.zeros(len(time), dtype=bool)
+    kept[first] = True
+    assert float(np.diff(time[kept]).max()) == pytest.approx(seconds, abs=0.5)
+    verdict = judged(tmp_path, with_rows(kept), AEROSONDE).verdict
+    assert ("the log has no rows" in verdict.unjudged) is not seen
+
+
 def test_a_log_that_ends_on_the_way_says_nothing_of_the_rest(tmp_path: Path) -> None:
     time = example_raw_log().series["position"].time
     flight = judged(tmp_path, with_rows(time < 90.0), AEROSONDE)

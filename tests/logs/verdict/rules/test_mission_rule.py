@@ -258,6 +258,22 @@ UNJOINED = {
         (_WIDE, wp(0, 0, 300, command=18, p="1 0 200 0"), wp(5000, 0, 300)),
         (3, "no tangent joins its circle to that of item 2"),
     ),
+    # Nobody has to fly elsewhere for a loiter without a place of its own, or with that of the waypoint before.
+    "at-the-place-before": ((wp(0, 0, 300), wp(0, 0, 300, command=18, p="1 0 150 0"), wp(5000, 0, 300)), None),
+    "no-place": ((wp(0, 0, 300), "3 18 1 0 150 0 0 0 300", wp(5000, 0, 300)), None),
+    "far-below-it": (
+        (wp(0, 0, 100), wp(0, 0, 300, command=18, p="1 0 150 0"), wp(5000, 0, 300)),
+        (2, "lies inside the circle of item 3: ArduPlane flies there"),
+    ),
+    # 150 m at 500 m are 153 m, and at 350 m 151 m.
+    "down-one-place": (
+        (wp(0, 0, 200, command=18, p="2 0 150 0"), wp(0, 0, 50, command=31, p="0 150 0 0"), wp(5000, 0, 50)),
+        None,
+    ),
+    "down-the-other-way": (
+        (wp(0, 0, 200, command=18, p="2 0 150 0"), wp(0, 0, 50, command=31, p="0 -150 0 0"), wp(5000, 0, 50)),
+        (3, "no tangent joins its circle to that of item 2"),
+    ),
     "outside": ((_WIDE, wp(1500, 0, 300), wp(5000, 0, 300)), None),
     "apart": ((_WIDE, wp(5000, 0, 300, command=18, p="1 0 200 0"), wp(9000, 0, 300)), None),
     "twice": ((_WIDE, _WIDE, wp(5000, 0, 300)), None),
@@ -285,5 +301,6 @@ def test_what_no_tangent_joins_to_a_circle_fails_where_the_autopilot_flies_there
 def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
     around = (_WIDE, wp(5000, 0, 300))
     assert not setup_by_law(mission(wp(0, 0, 300, command=22), *around)).route.unjoined
-    # A waypoint there is flown to.
-    assert setup_by_law(mission(wp(0, 0, 300), *around)).route.unjoined
+    # Wherever in it that is; a waypoint there is flown to.
+    assert not setup_by_law(mission(wp(0, 300, 300, command=22), *around)).route.unjoined
+    assert setup_by_law(mission(wp(0, 300, 300), *around)).route.unjoined

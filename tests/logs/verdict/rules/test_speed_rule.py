@@ -54,6 +54,14 @@ def test_where_there_is_no_level_flight_no_speed_is_one_of_it() -> None:
         assert item.reason.startswith("no level flight at 300 m")
 
 
+def test_a_leg_that_climbs_to_where_there_is_no_level_flight_has_none() -> None:
+    low = replace(envelope(), level_speed_max=np.array([32.0, 32.0, np.nan]))
+    climb = [[0.0, 0.0, 900.0], [0.0, 9000.0, 1500.0]]
+    item = of(judge_geometry(make_setup(climb, table=low)), "speed", leg(0))
+    assert item.ok is False
+    assert item.reason.startswith("no level flight at 1500 m")
+
+
 @pytest.mark.parametrize(("speed", "ok"), [(28.0, True), (30.0, None), (32.5, False), (16.5, True)])
 def test_a_speed_within_what_is_not_known_is_undecided(speed: float, ok: bool | None) -> None:
     """32 m/s at most, give or take 2: 1.645 of those less is 28.7."""
