@@ -81,6 +81,16 @@ def survey_remedies(
     return tuple(one for one in found if one is not None)
 
 
+def _worst_margins(verdict: Verdict) -> dict[str, float]:
+    """The least margin of each rule that fails; -inf where a failure has none."""
+    worst: dict[str, float] = {}
+    for item in verdict.findings:
+        if item.ok is False:
+            margin = -math.inf if item.margin is None else item.margin
+            worst[item.rule] = min(margin, worst.get(item.rule, math.inf))
+    return worst
+
+
 def _of(survey: Survey, item: Finding) -> bool:
     return item.place.index is not None and survey.first <= item.place.index < survey.last
 
@@ -90,8 +100,7 @@ class _Trials:
 
     def __init__(self, setup: FlightSetup, airframe: Airframe, verdict: Verdict, told: Callable[[str], None]) -> None:
         self._setup, self._airframe, self._told = setup, airframe, told
-        self._failed = {item.rule for item in verdict.findings if item.ok is False}
-        self._verdict = verdict
+        self._worst, self._verdict = _worst_margins(verdict), verdict
 
     def _fly(self, mission: Mission, airframe: Airframe, what: str) -> tuple[Verdict, float] | None:
         """The verdict of a flight, and its length; None where it cannot be laid out."""
@@ -105,9 +114,11 @@ class _Trials:
         return flown.verdict, setup.path.length
 
     def _passes(self, verdict: Verdict) -> bool:
-        failed = {item.rule for item in verdict.findings if item.ok is False}
-        lines = [item for item in verdict.findings if item.rule == "survey"]
-        return bool(lines) and "survey" not in failed and failed <= self._failed
+        """Whether all lines of a flight can be used, and nothing else is worse than it was."""
+        lines = [item.ok for item in verdict.findings if item.rule == "survey"]
+        if not lines or not all(ok is True for ok in lines):
+            return False
+        return all(worst >= self._worst.get(rule, math.inf) for rule, worst in _worst_margins(verdict).items())
 
     def _laid(self, survey: Survey, layout: SurveyLayout, what: str) -> tuple[Verdict, Mission, float] | None:
         """A layout that passes; None where it does not."""

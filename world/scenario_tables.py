@@ -296,8 +296,8 @@ class LimitsTable(ScenarioTable):
     """[limits]: a number, or "aircraft" for what the envelope allows.
 
     corridor_m: half width of the corridor about the legs; where it is not given, what the autopilot needs.
-    surveys: whether a survey is judged by its photo "lines", its turn-arounds left to the autopilot, or as any "path";
-    by its lines where it is not given.
+    surveys: whether parallel lines are judged as the photo "lines" of a survey, its turn-arounds left to the autopilot,
+    or as any "path"; where it is not given, as lines where the mission switches its camera on them.
     max_height_m: above ground; none where it is not given.
     """
 

@@ -72,6 +72,8 @@ def with_layout(
     if any(seqs[i] not in at for line in survey.lines for i in range(line.first, line.last + 1)):
         return None
     blocks = [_block(mission, at, seqs, line) for line in survey.lines]
+    if not _only_waypoints(mission, at, seqs, survey):
+        return None
     lines = [
         _Line(route.waypoints[[line.first, line.last], :2], block)
         for line, block in zip(survey.lines, blocks, strict=True)
@@ -96,6 +98,20 @@ def _block(mission: Mission, at: dict[int, int], seqs: Sequence[int], line: Phot
     """A line's items, with those that stand behind its last waypoint."""
     first, last = at[seqs[line.first]], at[seqs[line.last]]
     return (*mission.items[first : last + 1], *_trailing(mission, last))
+
+
+def _only_waypoints(mission: Mission, at: dict[int, int], seqs: Sequence[int], survey: Survey) -> bool:
+    """Whether lines are flown by waypoints, and nothing but waypoints stands between them."""
+    for line in survey.lines:
+        steps = [mission.items[at[seqs[i]]] for i in range(line.first, line.last + 1)]
+        if any(item.command != Command.NAV_WAYPOINT for item in steps):
+            return False
+    for first, last in survey.turn_arounds():
+        end = at[seqs[first]]
+        between = mission.items[end + 1 + len(_trailing(mission, end)) : at[seqs[last]]]
+        if any(item.command != Command.NAV_WAYPOINT for item in between):
+            return False
+    return True
 
 
 def _trailing(mission: Mission, at: int) -> list[MissionItem]:
@@ -125,7 +141,12 @@ def _drop_extension(
 
 
 def _ordered(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
-    """Lines in the order of flight, each the other way round than the one before; the first as the first is."""
+    """Lines in the order of flight, each the other way round than the one before; the first as the first is.
+
+    Those of a survey that keeps its order stay as they are.
+    """
+    if layout.every == 1 and layout.course is None and not layout.backwards:
+        return list(lines)
     start, end = lines[0].ends
     unit = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
     right = np.array([unit[1], -unit[0]])

@@ -79,6 +79,10 @@ class Survey:
         """The waypoint at which it ends."""
         return self.lines[-1].last
 
+    def takes_photos(self) -> bool:
+        """Whether items of the mission switch the camera on its lines."""
+        return any(line.switched_on or line.switched_off or line.photo > 0.0 for line in self.lines)
+
     def turn_arounds(self) -> list[tuple[int, int]]:
         """Waypoints at which each turn-around begins and ends: the end of a line, and the begin of the next."""
         return [(one.last, other.first) for one, other in zip(self.lines[:-1], self.lines[1:], strict=True)]
@@ -90,21 +94,20 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
     The camera is switched by the items that stand behind a waypoint's, as soon as that is reached.  The legs to a
     waypoint that several items lead to by jumps are those of its item.
     """
-    switched, on = {}, 0.0
-    order = list(mission.items)
-    for k, item in enumerate(order):
-        if not is_navigation(item.command):
-            continue
-        for then in order[k + 1 :]:
-            if is_navigation(then.command):
-                break
-            if then.command == Command.DO_SET_CAM_TRIGG_DIST:
-                on = max(0.0, then.params[0]) if math.isfinite(then.params[0]) else 0.0
-            elif then.command in (Command.IMAGE_START_CAPTURE, Command.VIDEO_START_CAPTURE):
-                on = math.nan
-            elif then.command in (Command.IMAGE_STOP_CAPTURE, Command.VIDEO_STOP_CAPTURE):
-                on = 0.0
-        switched[item.seq] = on
+    flown = set(route.items.tolist())
+    switched, on, here = dict[int, float](), 0.0, None
+    for item in mission.items:
+        if is_navigation(item.command):
+            # What is flown at no place of its own belongs to the place before.
+            here = item.seq if item.seq in flown else here
+        elif item.command == Command.DO_SET_CAM_TRIGG_DIST:
+            on = max(0.0, item.params[0]) if math.isfinite(item.params[0]) else 0.0
+        elif item.command in (Command.IMAGE_START_CAPTURE, Command.VIDEO_START_CAPTURE):
+            on = math.nan
+        elif item.command in (Command.IMAGE_STOP_CAPTURE, Command.VIDEO_STOP_CAPTURE):
+            on = 0.0
+        if here is not None:
+            switched[here] = on
     out, held = np.zeros(len(route.items)), 0.0
     for i, seq in enumerate(route.items.tolist()):
         held = switched.get(seq, held)
@@ -126,6 +129,9 @@ def find_surveys(route: Route, camera: Floats) -> tuple[Survey, ...]:
     ([(0, 1), (2, 3), (4, 5)], (0.0, 60.0, 120.0), 60.0)
     """
     runs, surveys, at = _straight_runs(route), [], 0
+    if camera.any():
+        # Where items switch the camera, a line is where it is on.
+        runs = [(first, last) for first, last in runs if (camera[first:last] != 0.0).any()]
     while at < len(runs):
         chain = _chain(route.waypoints, runs, at)
         survey = _survey(route.waypoints, [runs[k] for k in chain], camera) if len(chain) >= _FEWEST else None
@@ -214,6 +220,9 @@ def _without_leads(points: Floats, lines: tuple[PhotoLine, ...]) -> tuple[PhotoL
     """
     lengths = leg_runs(points)
     if any(line.last - line.first < _LEGS_WITH_LEADS for line in lines):
+        return lines
+    # Waypoints at equal distances along a line are no leads.
+    if all(abs(float(lengths[line.first] - lengths[line.first + 1])) <= _SAME_LEAD for line in lines):
         return lines
     for end in ([line.first for line in lines], [line.last - 1 for line in lines]):
         leads = lengths[end]

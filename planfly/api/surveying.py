@@ -1,7 +1,6 @@
 """Will the photos come out?  The lines of a survey as they are flown, and what would help those that are lost."""
 
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -23,14 +22,15 @@ from planfly.arguments import check_arguments
 from planfly.crash_safe_log import flight_text
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.open_mission import is_log
+from planfly.open_mission import OpenedMission, is_log
 from planfly.pipeline import fly_and_judge
 from planfly.stages import stage
 from planfly.survey_remedies import SurveyRemedy, survey_remedies
 from planfly.survey_text import line_text, lines_headline, remedy_text, survey_text, usable
 from planfly.targets import SURVEY_FILES, clean_folder, refuse_folder
-from world.errors import MissionError
+from world.errors import LogError, MissionError
 from world.files import write_whole
+from world.scenario import Scenario
 from world.scenario_tables import Guidance, Navigation
 
 
@@ -130,22 +130,32 @@ def survey(
         what = read_log(Path(what))
     if isinstance(what, FlightLog | FlownMission):
         refuse("flight", given | changes | {"suggest": suggest or None}, _AS_FLOWN)
-        found = _measured(what.setup, what.track, judge_flight(what.setup, what.track, what.ended or ""))
-        return _written(found, out, overwrite)
-    change = partial(changed_scenario, **changes, nav=nav)
-    opened = opened_mission(what, scenario, terrain, seed, fence, change)
+        source = what.setup.source
+        if source is not None and "attitude" not in source.holds:
+            raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)
+        setup = what.setup.in_scenario(_with_lines(what.setup.scenario))
+        return _written(_measured(setup, what.track, judge_flight(setup, what.track, what.ended or "")), out, overwrite)
+
+    def change(world: Scenario) -> Scenario:
+        return _with_lines(changed_scenario(world, **changes, nav=nav))
+
+    return _written(_flown(opened_mission(what, scenario, terrain, seed, fence, change), suggest), out, overwrite)
+
+
+def _flown(opened: OpenedMission, suggest: bool) -> SurveyFound:
+    """Fly a mission, measure its lines, and look for what would help."""
     _found_surveys(opened.setup)
     with stage(f"flying {flight_text(opened.setup)}") as advance:
         flown = fly_and_judge(opened.setup, opened.airframe, None, advance, reference=False)
     found = _measured(flown.setup, flown.track, flown.verdict)
-    if suggest and not found.usable:
-        with stage("looking for what would help") as advance:
-            counted = count(1)
-            remedies = survey_remedies(
-                flown.setup, opened.airframe, flown.verdict, lambda text: advance(next(counted), 0.0, text)
-            )
-        found = replace(found, remedies=remedies)
-    return _written(found, out, overwrite)
+    if not suggest or found.usable:
+        return found
+    with stage("looking for what would help") as advance:
+        counted = count(1)
+        remedies = survey_remedies(
+            flown.setup, opened.airframe, flown.verdict, lambda text: advance(next(counted), 0.0, text)
+        )
+    return replace(found, remedies=remedies)
 
 
 def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
@@ -167,6 +177,12 @@ def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> Sur
             write_whole(path, mission_text(remedy.mission, "waypoints"))
             files.append(path)
     return replace(found, files=tuple(files))
+
+
+def _with_lines(scenario: Scenario) -> Scenario:
+    """A scenario that judges all parallel lines as a survey's: that is what was asked for."""
+    limits = scenario.limits.model_copy(update={"surveys": "lines"})
+    return replace(scenario, limits=limits, spec=scenario.spec.model_copy(update={"limits": limits}))
 
 
 def _found_surveys(setup: FlightSetup) -> tuple[Survey, ...]:

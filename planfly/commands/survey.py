@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import planfly
 from planfly.terminal.arguments import MISSIONS, completed, files, number
 from planfly.terminal.command_parser import LineParser, coloured
-from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
+from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
 from planfly.terminal.options import call, flown_by_options, result_options, steering_options, world_options
 from planfly.terminal.output import give_answer
 
@@ -42,10 +42,13 @@ def survey_options(line: LineParser) -> None:
 
 
 def survey(args: argparse.Namespace) -> int:
-    """Judge every photo line: 0 where all can be used, 4 where one cannot."""
+    """Judge every photo line: 4 where one cannot be used, else as the flight is judged."""
     found = call(planfly.survey, args)
-    code = FLYABLE if found.usable else NOT_FLYABLE
+    code = verdict_code(found.verdict)
+    if not found.usable:
+        code = NOT_FLYABLE
     print(f"survey    {coloured(found.headline, 'good' if found.usable else 'bad')}")
+    print(f"flight    {found.verdict.headline}")
     for text in found.lines_of_lines:
         print(f"  {text}")
     for text in found.lines_of_remedies:

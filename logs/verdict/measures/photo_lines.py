@@ -105,7 +105,7 @@ def measure_line(
         "away": np.abs(across) <= limit,
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= PHOTO_BANK,
         "high": np.abs(off) <= allowed,
-        "dark": _camera_on(requirements, line, position, along, axis.length),
+        "dark": _camera_on(requirements, line, position, along, ahead, axis.length),
     }
     good, state, lost = np.ones(0, dtype=np.bool_), ahead, {}
     for name, fulfilled in needed.items():
@@ -164,24 +164,24 @@ def _heights_off(
 
 
 def _camera_on(
-    requirements: RouteRequirements, line: PhotoLine, position: Floats, along: Floats, length: float
+    requirements: RouteRequirements, line: PhotoLine, position: Floats, along: Floats, ahead: Flags, length: float
 ) -> Flags:
     """Whether the camera is on at each row: from where the line's first waypoint counts as reached to its last's.
 
-    Of a mission that does not switch its camera there it always is.
+    Of a mission that does not switch its camera there it always is.  ahead: whether each row flies along the line.
     """
     follows, rows = requirements.setup.autopilot.follows_path, np.arange(len(along))
 
-    def reached(waypoint: int, from_along: float) -> int:
+    def reached(waypoint: int, from_along: float, after: int = 0) -> int:
         away = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
         # Who follows a path is at a waypoint where the path passes it.
         near = 0.0 if follows else reach(requirements, waypoint).radius
-        there = np.flatnonzero((away <= near) | (along >= from_along))
+        there = np.flatnonzero(((away <= near) | (along >= from_along)) & ahead & (rows >= after))
         return int(there[0]) if there.size else len(along)
 
     begins = reached(line.first, 0.0) if line.switched_on else 0
-    ends = reached(line.last, length) if line.switched_off else len(along)
-    return (rows >= begins) & (rows <= max(begins, ends))
+    ends = reached(line.last, length, begins) if line.switched_off else len(along)
+    return (rows >= begins) & (rows <= ends)
 
 
 def _cells(along: Floats, state: Flags, length: float) -> Flags:

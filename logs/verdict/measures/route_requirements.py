@@ -1,5 +1,6 @@
 """What a route asks of the aircraft and what the aircraft's limits are: the planned side of every finding."""
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -295,11 +296,11 @@ class RouteRequirements:
 
     def turns_around(self, waypoint: int) -> bool:
         """Whether a waypoint is part of a survey's turn-around, its ends included: the autopilot's business."""
-        return any(a <= waypoint <= b for survey in self.surveys for a, b in survey.turn_arounds())
+        return waypoint in _turned_around(self.surveys)[0]
 
     def leads_around(self, leg: int) -> bool:
         """Whether a leg is part of a survey's turn-around."""
-        return any(a <= leg < b for survey in self.surveys for a, b in survey.turn_arounds())
+        return leg in _turned_around(self.surveys)[1]
 
     def leg_unit(self, leg: int) -> Floats:
         """East and north components of a leg's course, (2,)."""
@@ -364,10 +365,25 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 
 
 def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
-    """The surveys of a setup's mission; none of a plan of planfly's own, or where surveys are judged as any path."""
-    if setup.plan is not None or setup.scenario.limits.surveys == "path":
+    """The surveys of a setup's mission that are judged by their lines; none of a plan of planfly's own.
+
+    Those whose camera is switched, or, where the scenario asks for "lines", all that have the form of one.
+    """
+    asked = setup.scenario.limits.surveys
+    if setup.plan is not None or asked == "path":
         return ()
-    return find_surveys(setup.route, camera_spacing(setup.mission, setup.route))
+    found = find_surveys(setup.route, camera_spacing(setup.mission, setup.route))
+    return tuple(one for one in found if asked == "lines" or one.takes_photos())
+
+
+@functools.lru_cache(maxsize=8)
+def _turned_around(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
+    """Waypoints and legs of all turn-arounds."""
+    ends = [pair for survey in surveys for pair in survey.turn_arounds()]
+    return (
+        frozenset(i for first, last in ends for i in range(first, last + 1)),
+        frozenset(i for first, last in ends for i in range(first, last)),
+    )
 
 
 def true_route(setup: FlightSetup) -> Route:

@@ -34,7 +34,8 @@ def slope_findings(
     """Judge each leg; ``geometric`` judges the route alone, without a flight."""
     out = []
     for leg in range(requirements.legs):
-        if requirements.leads_around(leg):
+        # Where nothing was flown nobody knows where a climb that cannot be flown leads.
+        if requirements.leads_around(leg) and not geometric:
             continue
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:

@@ -79,8 +79,11 @@ def _place(requirements: RouteRequirements, line: PhotoLine) -> Place:
 def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> Finding:
     """What the turns at a line's ends leave of it, where the line ends at its turns."""
     length = float(requirements.runs[line.first : line.last].sum())
-    cut_in = _taken(float(requirements.after[line.first]), length) if line.first == line.begins else 0.0
-    cut_out = _taken(_left_early(requirements, line), length) if line.last == line.ends else 0.0
+    # What the turns before and behind take of the leads does not matter.
+    lead_in = float(requirements.runs[line.begins : line.first].sum())
+    lead_out = float(requirements.runs[line.last : line.ends].sum())
+    cut_in = _taken(float(requirements.after[line.begins]) - lead_in, length)
+    cut_out = _taken(_left_early(requirements, line) - lead_out, length)
     share = max(0.0, length - cut_in - cut_out) / length
     ok = share >= PHOTO_SHARE
     name = _named(requirements, survey, line, number)
@@ -96,8 +99,8 @@ def _planned(requirements: RouteRequirements, survey: Survey, line: PhotoLine, n
 
 
 def _left_early(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """How far before a line's end its turn begins, m."""
-    setup, last = requirements.setup, line.last
+    """How far before the end of a line's straight run the turn there begins, m."""
+    setup, last = requirements.setup, line.ends
     if setup.autopilot.follows_path or not 0 < last < requirements.legs:
         return float(requirements.before[last])
     turn = abs(float(requirements.turns[last]))
@@ -106,7 +109,7 @@ def _left_early(requirements: RouteRequirements, line: PhotoLine) -> float:
 
 
 def _taken(metres: float, length: float) -> float:
-    return min(metres, length) if math.isfinite(metres) else length
+    return min(max(metres, 0.0), length) if math.isfinite(metres) else length
 
 
 def _flown(

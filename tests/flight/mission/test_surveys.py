@@ -112,6 +112,30 @@ def test_the_camera_between_photos() -> None:
     assert all((line.photo, line.switched_on, line.switched_off) == (25.0, True, True) for line in found.lines)
 
 
+def test_where_the_camera_is_switched_lines_are_where_it_is_on() -> None:
+    """A way back beside the lines, and the downwind of a landing, are none."""
+    lines = []
+    for k, (east, north) in enumerate(grid(count=3)):
+        lines += [wp(east, north), f"2 206 {0 if k % 2 else 25} 0 1 0 0 0 0"]
+    read = mission(*lines, wp(180, 800), wp(180, 0), home="36.5 -84.2 0")
+    route = make_route(read, ORIGIN, None, 15.0, False)
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert [(line.first, line.last) for line in found.lines] == [(0, 1), (2, 3), (4, 5)]
+
+
+def test_a_camera_that_is_on_from_the_start_and_one_behind_a_pause() -> None:
+    on, off, pause = "2 206 25 0 1 0 0 0 0", "2 206 0 0 1 0 0 0 0", "3 93 5 0 0 0 0 0 0"
+    read = mission(on, wp(0, 0), wp(0, 800), pause, off, wp(500, 800), home="36.5 -84.2 0")
+    route = make_route(read, ORIGIN, None, 15.0, False)
+    assert camera_spacing(read, route).tolist() == [25.0, 0.0, 0.0]
+
+
+def test_waypoints_at_equal_distances_along_a_line_are_no_leads() -> None:
+    places = [(60.0 * k, 200.0 * (n if k % 2 == 0 else 4 - n)) for k in range(3) for n in range(5)]
+    [found] = surveys(places)
+    assert [(line.first, line.last) for line in found.lines] == [(0, 4), (5, 9), (10, 14)]
+
+
 def places_of(read: Mission) -> np.ndarray:
     return np.array(make_route(read, ORIGIN, None, 15.0, False).waypoints)[:, :2]
 
@@ -183,6 +207,17 @@ def test_what_stands_around_a_survey_stays() -> None:
     assert places[0] == pytest.approx([-500.0, -300.0], abs=0.05)
     assert places[-2:] == pytest.approx(np.array(around[-2:]), abs=0.05)
     assert len(places) == 12 + 3
+
+
+def test_nothing_but_waypoints_is_laid_out() -> None:
+    """A change of speed between two lines, and a loiter on one, would be lost."""
+    for place, line in ((2, "2 178 0 15 -1 0 0 0 0"), (1, wp(0, 800, command=19, p="10 0 0 0"))):
+        lines = [wp(east, north) for east, north in grid(lead=50.0)]
+        lines[place + 2 : place + 2] = [line]
+        read = mission(*lines, home="36.5 -84.2 0")
+        route = make_route(read, ORIGIN, None, 15.0, False)
+        for found in find_surveys(route, camera_spacing(read, route)):
+            assert with_layout(read, route, found, SurveyLayout(100.0), ORIGIN) is None
 
 
 def test_a_mission_that_jumps_keeps_its_layout() -> None:

@@ -14,7 +14,7 @@ from flight.autopilots.arduplane.parameters import default_parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_geometry
-from tests.logs.verdict.judging import failing, judge
+from tests.logs.verdict.judging import failing, judge, leg
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import bank_radius, fly_path, make_setup
 
@@ -31,7 +31,8 @@ def lines(lead: float = LEAD, count: int = 3, apart: float = APART) -> list[list
 
 
 def survey(lead: float = LEAD, **world: object) -> FlightSetup:
-    return make_setup(lines(lead), **world)
+    """Without a camera: the scenario says that they are photo lines."""
+    return make_setup(lines(lead), **({"limits": {"surveys": "lines"}} | world))
 
 
 def photo_lines(verdict: Verdict) -> list[Finding]:
@@ -52,8 +53,10 @@ def test_lines_flown_as_drawn_are_whole_and_their_turn_arounds_are_nobodys_busin
     assert not [item for item in verdict.findings if item.rule == "corridor" and item.place.index not in (0, 10)]
 
 
-def test_as_any_path_it_fails_by_its_turns() -> None:
-    setup = survey(limits={"surveys": "path"})
+@pytest.mark.parametrize("limits", [{"surveys": "path"}, {}])
+def test_as_any_path_it_fails_by_its_turns(limits: dict[str, object]) -> None:
+    """And so does a patrol: nothing says that its lines are for photos."""
+    setup = survey(limits=limits)
     assert photo_lines(judge(setup, fly_path(setup))) == []
     assert {rule for rule, _ in failing(judge_geometry(setup))} >= {"turn"}
 
@@ -115,6 +118,21 @@ def test_without_turn_arounds_geometry_says_what_the_turns_leave() -> None:
     assert [item.flown for item in flown] == pytest.approx(left, abs=2.5)
 
 
+@pytest.mark.parametrize(("lead", "left"), [(50.0, 88.0), (105.0, 99.0), (120.0, 100.0)])
+def test_a_lead_saves_what_is_longer_than_the_turn(lead: float, left: float) -> None:
+    """Of an arc of 110 m a lead of 50 m leaves 60 m on the line, at either end of the middle one."""
+    found = photo_lines(judge_geometry(survey(lead=lead)))
+    assert found[1].planned == pytest.approx(left, abs=0.15)
+
+
+def test_a_climb_between_lines_that_cannot_be_flown_fails_without_a_flight() -> None:
+    """From 100 m to 500 m on 400 m between the first two lines: geometry does not know where that leads."""
+    points = np.array(lines(apart=400.0))
+    points[4:, 2] = 500.0
+    setup = make_setup(points, limits={"surveys": "lines"})
+    assert ("slope", leg(3)) in failing(judge_geometry(setup))
+
+
 def test_with_turn_arounds_geometry_finds_lines_whole() -> None:
     assert [item.ok for item in photo_lines(judge_geometry(survey()))] == [True] * 3
 
@@ -154,12 +172,12 @@ def test_photos_that_a_waypoint_counted_early_costs() -> None:
 
 
 def test_two_lines_are_no_survey() -> None:
-    setup = make_setup(lines(count=2))
+    setup = make_setup(lines(count=2), limits={"surveys": "lines"})
     assert photo_lines(judge(setup, fly_path(setup))) == []
 
 
 def test_a_stated_corridor_counts_in_a_survey_too() -> None:
-    setup = survey(limits={"corridor_m": 30.0})
+    setup = survey(limits={"corridor_m": 30.0, "surveys": "lines"})
     legs = [item.place.index for item in judge(setup, fly_path(setup)).findings if item.rule == "corridor"]
     assert legs == list(range(11))
 
@@ -190,5 +208,5 @@ def test_a_turn_around_too_tight_to_be_drawn_is_left_open_where_something_is_nea
 
 def test_a_turn_around_that_fits_is_where_it_is_drawn() -> None:
     """Lines 400 m apart leave room for arcs of 110 m: their way is known, however near the missile stands."""
-    setup = make_setup(lines(apart=400.0), **beside(-15.0))
+    setup = make_setup(lines(apart=400.0), limits={"surveys": "lines"}, **beside(-15.0))
     assert not judge_geometry(setup).undecided
