@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from flight.mission.items import Command, Mission, is_navigation
 from flight.mission.route import Route
-from world.geometry import leg_courses, leg_runs, wrap
+from world.geometry import leg_courses, leg_runs
 
 Floats = NDArray[np.float64]
 
@@ -150,7 +150,8 @@ def _straight_runs(route: Route) -> list[tuple[int, int]]:
     lands, takes_off = math.isfinite(route.landing_ground), math.isfinite(route.takeoff_ground)
     runs, first = [], 0
     for k in range(1, last + 1):
-        if k < last and abs(float(wrap(courses[k] - courses[first]))) <= _STRAIGHT and arcs[k] == 0.0:
+        turned = abs(math.remainder(float(courses[min(k, end - 1)] - courses[first]), 2.0 * math.pi))
+        if k < last and turned <= _STRAIGHT and arcs[k] == 0.0:
             continue
         on_ground = (takes_off and first == 0) or (lands and k == end)
         if not on_ground and (arcs[first] == 0.0 or arcs[k] == 0.0):

@@ -7,7 +7,7 @@ from flight.mission.surveys import Survey
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.measures.photo_lines import LineMeasure, measure_line
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements, surveys_of
 from logs.verdict.measures.track_alignment import align_track
 from logs.views.charts import Chart, Label, Layer, Panel
 
@@ -19,9 +19,11 @@ _NUMBERED, _POINTS = 24, 8000
 
 def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
     """Each survey of a flight, its lines laid level; None where there is none, or nothing was flown of it."""
+    if not surveys_of(setup):
+        return None
     requirements = route_requirements(setup)
     aligned = align_track(requirements, track)
-    if aligned is None or not requirements.surveys:
+    if aligned is None:
         return None
     panels = []
     for number, survey in enumerate(requirements.surveys, 1):
