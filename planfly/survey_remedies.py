@@ -56,11 +56,11 @@ Try = Callable[[Mission, Airframe], Verdict | None]
 
 
 def survey_remedies(
-    setup: FlightSetup, airframe: Airframe, verdict: Verdict, told: Callable[[str], None] = lambda _: None
+    setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None] = lambda _: None
 ) -> tuple[SurveyRemedy, ...]:
     """What alone would let all photo lines be flown, by kind; of each kind the least change that was found.
 
-    verdict: on the flight of the setup.  told: called before each flight with what is tried.
+    verdict: on the flight of the setup.  on_trial: called before each flight with what is tried.
     A change passes where no photo line fails, and nothing else that did not fail before.
     """
     lost = [item for item in verdict.findings if item.rule == "survey" and item.ok is False]
@@ -68,7 +68,7 @@ def survey_remedies(
     if not lost or not surveys:
         return ()
     worst = max(surveys, key=lambda one: sum(_of(one, item) for item in lost))
-    tried = _Trials(setup, airframe, verdict, told)
+    tried = _Trials(setup, airframe, verdict, on_trial)
     longer = tried.turn_around(worst)
     found = [
         tried.side(worst),
@@ -98,13 +98,15 @@ def _of(survey: Survey, item: Finding) -> bool:
 class _Trials:
     """Flights of one mission, changed in one thing at a time."""
 
-    def __init__(self, setup: FlightSetup, airframe: Airframe, verdict: Verdict, told: Callable[[str], None]) -> None:
-        self._setup, self._airframe, self._told = setup, airframe, told
+    def __init__(
+        self, setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None]
+    ) -> None:
+        self._setup, self._airframe, self._on_trial = setup, airframe, on_trial
         self._worst, self._verdict = _worst_margins(verdict), verdict
 
     def _fly(self, mission: Mission, airframe: Airframe, what: str) -> tuple[Verdict, float] | None:
         """The verdict of a flight, and its length; None where it cannot be laid out."""
-        self._told(what)
+        self._on_trial(what)
         scenario = self._setup.scenario
         try:
             setup = make_setup(scenario, airframe, mission, self._setup.seed)
