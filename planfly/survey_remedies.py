@@ -52,9 +52,6 @@ class SurveyRemedy:
     turn_around: float = math.nan
 
 
-Try = Callable[[Mission, Airframe], Verdict | None]
-
-
 def survey_remedies(
     setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None] = lambda _: None
 ) -> tuple[SurveyRemedy, ...]:
