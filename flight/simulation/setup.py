@@ -92,7 +92,8 @@ class Damage:
 class RowFaults:
     """What was wrong with a log's rows, and how often.
 
-    doubled: rows that came twice.  unordered: rows out of the order of their times.  unusable: rows without a place.
+    doubled: rows that came twice.  unordered: rows out of the order of their times.
+    unusable: rows without a place or a time.
     glitches: places that the aircraft cannot have been at.  clock_jumps: times (s) at which the clock jumped.
     """
 

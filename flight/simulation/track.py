@@ -28,6 +28,9 @@ ROLL, PITCH, YAW = range(3)  # columns of `Track.attitude`
 # Columns of `Track.controls` and `Track.commands`.
 ELEVATOR, AILERON, RUDDER, THROTTLE = range(4)
 
+# A row's time is from 0 on and before this, s: as much as a log can hold.
+LATEST = 1e7
+
 # Binary digits after the point that a flown row keeps of each column: finer than any instrument, and a third of the log
 # less than with all that a float32 holds.  Positions are the finest: courses and slopes are taken between rows that are
 # 0.4 m apart, and 0.06 mm turns those by 0.01 degrees.  Time and leg are as they are.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.setup import Gap, RowFaults
+from flight.simulation.track import LATEST
 from logs.importers.raw_log import LogSeries
 
 Floats = NDArray[np.float64]
@@ -142,7 +143,11 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     time, values = time[fresh], values[fresh]
     out = _glitches(time, values)
     time, values = time[~out], values[~out]
-    time, shifts = _without_jumps(time, values)
+    near = _near_others(time)
+    time, shifts = _without_jumps(time[near], values[near])
+    held = time < LATEST
+    time, values = time[held], values[near][held]
+    unusable += near.size - time.size
     jumps = tuple(sorted((*earlier_jumps, *(start for start, _ in shifts))))
     faults = RowFaults(doubled, unordered, unusable, int(out.sum()), jumps)
     lat, lon, up = values.T if len(values) else np.zeros((3, 0))
@@ -173,7 +178,7 @@ def _usable(time: Floats, values: Floats) -> Flags:
         # A log without heights has none at all; a height that is none is another matter.
         high = ~np.isfinite(up) | ((up > _LOWEST) & (up < _HIGHEST))
         known = np.isfinite(up) if np.isfinite(up).any() else np.ones(up.size, bool)
-        return np.asarray(np.isfinite(time) & (np.abs(time) < 1e9) & placed & high & known)
+        return np.asarray((time >= 0.0) & (time < 1e9) & placed & high & known)
 
 
 def _glitches(time: Floats, values: Floats) -> Flags:
@@ -213,6 +218,13 @@ def _near(time: Floats, values: Floats, one: int, other: int, most: float) -> bo
     rise = abs(float(values[other, 2] - values[one, 2]))
     seconds = float(time[other] - time[one])
     return max(away, 0.0 if math.isnan(rise) else rise) <= most * seconds
+
+
+def _near_others(time: Floats) -> Flags:
+    """Rows, by their times in order (n,), that are not a few alone, further from all others than a log can hold."""
+    parts = np.cumsum(np.concatenate([[0], np.diff(time) > LATEST])) if time.size else np.zeros(0, np.int64)
+    counts = np.bincount(parts)
+    return np.asarray((counts >= min(ROWS_BEHIND, int(counts.max(initial=0))))[parts])
 
 
 def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:

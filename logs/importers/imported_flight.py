@@ -228,7 +228,8 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
 
 def _why_none(places: Places) -> str:
     if places.time.size < 2:
-        return f"{places.time.size} usable places"
+        bad = places.faults.unusable
+        return f"{places.time.size} usable places" + (f", {bad:,} without a place or a time" if bad else "")
     return f"in {places.time[-1] - places.time[0]:.0f} s it never went faster than a person for long"
 
 

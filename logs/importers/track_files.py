@@ -19,9 +19,11 @@ from xml.etree import ElementTree
 import gpxpy
 import gpxpy.gpx
 import numpy as np
+from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from flight.simulation.setup import Damage, VerticalDatum
+from flight.simulation.track import LATEST
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, RawLog
 from world.errors import LogError
 
@@ -73,6 +75,11 @@ def _bytes_of(path: Path) -> bytes:
     return data
 
 
+def _earliest(stamps: NDArray[np.float64]) -> float:
+    """The earliest time of a track (n,) s; one further from the middle one than a log can hold is damaged."""
+    return float(stamps[np.abs(stamps - np.median(stamps)) < LATEST].min())
+
+
 # ----------------------------------------------------------------------
 # GPX tracks, by gpxpy: points with times; a route in the same file is what was planned.
 
@@ -97,6 +104,7 @@ def read_gpx(path: Path) -> RawLog:
     # Times without a zone are UTC, as the format has all of them.
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
     stamps = np.array([time.timestamp() for time in times])
+    start = _earliest(stamps)
     up = [math.nan if point.elevation is None else point.elevation for point in timed]
     values = np.array([[point.latitude, point.longitude, height] for point, height in zip(timed, up, strict=True)])
     return RawLog(
@@ -104,12 +112,12 @@ def read_gpx(path: Path) -> RawLog:
         format=GPX,
         program=str(found.creator or ""),
         vehicle="unknown",
-        series={"position": LogSeries("trkpt", stamps - stamps[0], values)},
+        series={"position": LogSeries("trkpt", stamps - start, values)},
         heights=(),
         datum="unstated",
         missions=tuple(_routes(found, str(path))),
         clock="start",
-        utc_start=float(stamps[0]),
+        utc_start=start,
         damage=Damage(unreadable=len(points) - len(timed)),
     )
 
@@ -162,7 +170,7 @@ def read_igc(path: Path) -> RawLog:
     use_gnss = bool((np.isfinite(gnss) & (gnss != 0.0)).mean() > 0.5)
     up, source = (gnss, "B record, GNSS altitude") if use_gnss else (pressure, "B record, pressure altitude")
     midnight = _midnight(lines)
-    start = float(time[0])
+    start = float(time.min())
     other = HeightSource("pressure altitude", "pressure", LogSeries("B", time - start, pressure[:, None]))
     return RawLog(
         source=str(path),
@@ -284,17 +292,18 @@ def read_kml(path: Path) -> RawLog:
         why = f"; its {lines} lines have no times" if lines else ""
         raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}", file=path)
     table = np.array(rows)
+    start = _earliest(table[:, 0])
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
     return RawLog(
         source=str(path),
         format=KML,
         program="",
         vehicle="unknown",
-        series={"position": LogSeries(f"gx:coord, {mode}", table[:, 0] - table[0, 0], table[:, 1:])},
+        series={"position": LogSeries(f"gx:coord, {mode}", table[:, 0] - start, table[:, 1:])},
         heights=(),
         datum=datum,
         clock="start",
-        utc_start=float(table[0, 0]),
+        utc_start=start,
         damage=Damage(unreadable=unreadable),
     )
 

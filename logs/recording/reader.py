@@ -18,12 +18,11 @@ from mcap.records import Channel, Schema
 from mcap.records import Message as MessageRecord
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track
+from flight.simulation.track import LATEST, Track
 from logs.recording.foxglove_scene import LEVELS
 from logs.recording.foxglove_updates import NAME as NOTED_IN_FLIGHT
 from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream, records
 from logs.recording.mcap_writer import FRAME_SIZE, MESSAGE_HEADER
-from logs.recording.recorder import LONGEST
 from logs.recording.setup_attachments import (
     RECOVERY_FILE,
     REFERENCE_FILE,
@@ -344,7 +343,7 @@ def _good_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:
     """Keep the rows before the first that cannot follow the one before it; and say what is wrong with that one."""
     state = rows["state"]
     time = state["time_s"]
-    good = np.isfinite(time) & (time >= 0.0) & (time < LONGEST)
+    good = np.isfinite(time) & (time >= 0.0) & (time < LATEST)
     good[1:] &= time[1:] > time[:-1]
     numbered = state["row"] == np.arange(len(rows), dtype=np.uint32)
     legs = (state["leg_index"] >= 0) & (state["leg_index"] < waypoints)

@@ -20,7 +20,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, join_rows, track_rows
+from flight.simulation.track import COLUMNS, LATEST, TRACK_ROW, Rows, Track, join_rows, track_rows
 from logs.recording import foxglove_scene as scene
 from logs.recording import foxglove_updates as clouds
 from logs.recording.foxglove_scene import aircraft_scene
@@ -59,7 +59,6 @@ from logs.verdict.reference_flights import reference_flights_json
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
-LONGEST = 1e7  # s
 # A log has it where its scenario has zones.
 ZONES_TOPIC = "/scene/zones"
 
@@ -162,9 +161,9 @@ class Recorder:
         if not len(rows):
             return
         times = np.ascontiguousarray(rows["time"])
-        newest = last_log_time(times, self._newest_ns, EPOCH_NS, LONGEST)
+        newest = last_log_time(times, self._newest_ns, EPOCH_NS, LATEST)
         if newest == OUT_OF_RANGE:
-            raise ValueError(f"time {times[0]}..{times[-1]} s: 0..{LONGEST:g} is expected")
+            raise ValueError(f"time {times[0]}..{times[-1]} s: 0..{LATEST:g} is expected")
         if newest == NOT_INCREASING:
             raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
@@ -198,8 +197,8 @@ class Recorder:
         """Record what happened at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
         if level not in scene.LEVELS:
             raise ValueError(f"level {level!r}: {', '.join(scene.LEVELS)} are expected")
-        if not 0.0 <= time < LONGEST:
-            raise ValueError(f"time {time} s: 0..{LONGEST:g} is expected")
+        if not 0.0 <= time < LATEST:
+            raise ValueError(f"time {time} s: 0..{LATEST:g} is expected")
         log_time = round(time * 1e9) + EPOCH_NS
         message = scene.log_message(log_time, text, level).SerializeToString(deterministic=True)
         self._events.append(single_record(self._channels[EVENT_TOPIC], log_time, message))

@@ -122,7 +122,7 @@ def rows_text(faults: RowFaults, gaps: int) -> str:
         (gaps, "gap" if gaps == 1 else "gaps"),
         (faults.doubled, "doubled"),
         (faults.unordered, "out of order"),
-        (faults.unusable, "without a place"),
+        (faults.unusable, "without a place or a time"),
         (faults.glitches, "glitches of position"),
     )
     words = [f"{count} {name}" for count, name in counted if count]

@@ -135,3 +135,29 @@ def test_a_single_row_that_is_missing_at_one_a_second_is_a_gap() -> None:
     # Rows that come now and then by four tenths late are none.
     late = time + np.where(time % 5.0 == 0.0, 0.4, 0.0)
     assert find_gaps(late) == ()
+
+
+def every_20_metres(time: np.ndarray) -> LogSeries:
+    """A flight to the north, whatever its clock says."""
+    lat = 46.0 + 20.0 * np.arange(time.size) / DEGREE
+    return LogSeries("POS", time, np.column_stack([lat, np.full(time.size, 8.0), np.zeros(time.size)]))
+
+
+@pytest.mark.parametrize("at", [0, 1, 30, 199])
+@pytest.mark.parametrize("wrong", [-4.5e8, -20.0, 2.1e8, 9.9e8])
+def test_a_few_rows_whose_times_are_damaged_cost_these_rows_alone(at: int, wrong: float) -> None:
+    time = np.arange(200.0) + 100.0
+    time[at] = wrong
+    found = clean_places(every_20_metres(time))
+    assert found.time.tolist() == [100.0 + k for k in range(200) if k != at]
+    assert found.faults.unusable == 1
+    assert found.shifts == ()
+
+
+def test_a_clock_that_was_set_in_flight_is_set_back() -> None:
+    """As many rows before as after: their times are no damage."""
+    time = np.concatenate([100.0 + np.arange(50.0), 5e8 + np.arange(50.0)])
+    found = clean_places(every_20_metres(time))
+    assert np.diff(found.time).tolist() == pytest.approx([1.0] * 99)
+    assert found.faults.unusable == 0
+    assert len(found.faults.clock_jumps) == 1

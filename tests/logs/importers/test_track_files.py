@@ -2,6 +2,7 @@ import contextlib
 import re
 import time
 import zipfile
+from datetime import UTC, datetime
 from pathlib import Path
 
 import gpxpy
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from logs.importers import track_files
+from logs.importers.imported_flight import make_flight
 from logs.importers.raw_log import example_raw_log
 from logs.importers.track_files import read_gpx, read_igc, read_kml, track_text
 from planfly.cli import main
@@ -103,6 +105,27 @@ def test_rows_are_what_gpxpy_reads(tmp_path: Path) -> None:
         assert raw.series["position"].time[k] == (one.time - points[0].time).total_seconds()
     assert raw.utc_start == points[0].time.timestamp()
     assert raw.datum == "unstated"
+
+
+@pytest.mark.parametrize(
+    ("row", "stamp", "first", "rows"),
+    [
+        (0, "2040-01-01T00:00:00Z", "2024-03-02T10:00:01", 91),
+        (1, "2010-01-01T00:00:00Z", "2024-03-02T10:00:00", 91),
+        (1, "2024-03-02T09:59:50Z", "2024-03-02T09:59:50", 92),
+        (91, "2040-01-01T00:00:00Z", "2024-03-02T10:00:00", 91),
+    ],
+)
+def test_a_time_that_is_damaged_costs_its_row(row: int, stamp: str, first: str, rows: int, tmp_path: Path) -> None:
+    """The track begins at the earliest time that is none, wherever in the file it stands."""
+    path = gpx(tmp_path / "a.gpx")
+    text = path.read_text(encoding="utf-8")
+    was = re.findall(r"<time>[^<]*</time>", text)[row]
+    path.write_text(text.replace(was, f"<time>{stamp}</time>", 1), encoding="utf-8")
+    raw = read_gpx(path)
+    assert datetime.fromtimestamp(raw.utc_start, UTC).isoformat()[:19] == first
+    flight = make_flight(raw)
+    assert (flight.time[0], flight.time.size) == (0.0, rows)
 
 
 def test_a_route_is_a_plan(tmp_path: Path) -> None:
