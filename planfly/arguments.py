@@ -69,6 +69,7 @@ RANGES: Mapping[str, Range] = {
     "directions": Range(4, 72, "4 to 72 is expected", integer=True),
     "every": Range(0.1, 3600.0, "seconds from 0.1 to 3,600 are expected"),
     "most": Range(1.0, 40.0, "m/s from 1 to 40 are expected"),
+    "height": Range(1.0, 5000.0, "m above ground, from 1 to 5,000, are expected"),
 }
 CHOICES: Mapping[str, tuple[Any, ...]] = {
     "turbulence": ("none", "light", "moderate"),
@@ -117,3 +118,12 @@ def is_wind(speed: float, from_deg: float) -> bool:
     (True, False)
     """
     return 0.0 <= speed <= 40.0 and -360.0 <= from_deg <= 360.0
+
+
+def is_place(lat: float, lon: float) -> bool:
+    """Whether there is such a latitude and longitude, degrees, where planfly draws maps.
+
+    >>> is_place(-33.9, 18.4), is_place(91.0, 0.0)
+    (True, False)
+    """
+    return -89.0 <= lat <= 89.0 and -180.0 <= lon <= 180.0

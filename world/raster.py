@@ -413,8 +413,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     """
     box = np.asarray(bounds, dtype=np.float64)
     rows, cols = raster.shape
-    e0, e1, n0, n1 = _outline_window(raster, origin, box, 0.0)
-    if e0 < -1e-6 or n0 < -1e-6 or e1 > cols - 1 + 1e-6 or n1 > rows - 1 + 1e-6:
+    if not is_covered(raster, origin, box):
         raise TerrainError(
             f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
             f"reaches beyond the tile, which covers {_tile_cover(raster, origin)}",
@@ -451,6 +450,20 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     terrain = Terrain(heights, to_pixel, pitch, raster.name, raster.sha256, raster.datum.text)
     _refuse_holes(terrain, box, per_metre)
     return terrain
+
+
+def is_covered(raster: RasterFile, origin: GeoOrigin, box: Floats) -> bool:
+    """Whether the tile covers a map box [[e0, e1], [n0, n1]], m.
+
+    >>> raster = open_raster("jacksboro")
+    >>> is_covered(raster, raster.centre, np.array([[0.0, 14_000.0], [0.0, 1.0]]))
+    True
+    >>> is_covered(raster, raster.centre, np.array([[0.0, 16_000.0], [0.0, 1.0]]))
+    False
+    """
+    rows, cols = raster.shape
+    e0, e1, n0, n1 = _outline_window(raster, origin, box, 0.0)
+    return not (e0 < -1e-6 or n0 < -1e-6 or e1 > cols - 1 + 1e-6 or n1 > rows - 1 + 1e-6)
 
 
 def _count_from_sea_level(heights: NDArray[np.float32], raster: RasterFile, top: int, left: int) -> None:
@@ -551,6 +564,16 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
         if c0 >= 0 and r0 >= 0 and c1 <= cols - 1 and r1 <= rows - 1:
             return box
     raise TerrainError(f"{raster.name}: no upright area fits inside the tile; give [area]", file=raster.name)
+
+
+def cover_text(raster: RasterFile) -> str:
+    """Which degrees the tile reaches from and to, for messages.
+
+    >>> cover_text(open_raster("jacksboro"))
+    'latitude 36.160..36.446, longitude -84.413..-84.078'
+    """
+    lon, lat = longitude_near(raster.corners[:, 0], float(raster.corners[0, 0])), raster.corners[:, 1]
+    return f"latitude {lat.min():.3f}..{lat.max():.3f}, longitude {lon.min():.3f}..{lon.max():.3f}"
 
 
 def _tile_cover(raster: RasterFile, origin: GeoOrigin) -> str:

@@ -30,7 +30,7 @@ def plan_options(line: LineParser) -> None:
         "plan",
         "plan a path, or plan again in flight, without flying it",
         "planfly plan jacksboro --seed 3 --out plan.json",
-        "planfly plan jacksboro --from plan.json --at-leg 4 --add-threat=-2000,1500,800,1500",
+        "planfly plan jacksboro --from plan.json --at-leg 4 --add-threat -2000,1500,800,1500",
     )
     parser.more = _algorithms
     parser.alias("seconds", "--budget")
@@ -55,7 +55,7 @@ def plan_options(line: LineParser) -> None:
     again.add_argument("--at-leg", metavar="K", type=number("at_leg"), help="legs before K have been flown and stay")
     again.add_argument(
         "--add-threat", dest="threats", metavar="EAST,NORTH,KILL,DETECTION", type=threat, action="append",
-        help="a threat that has popped up, in m; --add-threat=-... where EAST is negative; repeatable",
+        help="a threat that has popped up, in m; repeatable",
     )  # fmt: skip
     flown_by_options(parser)
     pilot_options(parser)

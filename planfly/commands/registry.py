@@ -60,6 +60,7 @@ COMMANDS = (
     Command("paper", _MANY, "PaperAnswer"),
     Command("aircraft", _AIRCRAFT, "AircraftAnswer"),
     Command("scenarios", _AIRCRAFT, "ScenariosAnswer", "shell"),
+    Command("new", _AIRCRAFT, "NewAnswer"),
     Command("help", _HELP, module="shell", function="show_help"),
     Command("completion", _HELP, module="shell"),
 )

@@ -936,6 +936,17 @@ class PaperAnswer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class NewAnswer:
+    """planfly new: the scenario's file, and what planning it comes to."""
+
+    schema: Literal["planfly.new/1"] = "planfly.new/1"
+    exit_code: int
+    file: str
+    safe: bool
+    waypoints: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ScenarioEntry:
     """An embedded scenario."""
 

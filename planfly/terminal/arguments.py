@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from logs.importers.open_log import SUFFIXES
-from planfly.arguments import CHOICES, RANGES, is_wind
+from planfly.arguments import CHOICES, RANGES, is_place, is_wind
 
 # ----------------------------------------------------------------------
 # Texts of the command line as values, within the ranges of the API's keywords.
@@ -47,6 +47,19 @@ def wind(text: str) -> tuple[float, float]:
             f"{text!r}: SPEED,FROM is expected: m/s from 0 to 40, degrees from north that it blows from (-360..360)"
         )
     return speed, source
+
+
+def place(text: str) -> tuple[float, float]:
+    """LAT,LON: degrees."""
+    try:
+        lat, lon = (float(part) for part in text.split(","))
+    except ValueError:
+        lat, lon = math.nan, 0.0
+    if not is_place(lat, lon):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: LAT,LON is expected: degrees north from -89 to 89, degrees east from -180 to 180"
+        )
+    return lat, lon
 
 
 def autopilots(text: str) -> list[str]:

@@ -154,7 +154,7 @@ class LineParser(CommandParser):
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
         """The arguments by name; for bad usage one line that names what may have been meant, and SystemExit."""
-        words = sys.argv[1:] if args is None else list(args)
+        words = _with_negatives(sys.argv[1:] if args is None else list(args))
         if words and not words[0].startswith("-") and words[0] not in self.commands:
             there = did_you_mean(words[0], self.commands) or f"; there are {', '.join(self.commands)}"
             self.error(f"{words[0]!r}: no such command{there}")
@@ -168,6 +168,21 @@ class LineParser(CommandParser):
                 parser.error(f"{option}: no such option{did_you_mean(option, parser.options())}")
             parser.error(f"{next((word for word in left if word != '--'), left[0])}: no such argument")
         return parsed
+
+
+# What argparse takes for an option of its own: the negative first of several numbers.
+_NEGATIVES = re.compile(r"-\.?\d[^=]*")
+
+
+def _with_negatives(words: list[str]) -> list[str]:
+    """A command line in which negative numbers stand with the option that they follow: --from -33.9,18.4."""
+    joined: list[str] = []
+    for word in words:
+        if _NEGATIVES.fullmatch(word) and joined and _OPTION.fullmatch(joined[-1]):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 # ----------------------------------------------------------------------

@@ -31,6 +31,7 @@ FUNCTIONS = {
     "paper": ("paper_tables",),
     "aircraft": ("aircraft", "describe_aircraft", "new_aircraft", "identify_aircraft"),
     "scenarios": ("scenarios",),
+    "new": ("new_scenario",),
     "help": (),
     "completion": (),
 }

@@ -38,6 +38,7 @@ VERBS = {
         "aircraft",
         "describe_aircraft",
         "new_aircraft",
+        "new_scenario",
         "identify_aircraft",
         "paper_tables",
         "optimise",

@@ -69,6 +69,7 @@ EVERY = {
         Given(("paper", "--problems", "7", "--runs", "1", "--jobs", "1", "--out", "out"), target="out"),
         Given(("aircraft", "aerosonde")),
         Given(("scenarios",)),
+        Given(("new", "site", "--from", "46.5,8", "--to", "46.55,8.05"), target="site"),
         Given(("help",)),
         Given(("completion", "bash")),
     )

@@ -1,0 +1,103 @@
+"""Begin a scenario of one's own."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from aircraft.catalog import find_aircraft
+from planfly.arguments import check_arguments, is_place
+from planfly.stages import stage
+from planfly.targets import refuse_existing
+from world.elevation_formats import EMBEDDED
+from world.errors import ArgumentError, PlanflyError
+from world.files import whole_path, write_whole
+from world.raster import open_raster
+from world.scenario import from_spec
+from world.scenario_draft import Place, draft_text, make_draft
+from world.scenario_file import parse_scenario
+from world.scenario_tables import DEFAULT_AUTOPILOT, names_folder
+
+
+def new_scenario(
+    folder: str | Path,
+    start: Sequence[float],
+    destination: Sequence[float],
+    *,
+    terrain: str | Path | None = None,
+    height: float = 120.0,
+    aircraft: str | Path = "aerosonde",
+    autopilot_law: str | None = None,
+    overwrite: bool = False,
+) -> Path:
+    """Write a commented scenario from one place to another, which can be planned and flown as it stands.
+
+    folder: where FOLDER/NAME.toml is written, under the folder's own name; it is made if it is not there.
+    start, destination: latitude and longitude, degrees.  height: of both above ground, m.
+    terrain: an elevation file, a folder of tiles, or an embedded name; None for flat ground.
+    aircraft: a name, or a folder.  autopilot_law: as of `planfly.fly`.
+    overwrite: whether a scenario of that name is replaced.
+    The area takes in the straight line and a third of its length about it, as far as the elevation file reaches.
+    Returns the file.  Raises a `planfly.PlanflyError` for bad input; nothing is written then.
+
+    >>> import planfly, tempfile
+    >>> with tempfile.TemporaryDirectory() as place:
+    ...     file = planfly.new_scenario(place + "/ridge", (36.27, -84.15), (36.33, -84.35), terrain="jacksboro")
+    ...     path = planfly.plan(file)
+    >>> file.name, path.safe
+    ('ridge.toml', True)
+    """
+    check_arguments(height=height, autopilot_law=autopilot_law)
+    ends = _place("start", start), _place("destination", destination)
+    target = Path(folder)
+    name = Path(whole_path(target)).name
+    file = _target(target, name, overwrite=overwrite)
+    law, _, version = (autopilot_law or DEFAULT_AUTOPILOT).partition("-")
+    ground = None if terrain is None else _whole(terrain, is_name=terrain in EMBEDDED)
+    model = _whole(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
+    airspeed = find_aircraft(model).airspeed
+    with stage(f"laying out {name}"):
+        raster = None if ground is None else open_raster(ground)
+        draft = make_draft(
+            name, ends[0], ends[1], height, raster=raster, terrain=ground, aircraft=model,
+            airspeed=airspeed, autopilot=law, px4_version=version or None,
+        )  # fmt: skip
+        # As it is read from there: a fault is found before anything is written.
+        from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
+    moved = replace(draft, terrain=ground and _from(target, ground), aircraft=_from(target, model))
+    target.mkdir(exist_ok=True)
+    write_whole(file, draft_text(moved))
+    return file
+
+
+def _target(folder: Path, name: str, *, overwrite: bool) -> Path:
+    """The file to write.  Raises PlanflyError for one that is there, and for a folder that cannot be made."""
+    if folder.suffix == ".toml" or (folder.exists() and not folder.is_dir()):
+        raise PlanflyError(f"{folder}: a folder is expected; the scenario is written into it", file=folder)
+    file = folder / f"{name}.toml"
+    if folder.is_dir():
+        refuse_existing(file, overwrite)
+    elif not folder.absolute().parent.is_dir():
+        raise PlanflyError(f"{folder}: its folder {folder.parent} does not exist", file=folder)
+    return file
+
+
+def _place(keyword: str, given: Sequence[float]) -> Place:
+    """Latitude and longitude.  Raises ArgumentError."""
+    if isinstance(given, str) or len(given) != 2 or not is_place(*given):
+        raise ArgumentError.of_argument(keyword, given, "latitude -89..89 and longitude -180..180 are expected")
+    return Place(float(given[0]), float(given[1]))
+
+
+def _whole(given: str | Path, *, is_name: bool) -> str:
+    """A path from anywhere; a name of what planfly ships stays."""
+    return str(given) if is_name else whole_path(Path(given))
+
+
+def _from(folder: Path, given: str) -> str:
+    """A whole path as it is written in a file of a folder; a name stays."""
+    if not Path(given).is_absolute():
+        return given
+    relative = os.path.relpath(given, whole_path(folder))
+    # With a slash, so that the folder of an aircraft is known for one.
+    return relative if "/" in relative else f"./{relative}"

@@ -1,0 +1,71 @@
+"""``planfly new``: a scenario of one's own to begin with, and whether it can be planned."""
+
+import argparse
+
+import planfly
+from planfly.arguments import CHOICES
+from planfly.terminal.arguments import aircraft_words, completed, number, place
+from planfly.terminal.command_parser import LineParser, coloured
+from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
+from planfly.terminal.options import call, result_options, terrain_option
+from planfly.terminal.output import give_answer
+
+
+def new_options(line: LineParser) -> None:
+    """The parser of ``planfly new``."""
+    parser = line.command(
+        "new",
+        "write a commented scenario from one place to another, and plan it once",
+        "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --terrain dem.tif",
+        "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --aircraft x8 --height 100",
+    )
+    parser.add_argument("folder", metavar="FOLDER", help="where FOLDER/NAME.toml is written, NAME as the folder's")
+    way = parser.group("the way")
+    for option, keyword in (("--from", "start"), ("--to", "destination")):
+        way.add_argument(
+            option, dest=keyword, metavar="LAT,LON", type=place, required=True, help="degrees north and east"
+        )
+    way.add_argument(
+        "--height", metavar="M", type=number("height"), default=120.0,
+        help="of both ends above ground, m (default: 120)",
+    )  # fmt: skip
+    terrain_option(parser.group("where it flies"))
+    flown = parser.group("aircraft and autopilot")
+    completed(
+        flown.add_argument(
+            "--aircraft", metavar="AIRCRAFT", default="aerosonde",
+            help="a name that planfly aircraft lists, or a folder (default: aerosonde)",
+        ),
+        aircraft_words,
+    )  # fmt: skip
+    flown.add_argument("--autopilot-law", choices=CHOICES["autopilot_law"], help="whose law flies (default: ardupilot)")
+    result_options(parser)
+
+
+def new(args: argparse.Namespace) -> int:
+    """Write it, and plan it; 4 where the plan is not safe, which does not take the file away."""
+    from planner.plan import Objective
+
+    file = call(planfly.new_scenario, args)
+    print(f"scenario  {file}")
+    if args.terrain is None:
+        print("ground    flat, at mean sea level: nobody named an elevation file (--terrain DEM)")
+    made = planfly.plan(file)
+    code = FLYABLE if made.safe else NOT_FLYABLE
+    if made.safe:
+        ratio = float(made.objectives[Objective.LENGTH_RATIO])
+        safe = coloured("plans     safe", "good")
+        print(f"{safe}: {len(made.waypoints)} waypoints, {ratio:.3f} times the straight line")
+    else:
+        print(coloured("plans     no safe path", "bad"))
+        for said in (*made.certificate.problems, *planfly.what_blocks(made)):
+            print(f"  {said}")
+    print(f"next      planfly run {file}")
+
+    def answer() -> object:
+        from planfly.terminal.answers import NewAnswer
+
+        return NewAnswer(exit_code=code, file=str(file), safe=made.safe, waypoints=len(made.waypoints))
+
+    give_answer(args, answer)
+    return code

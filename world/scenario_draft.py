@@ -1,0 +1,284 @@
+"""A scenario file to begin with: from here to there over this ground, commented, and with examples to switch on."""
+
+import json
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.elevation_formats import EMBEDDED
+from world.errors import ArgumentError
+from world.frames import GeoOrigin, to_geo, to_map
+from world.raster import RasterFile, cover_text, is_covered, read_terrain, tile_bounds
+
+Floats = NDArray[np.float64]
+
+# Ground beside the straight line that a way round may lead over, as a share of the line's length, and its limits, m.
+_MARGIN_SHARE, _MARGIN_LEAST, _MARGIN_MOST = 0.3, 1500.0, 15_000.0
+# The ends may be no closer to the edge of the elevation file, and no further from each other, m.
+_EDGE, _FURTHEST = 200.0, 300_000.0
+# Room above the highest ground and the ends, and the step that the ceiling is rounded up to, m.
+_HEADROOM, _CEILING_STEP = 300.0, 50.0
+# What paths keep above ground, m, and at most as a share of the height of the ends.
+_CLEARANCE, _CLEARANCE_SHARE = 60.0, 0.5
+
+
+class Place(NamedTuple):
+    """Degrees north and east."""
+
+    lat: float
+    lon: float
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """What a scenario file to begin with states.
+
+    terrain: as its path is written there; None for flat ground at mean sea level.
+    start, destination: at `height` m above ground.
+    box: [[east0, east1], [north0, north1]] m about `origin`.  ceiling: m above mean sea level.
+    aircraft, autopilot, px4_version: as in [flight].  airspeed: the aircraft's cruise speed, m/s.
+    """
+
+    name: str
+    terrain: str | None
+    start: Place
+    destination: Place
+    height: float
+    origin: GeoOrigin
+    box: Floats
+    ceiling: float
+    aircraft: str
+    airspeed: float
+    autopilot: str
+    px4_version: str | None
+
+    @property
+    def clearance(self) -> float:
+        """What a path keeps above the ground, m."""
+        return min(_CLEARANCE, _CLEARANCE_SHARE * self.height)
+
+
+def make_draft(
+    name: str,
+    start: Place,
+    destination: Place,
+    height: float,
+    *,
+    raster: RasterFile | None = None,
+    terrain: str | None = None,
+    aircraft: str = "aerosonde",
+    airspeed: float = 25.0,
+    autopilot: str = "ardupilot",
+    px4_version: str | None = None,
+) -> Draft:
+    """Lay out a scenario from one place to another.
+
+    height: of both above ground, m.  raster: its ground, None for flat ground; terrain: as its path is written down.
+    The area takes in the straight line and a third of its length about it, as far as the elevation file covers it.
+    Raises ArgumentError for places that are outside of the file, or too far from each other, and TerrainError.
+    """
+    east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
+    length = math.hypot(east, north)
+    if length > _FURTHEST:
+        allowed = f"at most {_FURTHEST / 1000.0:g} km from `start` is expected"
+        raise ArgumentError.of_argument("destination", destination, allowed, shown=_shown(destination, length))
+    middle = to_geo(GeoOrigin(*start), east / 2.0, north / 2.0)
+    origin = GeoOrigin(round(float(middle[0]), 5), round(float(middle[1]), 5))
+    ends = np.array([to_map(origin, *place) for place in (start, destination)])
+    margin = min(max(_MARGIN_SHARE * length, _MARGIN_LEAST), _MARGIN_MOST)
+    box = np.stack([ends.min(axis=0) - margin, ends.max(axis=0) + margin], axis=1)
+    highest = 0.0
+    if raster is not None:
+        box = _within_file(box, raster, origin)
+        for keyword, place, end in zip(("start", "destination"), (start, destination), ends, strict=True):
+            if not ((box[:, 0] + _EDGE <= end) & (end <= box[:, 1] - _EDGE)).all():
+                allowed = f"outside {raster.name} or within {_EDGE:g} m of its edge: it covers {cover_text(raster)}"
+                raise ArgumentError.of_argument(keyword, place, allowed, shown=_shown(place))
+        ground = read_terrain(raster, origin, box, 0.0)
+        highest = float(np.nanmax(ground.heights))
+    ceiling = math.ceil((highest + height + _HEADROOM) / _CEILING_STEP) * _CEILING_STEP
+    box = np.stack([np.ceil(box[:, 0] / 10.0), np.floor(box[:, 1] / 10.0)], axis=1) * 10.0
+    return Draft(
+        name, terrain, start, destination, height, origin, box, ceiling, aircraft, airspeed, autopilot, px4_version
+    )
+
+
+def _shown(place: Place, length: float | None = None) -> str:
+    there = f"{place.lat:g},{place.lon:g}"
+    return there if length is None else f"{there}, {length / 1000.0:,.0f} km away"
+
+
+def _within_file(box: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
+    """A box (2, 2) cut to what the file covers."""
+    if is_covered(raster, origin, box):
+        return box
+    bounds = tile_bounds(raster, origin)
+    return np.stack([np.maximum(box[:, 0], bounds[:, 0]), np.minimum(box[:, 1], bounds[:, 1])], axis=1)
+
+
+# ----------------------------------------------------------------------
+# The file.
+
+
+def draft_text(draft: Draft) -> str:
+    """The scenario file of a draft, as text of TOML.
+
+    >>> place, there = Place(46.5, 8.0), Place(46.55, 8.05)
+    >>> print(draft_text(make_draft("site", place, there, 120.0)).split("[area]")[0])
+    # From 46.5, 8 to 46.55, 8.05.  Lines that begin with "# " and a key are examples: take the "# " away.
+    # All keys: docs/scenario-file.md of planfly.
+    name = "site"
+    <BLANKLINE>
+    [origin]                      # where east_m = north_m = 0: half way
+    lat_deg = 46.525
+    lon_deg = 8.02499
+    <BLANKLINE>
+    [terrain]
+    kind = "flat"                 # no elevation file was named: flat ground says nothing of hills
+    amsl_m = 0                    # height of the ground above mean sea level
+    # For measured ground take these lines in place of the two above:
+    # kind = "dem"
+    # path = "dem.tif"            # an elevation file, a folder of tiles, or a .vrt
+    <BLANKLINE>
+    <BLANKLINE>
+    """
+    return "\n".join((_head(draft), _terrain(draft), _way(draft), _limits(draft), _flown(draft), _examples(draft)))
+
+
+def _text(value: str) -> str:
+    """A string of TOML: JSON's escapes are among TOML's."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _number(value: float) -> str:
+    return f"{value:.8g}"
+
+
+def _line(key: str, value: str, comment: str = "") -> str:
+    return f"{f'{key} = {value}':<30}# {comment}" if comment else f"{key} = {value}"
+
+
+def _head(draft: Draft) -> str:
+    start, there = (f"{_number(place.lat)}, {_number(place.lon)}" for place in (draft.start, draft.destination))
+    return f"""\
+# From {start} to {there}.  Lines that begin with "# " and a key are examples: take the "# " away.
+# All keys: docs/scenario-file.md of planfly.
+name = {_text(draft.name)}
+
+[origin]                      # where east_m = north_m = 0: half way
+lat_deg = {_number(draft.origin.lat_deg)}
+lon_deg = {_number(draft.origin.lon_deg)}
+"""
+
+
+def _terrain(draft: Draft) -> str:
+    if draft.terrain is None:
+        return f"""\
+[terrain]
+{_line("kind", '"flat"', "no elevation file was named: flat ground says nothing of hills")}
+{_line("amsl_m", "0", "height of the ground above mean sea level")}
+# For measured ground take these lines in place of the two above:
+# kind = "dem"
+{_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
+"""
+    where = "the tile that planfly ships" if draft.terrain in EMBEDDED else "counted from this file's folder"
+    return f"""\
+[terrain]
+kind = "dem"
+{_line("path", _text(draft.terrain), where)}
+{_line("# vertical_error_m", "5", "as its source states it: clearance is then also shown minus this")}
+"""
+
+
+def _way(draft: Draft) -> str:
+    (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in side) for side in draft.box)
+    ends = []
+    for key, place, course in (
+        ("start", draft.start, "on which the aircraft begins"),
+        ("destination", draft.destination, "on which it arrives"),
+    ):
+        ends.append(f"""\
+[{key}]
+lat_deg = {_number(place.lat)}
+lon_deg = {_number(place.lon)}
+{_line("height_m", _number(draft.height), "above ground; amsl_m counts from mean sea level")}
+{_line("# course_deg", "0", course)}
+""")
+    return f"""\
+[area]                        # where a path may lead, m from [origin]
+east_m = [{east0}, {east1}]
+north_m = [{north0}, {north1}]
+{_line("ceiling_amsl_m", _number(draft.ceiling), "above mean sea level")}
+
+""" + "\n".join(ends)
+
+
+def _limits(draft: Draft) -> str:
+    return f"""\
+[limits]                      # turns and slopes: what the aircraft can do, unless a number is given
+{_line("min_clearance_m", _number(draft.clearance), "above ground")}
+{_line("# max_height_m", _number(max(400.0, 2.0 * draft.height)), "above ground")}
+{_line("# max_turn_deg", "60", "at a waypoint")}
+{_line("# corridor_m", "60", "half width about the legs; by default what the autopilot needs")}
+"""
+
+
+def _flown(draft: Draft) -> str:
+    version = "" if draft.px4_version is None else f"\npx4_version = {_text(draft.px4_version)}"
+    return f"""\
+[flight]
+{_line("aircraft", _text(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
+{_line("autopilot", _text(draft.autopilot), '"ardupilot", "px4", or "ideal": planfly' + "'s own guidance")}{version}
+{_line("# params", '"mine.param"', "its parameters, as a ground station saves them")}
+{_line("# airspeed_mps", _number(draft.airspeed), "true; by default this, the aircraft's cruise speed")}
+
+[wind]
+{_line("speed_mps", "0", "your forecast, 0 to 40")}
+{_line("from_deg", "0", "that it blows from: 270 is a west wind")}
+{_line("turbulence", '"none"', '"light" or "moderate"')}
+
+[planner]
+{_line("seed", "1", "the same seed finds the same path")}
+"""
+
+
+def _examples(draft: Draft) -> str:
+    """A threat and a zone beside the straight line, small enough to be gone round."""
+    rounded = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
+    threat, zone = (Place(*(float(x) for x in to_geo(draft.origin, *point))) for point in _beside(draft, rounded))
+    return f"""\
+# A threat: a missile, a radar, or both; on the ground unless a height is given.
+# [[threats]]
+# name = "battery"
+# lat_deg = {threat.lat:.5f}
+# lon_deg = {threat.lon:.5f}
+{_line("# kill_radius_m", _number(rounded))}
+{_line("# kill_scale_m", _number(round(rounded / 4.0)), "how softly its reach ends")}
+{_line("# detection_radius_m", _number(2.0 * rounded))}
+{_line("# detection_scale_m", _number(round(rounded / 2.0)))}
+
+# A zone to keep out of ("inclusion": to stay in); files of zones: zones_file = "airspace.geojson" above all tables.
+# [[zones]]
+# name = "village"
+# kind = "exclusion"
+# lat_deg = {zone.lat:.5f}
+# lon_deg = {zone.lon:.5f}
+{_line("# radius_m", _number(rounded))}
+{_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
+
+# What the way home is judged by.
+# [returns]
+# require = ["rtl"]           # a return to launch from anywhere on the way has to be safe
+"""
+
+
+def _beside(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """East and north of two places, one on either side of the straight line, a third of the way from its ends."""
+    ends = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
+    along = ends[1] - ends[0]
+    aside = np.array([-along[1], along[0]]) / (math.hypot(*along) or 1.0) * radius * 0.5
+    first, second = ends[0] + along / 3.0 + aside, ends[1] - along / 3.0 - aside
+    return (float(first[0]), float(first[1])), (float(second[0]), float(second[1]))
