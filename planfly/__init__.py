@@ -15,7 +15,7 @@ fly_by_each                          fly it by the laws of several autopilots
 check, judge, read_log               judge a log, a plan or a mission; read a log, its track as a table
 figures, report, compare             matplotlib figures; a page of a flight; two flights beside each other
 export, foxglove_layout              files for ground stations, maps and other programs
-timeline, instruments, movie         a flight again, from its log
+replay, timeline, instruments, movie a flight again, from its log
 play_to_foxglove, play_to_stations   the same in other programs
 import_log, refly, recover           another program's log; its mission flown in JSBSim; a damaged log
 returns                              will it come home, from everywhere on its way
@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from planfly.api.replaying import movie as movie
     from planfly.api.replaying import play_to_foxglove as play_to_foxglove
     from planfly.api.replaying import play_to_stations as play_to_stations
+    from planfly.api.replaying import replay as replay
     from planfly.api.replaying import timeline as timeline
     from planfly.api.reporting import WrittenReport as WrittenReport
     from planfly.api.reporting import compare as compare
@@ -185,6 +186,7 @@ _HOMES = {
             "movie",
             "play_to_foxglove",
             "play_to_stations",
+            "replay",
             "timeline",
         ),
         "planfly.api.reporting": (

@@ -32,7 +32,7 @@ from planfly.reference_flights import judge_with_reference_flights
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
-from world.scenario import Scenario, load_scenario
+from world.scenario import Scenario
 
 # Takes how far a stage is: done, total, a remark.
 Advance = Callable[[float, float, str], None]
@@ -53,7 +53,8 @@ class PlanThenFly:
     track: the flight, a row a guidance tick; None where there was no feasible plan to fly.
     verdict: whether it flies, with a finding for every rule and place.
 
-    >>> result = plan_then_fly("paper-07", seed=1)
+    >>> from world.scenario import load_scenario
+    >>> result = plan_then_fly(load_scenario("paper-07"), seed=1)
     >>> len(result.plan.waypoints), len(result.mission.items), round(float(result.track.time[-1]))
     (10, 11, 524)
     """
@@ -103,28 +104,20 @@ class JudgedFlight:
     reference: ReferenceFlights | None = None
 
 
-def plan_then_fly(
-    scenario: Scenario | str | Path, *, seed: int | None = None, log: Path | str | None = None
-) -> PlanThenFly:
-    """Plan a path, fly it in JSBSim and judge the flight.
+def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | None = None) -> PlanThenFly:
+    """Plan a path in a scenario, fly it and judge the flight.
 
-    scenario: an embedded name, a TOML file's path, or a `Scenario`.  seed: of planner and turbulence; None takes
-    the scenario's, or 1.  log: where to write the flight as MCAP, replaced if it exists; None writes none.
-    Raises a `world.errors.PlanflyError` for bad input.  A plan that cannot be flown is a verdict, not an error.
-
-    >>> result = plan_then_fly("tight", seed=1)
-    >>> result.plan.safe, result.verdict.flyable
-    (True, False)
+    seed: of planner and turbulence; None takes the scenario's, or 1.  log: where to write the flight, None for nowhere.
+    Raises a PlanflyError for bad input.  A plan that cannot be flown is a verdict, not an error.
     """
-    world = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
-    number = choose_seed(world, seed)
-    airframe = load_airframe(world)
-    plan = make_plan(world, airframe, number)
+    number = choose_seed(scenario, seed)
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, number)
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan))
-    setup = make_setup(world, airframe, mission, number, plan=plan)
-    flown = fly_and_judge(setup, airframe, None if log is None else Path(log))
+    setup = make_setup(scenario, airframe, mission, number, plan=plan)
+    flown = fly_and_judge(setup, airframe, log)
     return PlanThenFly(plan, mission, flown.track, flown.verdict)
 
 

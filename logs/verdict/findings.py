@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from importlib.util import find_spec
 from typing import Any
 
 from flight.autopilots.autopilot import AutopilotProgram, Parameters
@@ -144,6 +145,42 @@ class Verdict:
     def failed(self) -> tuple[Finding, ...]:
         """The findings that fail."""
         return tuple(finding for finding in self.findings if finding.ok is False)
+
+    @property
+    def closest(self) -> dict[str, Finding]:
+        """By rule the failed finding that is furthest beyond its limit, else the one closest to it.
+
+        Rules of which nothing was judged by a number, or failed, are not among them.
+
+        >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
+        >>> verdict = Verdict((far, near), flyable=True, complete=True, lines=(), level="flown")
+        >>> verdict.closest["slope"].margin
+        4.0
+        """
+        rules = dict.fromkeys(finding.rule for finding in self.findings)
+        found = {rule: closest_to_limit(one for one in self.findings if one.rule == rule) for rule in rules}
+        return {rule: finding for rule, finding in found.items() if finding is not None}
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame`: a row a finding, in the verdict's order, NaN for numbers that it has none of.
+
+        Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
+        tolerance, margin, unit, limit_source, method, ok (None where it was not judged) and reason.
+        Raises ImportError where pandas is not installed.
+        """
+        if find_spec("pandas") is None:
+            raise ImportError("pandas is not installed (pip install pandas)", name="pandas")
+        # An extra: nobody else needs it.
+        import pandas as pd
+
+        numbers = ("planned", "flown", "limit", "tolerance", "margin")
+        names = (*numbers, "unit", "limit_source", "method", "ok", "reason")
+        rows = [
+            [one.rule, one.place.kind, one.place.index, *(getattr(one, name) for name in names)]
+            for one in self.findings
+        ]
+        frame = pd.DataFrame(rows, columns=["rule", "place", "index", *names])
+        return frame.astype(dict.fromkeys(numbers, float))
 
     def __repr__(self) -> str:
         return f"<Verdict {self.level}: {self.answer}; {len(self.findings)} findings, {len(self.failed)} failed>"

@@ -9,7 +9,7 @@ from typing import Any
 from planfly.api.flying import FencePaths, named_fences
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
-from planfly.campaigns.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
 from planfly.campaigns.campaign_result import CampaignResult, campaign_line, make_goal, winds_line
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, read_dispersions
 from planfly.campaigns.find_winds import (
@@ -30,6 +30,7 @@ from planfly.campaigns.worker_pool import Workers, in_own_process
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
 from planfly.stages import stage
+from planner.plan import Plan
 from world.errors import PlanflyError
 from world.scenario_tables import Guidance, Navigation
 
@@ -49,7 +50,7 @@ class CampaignFlight:
 class _Asked:
     """What a campaign flies, as the keywords of a call state it; None for what they leave as it is."""
 
-    target: str
+    target: Plan | str
     scenario: str | None
     terrain: str | None
     fence: FencePaths
@@ -67,11 +68,15 @@ class _Asked:
             terrain=self.terrain, seed=self.seed, change=partial(changed_scenario, **self.flown),
             fences=named_fences(self.fence),
         )  # fmt: skip
-        is_file = Path(self.target).suffix.lower() in (".json", ".waypoints", ".plan")
-        if is_file or (planned is not None and planned.is_file()):
+        is_planned = isinstance(self.target, Plan) or is_mission_file(self.target)
+        if is_planned or (planned is not None and planned.is_file()):
             return opened()
         with stage("planning") as advance:
             return opened(advance=advance)
+
+    def name(self, folder: Path) -> str:
+        """What the line that repeats it names: a plan lies in the campaign's folder."""
+        return str(folder / "plan.json") if isinstance(self.target, Plan) else self.target
 
     def options(self, base: CampaignBase, spread: str | Path | None) -> dict[str, object]:
         """What decides what is flown, by name, for the line that repeats it."""
@@ -81,7 +86,7 @@ class _Asked:
 
 
 def _asked(
-    target: str | Path,
+    target: Plan | str | Path,
     scenario: str | Path | None,
     terrain: str | Path | None,
     fence: FencePaths,
@@ -89,7 +94,7 @@ def _asked(
     **flown: Any,
 ) -> _Asked:
     world, ground = (None if name is None else str(name) for name in (scenario, terrain))
-    return _Asked(str(target), world, ground, fence, seed, flown)
+    return _Asked(target if isinstance(target, Plan) else str(target), world, ground, fence, seed, flown)
 
 
 def _dispersions(file: str | Path | None) -> Dispersions:
@@ -113,7 +118,7 @@ def continued_goal(
 
 @with_warm_up(*BOTH)
 def campaign(
-    target: str | Path,
+    target: Plan | str | Path,
     *,
     spread: Path | str | None = None,
     flights: int | None = None,
@@ -141,7 +146,7 @@ def campaign(
 ) -> CampaignResult:
     """Fly a mission many times, each time as `planfly.fly` would in its own wind, aircraft, terrain and start.
 
-    target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
+    target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     spread: a TOML file of what varies; None takes planfly's default.
     flights: how many; None takes 300, or, with ``prove``, 5,000 at most.  Without flights, ``prove`` and ``at_least`` a
     campaign that is resumed goes on with its own.
@@ -170,7 +175,7 @@ def campaign(
         if resume:
             goal = continued_goal(place.folder, flights, prove, at_least, confidence)
         base = asked.open(_dispersions(spread), place)
-        line = campaign_line(str(target), goal, asked.options(base, spread))
+        line = campaign_line(asked.name(place.folder), goal, asked.options(base, spread))
         return _flown(base, goal, Workers(workers, scheduler), place, line, keep=out is not None)
 
 
@@ -191,7 +196,7 @@ def _flown(
 
 @with_warm_up(*BOTH)
 def campaign_flight(
-    target: str | Path,
+    target: Plan | str | Path,
     index: int,
     out: str | Path,
     *,
@@ -248,7 +253,7 @@ def _row_of(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightR
 
 @with_warm_up(*BOTH)
 def winds(
-    target: str | Path,
+    target: Plan | str | Path,
     *,
     prove: float = 0.99,
     directions: int = 16,
@@ -277,7 +282,7 @@ def winds(
 ) -> WindsFound:
     """Find the largest wind from each direction in which a mission flies with a probability.
 
-    target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
+    target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all
     directions; None takes 5,000, or those that a search which is resumed was to have.
     confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
@@ -305,5 +310,5 @@ def winds(
         with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying") as advance:
             found = find_winds(base, goal, Workers(workers, scheduler), store, advance)
         if out is not None:
-            write_winds(folder, base, found, winds_line(str(target), goal, asked.options(base, spread)))
+            write_winds(folder, base, found, winds_line(asked.name(place.folder), goal, asked.options(base, spread)))
     return found

@@ -15,7 +15,7 @@ from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly import pipeline
-from planfly.api.planning import Wind, changed_scenario
+from planfly.api.planning import Wind, changed_scenario, opened_scenario
 from planfly.arguments import check_arguments
 from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_text
 from planfly.first_start import with_warm_up
@@ -31,13 +31,13 @@ from planfly.open_mission import (
     open_planned,
     read_named_fences,
 )
-from planfly.pipeline import autopilot_log, fly_and_judge
+from planfly.pipeline import PlanThenFly, autopilot_log, fly_and_judge
 from planfly.return_flights import returns_line
 from planfly.stages import say_replaced, stage
 from planfly.targets import file_target, refuse_existing
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
-from world.scenario import over_terrain
+from world.scenario import Scenario, over_terrain
 from world.scenario_tables import Guidance, Navigation
 
 # ----------------------------------------------------------------------
@@ -122,7 +122,43 @@ FencePaths = str | Path | Sequence[str | Path]
 # ----------------------------------------------------------------------
 # Fly.
 
-plan_then_fly = with_warm_up(*BOTH)(pipeline.plan_then_fly)
+
+@with_warm_up(*BOTH)
+def plan_then_fly(
+    scenario: Scenario | str | Path,
+    *,
+    seed: int | None = None,
+    terrain: str | Path | None = None,
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    at: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
+    nav: Navigation | None = None,
+    log: Path | str | None = None,
+) -> PlanThenFly:
+    """Plan a path, fly it in JSBSim and judge the flight.
+
+    scenario: an embedded name, a TOML file's path, or a `Scenario`.  terrain: an elevation file in place of its own.
+    seed: of planner and turbulence; None takes the scenario's, or 1.
+    wind to nav: as of `planfly.plan`.
+    log: where to write the flight as MCAP, replaced if it exists; None writes none.
+    Raises a `planfly.PlanflyError` for bad input.  A plan that cannot be flown is a verdict, not an error.
+
+    >>> import planfly
+    >>> result = planfly.plan_then_fly("tight", seed=1, wind=(0, 0))
+    >>> result.plan.safe, result.verdict.flyable
+    (True, False)
+    """
+    check_arguments(seed=seed)
+    world = changed_scenario(
+        opened_scenario(scenario, terrain), wind=wind, turbulence=turbulence, at=at, aircraft=aircraft,
+        airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,
+    )  # fmt: skip
+    return pipeline.plan_then_fly(world, seed=seed, log=None if log is None else Path(log))
 
 
 @with_warm_up(*FLYING)

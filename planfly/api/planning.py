@@ -110,7 +110,7 @@ def changed_scenario(
     >>> changed.wind.speed, changed.flight.airspeed_mps
     (8.0, 28.0)
     """
-    speed, from_deg = (None, None) if wind is None else wind
+    speed, from_deg = (None, None) if wind is None else _two_numbers(wind)
     if speed is not None and from_deg is not None and not is_wind(0.0, from_deg):
         raise ArgumentError.of_argument("wind", wind, "degrees from north that it blows from, -360..360, are expected")
     entries = flight_entries(
@@ -124,6 +124,18 @@ def changed_scenario(
     )
     from_course = None if from_deg is None else math.radians(from_deg)
     return with_wind(with_flight(at_time(scenario, at), **entries), speed, from_course, turbulence)
+
+
+def _two_numbers(wind: Wind) -> Wind:
+    """A wind as two numbers.  Raises ArgumentError for anything else."""
+    try:
+        speed, from_deg = wind
+        if isinstance(wind, str | bytes):
+            raise TypeError
+        return float(speed), float(from_deg)
+    except (TypeError, ValueError):
+        allowed = "a speed, m/s, and the degrees from north that it blows from are expected, as (8, 270)"
+        raise ArgumentError.of_argument("wind", wind, allowed, shown=repr(wind)) from None
 
 
 # ----------------------------------------------------------------------

@@ -2,7 +2,8 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from logs.recording.reader import FlightLog, read_log
@@ -18,6 +19,8 @@ from world.errors import LogError
 _PORTS = range(1024, 65536)
 # A scheme, a name in small letters, as browsers write it, and a port.
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[a-z0-9._\[\]:-]+")
+# Frames a second of instruments.
+_FRAMES = 10.0
 # Seconds to wait for a ground station unless another time is given.
 _STATION_PATIENCE = 10.0
 
@@ -72,6 +75,47 @@ def instruments(log: FlightLog | str | Path) -> Instruments:
     True
     """
     return make_instruments(_opened(log))
+
+
+def replay(
+    log: FlightLog | str | Path,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    speed: float | None = None,
+    width: int | Callable[[], int] = 80,
+) -> Iterator[tuple[float, list[str]]]:
+    """Play a flight by the clock, as the command does on a terminal: ten times a second, and once at its end.
+
+    start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
+    width: of the lines, in characters, or what tells it when they are made.
+    Gives the time, s of the flight, and the instruments as lines of text.  A machine that sleeps makes it wait, too.
+    Raises a `planfly.PlanflyError` for bad input, at once.
+
+    >>> import planfly
+    >>> from logs.recording.example_log import example_log
+    >>> [round(time, 1) for time, lines in planfly.replay(example_log(), start=20.0, end=20.1, speed=10.0)][-1]
+    20.1
+    """
+    check_arguments(speed=speed)
+    found = _opened(log)
+    first, last = replayed_part(found, start, end)
+    return _played(instruments(found), first, last, speed or 1.0, width)
+
+
+def _played(
+    shown: Instruments, first: float, last: float, speed: float, width: int | Callable[[], int]
+) -> Iterator[tuple[float, list[str]]]:
+    # Imported here: it brings MAVLink with it.
+    from flight.live.link import RunningClock
+
+    played, now = RunningClock(), first
+    while True:
+        yield now, shown.frame(now, width=width() if callable(width) else width)
+        if now >= last:
+            return
+        time.sleep(1.0 / _FRAMES)
+        now = min(last, first + speed * played())
 
 
 @with_warm_up()

@@ -21,7 +21,7 @@ from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from planfly.airframe import Airframe, bank_limit, choose_seed, load_airframe, with_tracking
 from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
-from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission
+from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission, open_planned
 from planfly.pipeline import Advance, OffNominal, make_plan, make_setup
 from planner.plan import Plan, plan_json, read_plan
 from world.errors import FlightError, MissionError
@@ -72,8 +72,17 @@ class CampaignBase:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 
 
+def is_mission_file(target: str) -> bool:
+    """Whether a target is a plan's or a mission's file, by its name, and no scenario.
+
+    >>> is_mission_file("a/plan.json"), is_mission_file("jacksboro"), is_mission_file("valley.toml")
+    (True, False, False)
+    """
+    return Path(target).suffix.lower() in (".json", ".waypoints", ".plan")
+
+
 def open_campaign(
-    target: str,
+    target: Plan | str,
     dispersions: Dispersions,
     *,
     planned: Path | None = None,
@@ -86,15 +95,17 @@ def open_campaign(
 ) -> CampaignBase:
     """The base of a campaign of a scenario, which is planned here, or of a plan or mission file.
 
-    target: an embedded scenario's name, a scenario's TOML file, a plan.json, .waypoints or .plan.
+    target: an embedded scenario's name, a scenario's TOML file, a plan, or a plan.json, .waypoints or .plan.
     planned: where a scenario's plan is kept: it is read from there if it is there already, else written.
     scenario_name, terrain, change, fences: as of `planfly.open_mission.open_mission`; zones are planned around.
     seed: of plan and draws; None takes the scenario's, or 1.
     Raises a PlanflyError for bad input, a plan that is not feasible, and dispersions whose middle is no aircraft
     that flies.
     """
-    path = Path(target)
-    if path.suffix.lower() not in (".json", ".waypoints", ".plan"):
+    if isinstance(target, Plan):
+        opened = open_planned(target, scenario_name, terrain, seed=seed, change=change, fences=fences)
+        base = _of_mission(opened, dispersions, opened.setup.mission.source)
+    elif not is_mission_file(target):
         scenario = fences.on_scenario(change(load_scenario(target, terrain)))
         kept = planned is not None and planned.is_file()
         plan = read_plan(planned) if kept and planned is not None else _make_plan(scenario, seed, advance)
@@ -104,8 +115,8 @@ def open_campaign(
             write_whole(planned, plan_json(plan))
         base = _of_plan(plan, fences, dispersions, choose_seed(scenario, seed))
     else:
-        opened = open_mission(path, scenario_name, terrain, seed=seed, change=change, fences=fences)
-        base = _of_mission(opened, dispersions, path.name)
+        opened = open_mission(Path(target), scenario_name, terrain, seed=seed, change=change, fences=fences)
+        base = _of_mission(opened, dispersions, Path(target).name)
     check_middle(base)
     # A mission that cannot be laid out is refused here, not by a worker.
     make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)

@@ -133,21 +133,14 @@ def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
 
 def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     """Show frames until the end or an interruption; the last one stays on the terminal."""
-    from flight.live.link import RunningClock
-    from planfly.api.replaying import replayed_part
-
-    (now, end), speed = replayed_part(log, args.start, args.end), args.speed or 1.0
-    instruments, start, played = planfly.instruments(log), now, RunningClock()
+    speed, lines = args.speed or 1.0, list[str]()
+    frames = call(planfly.replay, args, log=log, width=lambda: shutil.get_terminal_size().columns)
     print(_ENTER, end="")
     try:
-        while now < end:
-            now = min(end, start + speed * played())
-            size = shutil.get_terminal_size()
-            lines = instruments.frame(now, width=size.columns)[: max(1, size.lines - 2)]
-            lines.append(f"x {speed:g}, Ctrl-C stops")
-            text = "".join(line + _TO_LINE_END + "\n" for line in lines)
+        for _, lines in frames:
+            fitting = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
+            text = "".join(line + _TO_LINE_END + "\n" for line in fitting)
             print(_HOME + text + _TO_END, end="", flush=True)
-            time.sleep(1.0 / _RATE)
     finally:
         print(_LEAVE, end="", flush=True)
-    print("\n".join(instruments.frame(now, width=shutil.get_terminal_size().columns)))
+    print("\n".join(lines))

@@ -22,7 +22,7 @@ FUNCTIONS = {
     "survey": ("survey",),
     "report": ("report", "foxglove_layout"),
     "compare": ("compare",),
-    "replay": ("timeline", "instruments", "movie", "play_to_foxglove", "play_to_stations"),
+    "replay": ("replay", "timeline", "instruments", "movie", "play_to_foxglove", "play_to_stations"),
     "recover": ("recover",),
     "import": ("import_log",),
     "refly": ("refly",),

@@ -31,7 +31,7 @@ VERBS = {
         "figures",
         "report",
     ),
-    *("compare", "export", "foxglove_layout", "timeline", "instruments", "movie", "play_to_foxglove"),
+    *("compare", "export", "foxglove_layout", "replay", "timeline", "instruments", "movie", "play_to_foxglove"),
     *("play_to_stations", "import_log", "refly", "recover", "campaign", "campaign_flight", "winds", "serve"),
     *(
         "scenarios",

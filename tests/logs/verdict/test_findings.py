@@ -15,6 +15,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
+from logs.verdict import findings
 from logs.verdict.findings import (
     SCHEMA,
     UNKNOWN_AIRCRAFT,
@@ -289,3 +290,36 @@ def test_a_rule_with_a_finding_left_open_is_not_called_ok_in_the_report() -> Non
     unsure = make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
     assert [row.state for row in rule_rows([passed])] == ["pass"]
     assert [(row.state, row.counts) for row in rule_rows([passed, unsure])] == [("unjudged", "1 ok, 1 not judged")]
+
+
+def made_verdict() -> Verdict:
+    """Two slopes of which one fails, a turn without a number, and a corridor that was not judged."""
+    findings = (
+        make_finding("slope", Place("leg", 0), ok=True, reason="", margin=2.0, planned=3.0, unit="deg"),
+        make_finding("slope", Place("leg", 1), ok=False, reason="too steep", margin=-1.5, tolerance=1.0, unit="deg"),
+        make_finding("turn", Place("turn", 1), ok=True, reason="", unit="deg"),
+        make_finding("corridor", Place("leg", 0), ok=None, reason="off the map", unit="m"),
+    )
+    return Verdict(findings, flyable=False, complete=True, lines=("not flyable",), level="flown")
+
+
+def test_the_closest_of_each_rule() -> None:
+    closest = made_verdict().closest
+    assert {rule: (one.place.index, one.margin) for rule, one in closest.items()} == {"slope": (1, -1.5)}
+
+
+def test_a_table_has_a_row_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
+    table = made_verdict().to_pandas()
+    assert table["rule"].tolist() == ["slope", "slope", "turn", "corridor"]
+    assert table["index"].tolist() == [0, 1, 1, 0]
+    assert table["ok"].tolist() == [True, False, True, None]
+    assert table.loc[table["ok"] == False, "reason"].tolist() == ["too steep"]  # noqa: E712
+    # Numbers of which there are none are NaN, so that a column can be reckoned with.
+    assert table["margin"].min() == -1.5
+    assert table["margin"].isna().tolist() == [False, False, True, True]
+    assert table.dtypes[["planned", "flown", "limit", "tolerance", "margin"]].unique().tolist() == [float]
+    empty = Verdict((), flyable=True, complete=True, lines=(), level="flown").to_pandas()
+    assert list(empty.columns) == list(table.columns)
+    monkeypatch.setattr(findings, "find_spec", lambda _: None)
+    with pytest.raises(ImportError, match="pandas is not installed"):
+        made_verdict().to_pandas()

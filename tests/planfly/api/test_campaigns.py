@@ -125,3 +125,21 @@ def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:
     assert with_both.world_hash() != without.world_hash()
     assert "fence" not in {rule for rule, _ in fly_one(without, 0).failed}
     assert "fence" in {rule for rule, _ in fly_one(with_both, 0).failed}
+
+
+def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path) -> None:
+    """The same mission, draws and flights; the line that repeats it names the plan in the campaign's folder."""
+    plan = planfly.plan("paper-07", seed=1, out=tmp_path / "plan.json")
+    bases = [
+        campaigns._asked(target, None, None, (), 3, wind=(4.0, 90.0)).open(
+            default_dispersions(), OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False)
+        )
+        for name, target in (("a", plan), ("b", tmp_path / "plan.json"))
+    ]
+    assert bases[0].world_hash() == bases[1].world_hash()
+    assert (tmp_path / "a" / "plan.json").read_bytes() == (tmp_path / "b" / "plan.json").read_bytes()
+    assert bases[0].scenario.wind.speed == 4.0
+    found = planfly.campaign(plan, flights=2, workers=1, seed=3, wind=(4.0, 90.0), out=tmp_path / "c")
+    assert found.columns["outcome"].tolist() == [fly_one(bases[1], k).outcome for k in (0, 1)]
+    page = (tmp_path / "c" / "report.html").read_text(encoding="utf-8")
+    assert f"planfly campaign {tmp_path / 'c' / 'plan.json'} --flights 2" in page

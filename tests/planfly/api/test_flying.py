@@ -151,3 +151,30 @@ def test_a_program_that_is_none_is_refused_before_anything_flies(mission: Path) 
 def test_a_scenario_made_in_python_is_planned_and_flown() -> None:
     made = planfly.plan(small_scenario(), seed=1)
     assert planfly.fly(made, max_hours=0.002).plan is made
+
+
+# ----------------------------------------------------------------------
+# `planfly.plan_then_fly` and winds.
+
+
+def test_both_at_once_are_the_one_after_the_other(tmp_path: Path) -> None:
+    flown_with = {"wind": (4.0, 90.0), "turbulence": "light", "airspeed": 27.0}
+    both = planfly.plan_then_fly("paper-07", seed=2, log=tmp_path / "f.mcap", **flown_with)
+    plan = planfly.plan("paper-07", seed=2, **flown_with)
+    assert plan_json(both.plan) == plan_json(plan)
+    assert verdict_json(both.verdict) == verdict_json(planfly.fly(plan, seed=2).verdict)
+    assert planfly.read_log(tmp_path / "f.mcap").setup.scenario.wind.speed == 4.0
+
+
+@pytest.mark.parametrize("wind", ["8,270", "8", 8, (8,), (8, 270, 1), ("a", "b"), {"speed": 8}])
+def test_a_wind_that_is_none_is_refused_by_its_name_in_python(wind: object) -> None:
+    with pytest.raises(
+        planfly.PlanflyError, match=r"^wind .*: a speed, m/s, and the degrees .* as \(8, 270\)$"
+    ) as found:
+        planfly.plan("paper-07", wind=wind)  # type: ignore[arg-type]
+    assert (found.value.field, found.value.value) == ("wind", wind)
+
+
+def test_a_wind_may_be_any_two_numbers() -> None:
+    winds = ((4, 90), [4.0, 90.0], np.array([4.0, 90.0]))
+    assert len({plan_json(planfly.plan("paper-07", seed=1, wind=wind)) for wind in winds}) == 1  # type: ignore[arg-type]
