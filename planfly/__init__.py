@@ -23,6 +23,7 @@ survey                               how much of each photo line of a survey can
 campaign, campaign_flight, winds     how likely it is to fly; the largest wind from each direction
 serve                                a MAVLink vehicle for ground stations
 scenarios, aircraft                  what is embedded
+terrain                              the ground of an area as a file, from tiles or from the Copernicus DEM's server
 new_scenario                         a commented scenario of one's own, from here to there over this ground
 describe_aircraft, new_aircraft      trims, modes and envelope; a folder for an aircraft of one's own
 identify_aircraft                    that folder from flight logs, with what is not known of it
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     from planfly.api.campaigns import campaign as campaign
     from planfly.api.campaigns import campaign_flight as campaign_flight
     from planfly.api.campaigns import winds as winds
+    from planfly.api.cutting_terrain import terrain as terrain
     from planfly.api.drafting import new_scenario as new_scenario
     from planfly.api.exporting import ExportedFiles as ExportedFiles
     from planfly.api.exporting import export as export
@@ -150,6 +152,7 @@ _HOMES = {
             "campaign_flight",
             "winds",
         ),
+        "planfly.api.cutting_terrain": ("terrain",),
         "planfly.api.drafting": ("new_scenario",),
         "planfly.api.exporting": (
             "ExportedFiles",

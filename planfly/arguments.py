@@ -69,6 +69,7 @@ RANGES: Mapping[str, Range] = {
     "directions": Range(4, 72, "4 to 72 is expected", integer=True),
     "every": Range(0.1, 3600.0, "seconds from 0.1 to 3,600 are expected"),
     "most": Range(1.0, 40.0, "m/s from 1 to 40 are expected"),
+    "margin": Range(0.0, 100.0, "km, from 0 to 100, are expected"),
     "height": Range(1.0, 5000.0, "m above ground, from 1 to 5,000, are expected"),
 }
 CHOICES: Mapping[str, tuple[Any, ...]] = {

@@ -127,7 +127,18 @@ def joined(tiles: Sequence["RasterFile"], name: str) -> "RasterFile":
         corners=corners,
         sha256=digest,
         read=read,
+        grid=moved_grid(first.grid, top, left),
     )
+
+
+def moved_grid(grid: tuple[float, ...], rows: int, cols: int) -> tuple[float, ...]:
+    """The affine coefficients (a, b, c, d, e, f) of a grid that begins so many rows and columns further on.
+
+    >>> moved_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
+    (30.0, 0.0, 460.0, 0.0, -30.0, 870.0)
+    """
+    a, b, c, d, e, f = grid
+    return a, b, c + a * cols + b * rows, d, e, f + d * cols + e * rows
 
 
 def _moved(

@@ -47,6 +47,8 @@ class RasterFile:
     to_source: longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: the other way.
     shape: (rows, cols).
     corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
+    grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference system, degrees
+    where there is none.
     read: rows and columns half-open to a float32 block with NaN for nodata, heights as the file has them.
     crs: the file's reference system as WKT; None where it has none.
     datum: what the heights count from.
@@ -59,6 +61,7 @@ class RasterFile:
     corners: Floats
     sha256: str
     read: Callable[[int, int, int, int], NDArray[np.float32]]
+    grid: tuple[float, ...]
     crs: str | None = None
     datum: HeightDatum = field(default=HeightDatum(UNSTATED))
 
@@ -139,7 +142,8 @@ def grid_in_degrees(
         return west + (col + 0.5) * pitch_x, north - (row + 0.5) * pitch_y
 
     corners = np.stack(to_place(*outline(cols, rows)), axis=1)
-    return RasterFile(name, (rows, cols), to_source, to_place, corners, file_sha256(file), read)
+    grid = (pitch_x, 0.0, west, 0.0, -pitch_y, north)
+    return RasterFile(name, (rows, cols), to_source, to_place, corners, file_sha256(file), read, grid)
 
 
 # ----------------------------------------------------------------------
@@ -240,7 +244,7 @@ def _read_strips(opened: Any, window: tuple[int, int, int, int], scale: float, o
 
 
 # What GDAL may do: read the one file, and nothing that lies beside it or is named in it.
-_GUARD: dict[str, Any] = {
+GUARD: dict[str, Any] = {
     "GDAL_PAM_ENABLED": "NO",
     "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
     "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
@@ -267,7 +271,7 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
     from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
 
     try:
-        with warnings.catch_warnings(), rasterio.Env(**_GUARD):
+        with warnings.catch_warnings(), rasterio.Env(**GUARD):
             # Without georeferencing there is no reference system either, and that is refused in one line.
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(os.fspath(file.resolve()), driver=driver) as source:
@@ -303,7 +307,7 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         try:
-            with rasterio.Env(**_GUARD), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
+            with rasterio.Env(**GUARD), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
                 return _read_strips(opened, (top, bottom, left, right), scale, offset)
         except (RasterioError, RasterioIOError, OSError) as error:
             raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
@@ -314,7 +318,8 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
         return np.asarray(lon), np.asarray(lat)
 
     corners = np.stack(to_place(*outline(cols, rows)), axis=1)
-    return RasterFile(str(file), (rows, cols), to_source, to_place, corners, file_sha256(file), read, crs.to_wkt())
+    place, grid = (rows, cols), tuple(forward)[:6]
+    return RasterFile(str(file), place, to_source, to_place, corners, file_sha256(file), read, grid, crs.to_wkt())
 
 
 def open_geotiff(file: Path, _name: str) -> RasterFile:

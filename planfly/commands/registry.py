@@ -38,7 +38,7 @@ class Command(NamedTuple):
 
 
 _FLY, _LOOK, _OTHERS = "plan and fly", "judge and show", "logs of autopilots"
-_MANY, _AIRCRAFT, _HELP = "many flights", "aircraft and scenarios", "help"
+_MANY, _AIRCRAFT, _HELP = "many flights", "aircraft, scenarios and terrain", "help"
 
 COMMANDS = (
     Command("run", _FLY, "RunAnswer"),
@@ -61,6 +61,7 @@ COMMANDS = (
     Command("aircraft", _AIRCRAFT, "AircraftAnswer"),
     Command("scenarios", _AIRCRAFT, "ScenariosAnswer", "shell"),
     Command("new", _AIRCRAFT, "NewAnswer"),
+    Command("terrain", _AIRCRAFT, "TerrainAnswer"),
     Command("help", _HELP, module="shell", function="show_help"),
     Command("completion", _HELP, module="shell"),
 )

@@ -947,6 +947,21 @@ class NewAnswer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class TerrainAnswer:
+    """planfly terrain: the file, and what it is from."""
+
+    schema: Literal["planfly.terrain/1"] = "planfly.terrain/1"
+    exit_code: int
+    file: str
+    rows: int
+    columns: int
+    tiles: list[str]
+    sea: list[list[int]]
+    """South-west corners, degrees, of what has no tile and is at 0 m."""
+    fetched_bytes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ScenarioEntry:
     """An embedded scenario."""
 

@@ -62,6 +62,17 @@ def place(text: str) -> tuple[float, float]:
     return lat, lon
 
 
+def area(text: str) -> tuple[float, ...]:
+    """S,W,N,E: degrees; the API says which are an area."""
+    try:
+        edges = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        edges = ()
+    if len(edges) != 4:
+        raise argparse.ArgumentTypeError(f"{text!r}: S,W,N,E is expected: south, west, north and east edge, degrees")
+    return edges
+
+
 def autopilots(text: str) -> list[str]:
     """Names of autopilots with commas between."""
     names = [name.strip() for name in text.split(",")]

@@ -32,6 +32,7 @@ FUNCTIONS = {
     "aircraft": ("aircraft", "describe_aircraft", "new_aircraft", "identify_aircraft"),
     "scenarios": ("scenarios",),
     "new": ("new_scenario",),
+    "terrain": ("terrain",),
     "help": (),
     "completion": (),
 }

@@ -39,6 +39,7 @@ VERBS = {
         "describe_aircraft",
         "new_aircraft",
         "new_scenario",
+        "terrain",
         "identify_aircraft",
         "paper_tables",
         "optimise",

@@ -26,6 +26,7 @@ SHORT = """QGC WPL 110
 2 0 3 16 0 0 0 0 46 8.01 100 1
 3 0 3 16 0 0 0 0 46.004 8.01 100 1
 """
+_AREA = ("--box", "36.25,-84.3,36.3,-84.2")
 _CAMPAIGN = ("short.waypoints", "--scenario", "field.toml", "--workers", "1", "--out", "out")
 
 
@@ -70,6 +71,10 @@ EVERY = {
         Given(("aircraft", "aerosonde")),
         Given(("scenarios",)),
         Given(("new", "site", "--from", "46.5,8", "--to", "46.55,8.05"), target="site"),
+        Given(
+            ("terrain", "--box", "36.25,-84.3,36.3,-84.2", "--source", "jacksboro", "--out", "new.tif"),
+            target="new.tif",
+        ),
         Given(("help",)),
         Given(("completion", "bash")),
     )

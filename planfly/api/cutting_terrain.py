@@ -1,0 +1,114 @@
+"""Get the ground of an area."""
+
+import math
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from platformdirs import user_cache_dir
+
+from flight.mission_files.formats import read_mission
+from planfly.arguments import check_arguments
+from planfly.stages import stage
+from planfly.targets import refuse_existing
+from world.errors import ArgumentError, PlanflyError
+from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_from_server
+
+# km on a degree of latitude, and the furthest from the equator that areas reach, degrees.
+_DEGREE, _FURTHEST = 111.2, 84.0
+
+
+def terrain(
+    out: str | Path,
+    *,
+    around: str | Path | None = None,
+    box: Sequence[float] | None = None,
+    margin: float = 3.0,
+    source: str | Path = COPERNICUS,
+    overwrite: bool = False,
+) -> CutTerrain:
+    """Write the ground of an area as a GeoTIFF that all else of planfly reads as terrain.
+
+    out: the file.  overwrite: whether one that is there is replaced.
+    around: a mission file, all places of which lie in the area; or box: its south, west, north and east edge, degrees.
+    margin: ground beside them, km.
+    source: a folder of tiles or an elevation file; or the address (http or https) of a server that has GLO-30 tiles of
+    the Copernicus DEM as the registry of open data of AWS has them, which is the default: what is fetched of it is kept
+    in the user's cache.  Degrees of which such a server has no tile are sea, at 0 m.
+    Raises a `planfly.PlanflyError` for bad input, and where the server cannot be reached; nothing is written then.
+
+    >>> import planfly
+    >>> planfly.terrain("dem.tif", box=(47.0, 8.0, 46.0, 9.0))
+    Traceback (most recent call last):
+    world.errors.ArgumentError: box (47.0, 8.0, 46.0, 9.0): south, west, north, east are expected, degrees -84..84 and \
+-180..180, south below north
+    """
+    check_arguments(margin=margin)
+    if (around is None) == (box is None):
+        raise ArgumentError.of_argument("box", "", "`around` MISSION or `box`: one of them is expected", shown="")
+    target = Path(out)
+    if target.suffix.lower() not in (".tif", ".tiff"):
+        raise PlanflyError(f"{target}: a name that ends with .tif is expected", file=target)
+    refuse_existing(target, overwrite, Path(around) if around is not None else None)
+    area = _widened(_box(box) if box is not None else _around(Path(str(around))), margin)
+    named = str(source)
+    with stage("fetching terrain" if "://" in named else "cutting terrain") as advance:
+        if "://" not in named:
+            refuse_existing(target, True, Path(named))
+            return cut_from_files(Path(named), area, target)
+        if not named.startswith(("http://", "https://")):
+            raise ArgumentError.of_argument("source", named, "a folder, or an address by http or https, is expected")
+        with tempfile.TemporaryDirectory() as instead:
+            return cut_from_server(named, area, target, _cache(Path(instead)), advance)
+
+
+def _box(given: Sequence[float]) -> Box:
+    """Raises ArgumentError."""
+    try:
+        south, west, north, east = (float(value) for value in given)
+    except (TypeError, ValueError):
+        south = west = north = east = math.nan
+    # Written so that NaN fails; an area may lie across the 180th meridian, from 179 to -179 or to 181.
+    around = east + 360.0 if east < west else east
+    if not (-_FURTHEST <= south < north <= _FURTHEST and -180.0 <= west <= 180.0 and west < around <= west + 30.0):
+        allowed = "south, west, north, east are expected, degrees -84..84 and -180..180, south below north"
+        raise ArgumentError.of_argument("box", given, allowed)
+    return Box(south, west, north, around)
+
+
+def _around(file: Path) -> Box:
+    """The box of all places of a mission: its items, home, fences and rally points.  Raises PlanflyError."""
+    mission = read_mission(file)
+    places = [
+        (one.lat_deg, one.lon_deg) for one in (*mission.items, *mission.fences, *mission.rally) if one.has_position
+    ]
+    if mission.home is not None:
+        places.append((mission.home.lat_deg, mission.home.lon_deg))
+    if not places:
+        raise PlanflyError(f"{file}: no place in it", file=file)
+    first = places[0][1]
+    lats = [lat for lat, _ in places]
+    lons = [first + (lon - first + 180.0) % 360.0 - 180.0 for _, lon in places]
+    if max(abs(lat) for lat in lats) > _FURTHEST or max(lons) - min(lons) > 30.0:
+        raise PlanflyError(
+            f"{file}: its places lie too far apart, or beyond {_FURTHEST:g} degrees of latitude", file=file
+        )
+    return Box(min(lats), min(lons), max(lats), max(lons))
+
+
+def _widened(box: Box, margin: float) -> Box:
+    """An area and the ground beside it.  margin: km."""
+    up = margin / _DEGREE
+    across = up / math.cos(math.radians(min(_FURTHEST, max(abs(box.south), abs(box.north)))))
+    return Box(box.south - up, box.west - across, box.north + up, box.east + across)
+
+
+def _cache(instead: Path) -> Path:
+    """Where fetched parts are kept; in a temporary folder where the user's cache cannot be written."""
+    folder = Path(user_cache_dir("planfly")) / "terrain"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        return instead

@@ -1,0 +1,317 @@
+"""The ground of an area as one GeoTIFF: from a folder of tiles, or from a server of Copernicus GLO-30 tiles.
+
+The server's layout is that of the Copernicus DEM in the registry of open data of AWS: a folder for each degree, with a
+cloud-optimised GeoTIFF in it, of which only the blocks that the area needs are fetched.  Where there is no tile is sea.
+Heights are above EGM2008 (Copernicus DEM Product Handbook, GEO.2018-1988-2, "Vertical datum").
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.elevation_tiles import is_ground, moved_grid
+from world.errors import TerrainError
+from world.files import write_whole
+from world.raster import GUARD, MAX_PIXELS, RasterFile, open_geotiff, open_raster
+from world.remote_files import RemoteFile, find_remote
+
+Heights = NDArray[np.float32]
+Floats = NDArray[Any]
+
+COPERNICUS = "https://copernicus-dem-30m.s3.amazonaws.com"
+# Tiles of an area at most: 100 would be some 3 GB.
+MAX_FETCHED = 25
+# What a tile's directory takes at its beginning, bytes: that of a GLO-30 tile takes 6 kB.
+_DIRECTORY = 2**16
+# WGS 84 with heights above EGM2008.
+_SYSTEM = "EPSG:4326+3855"
+_NODATA = -32768.0
+
+# Told of bytes, how many are expected, and a remark.
+Told = Callable[[float, float, str], None]
+
+
+class Box(NamedTuple):
+    """Degrees."""
+
+    south: float
+    west: float
+    north: float
+    east: float
+
+
+class CutTerrain(NamedTuple):
+    """What was written.
+
+    file: the GeoTIFF.  shape: its rows and columns.  tiles: names of those it is from.
+    sea: degrees (south-west corners) without a tile, at 0 m.  fetched: bytes that came from the server.
+    """
+
+    file: Path
+    shape: tuple[int, int]
+    tiles: tuple[str, ...]
+    sea: tuple[tuple[int, int], ...]
+    fetched: int
+
+
+# ----------------------------------------------------------------------
+# From a folder, a file or a virtual raster.
+
+
+def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
+    """Write the part of local tiles that an area needs, in their own reference system and on their own grid.
+
+    Raises TerrainError where the tiles do not reach beyond the area, or cannot be read.
+    """
+    raster = open_raster(str(source))
+    top, bottom, left, right = _window(raster, box)
+    heights = raster.read(top, bottom, left, right)
+    _write(out, heights, moved_grid(raster.grid, top, left), raster.crs or "EPSG:4326")
+    return CutTerrain(out, (bottom - top, right - left), (raster.name,), (), 0)
+
+
+def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
+    """Rows and columns (top, bottom, left, right) about an area.  Raises TerrainError where the raster ends in it."""
+    col, row = raster.to_source(*_outline(box))
+    rows, cols = raster.shape
+    if not (col.min() >= 0.0 and row.min() >= 0.0 and col.max() <= cols - 1 and row.max() <= rows - 1):
+        south, west, north, east = box
+        said = f"latitude {south:.4f}..{north:.4f}, longitude {west:.4f}..{east:.4f}"
+        raise TerrainError(f"{raster.name}: does not cover {said}", file=raster.name, field="area", value=tuple(box))
+    top, left = max(0, math.floor(row.min()) - 1), max(0, math.floor(col.min()) - 1)
+    return top, min(rows, math.ceil(row.max()) + 2), left, min(cols, math.ceil(col.max()) + 2)
+
+
+def _outline(box: Box) -> tuple[Floats, Floats]:
+    """Longitudes and latitudes along the edge of an area."""
+    ramp = np.linspace(0.0, 1.0, 41)
+    across, up = box.west + ramp * (box.east - box.west), box.south + ramp * (box.north - box.south)
+    lon = np.concatenate([across, across, np.full(41, box.west), np.full(41, box.east)])
+    lat = np.concatenate([np.full(41, box.south), np.full(41, box.north), up, up])
+    return lon, lat
+
+
+def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
+    """Write a GeoTIFF, whole or not at all.  grid: affine coefficients, from columns and rows to the system."""
+    import rasterio
+    from rasterio.io import MemoryFile
+
+    if heights.size > MAX_PIXELS:
+        allowed = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
+        raise TerrainError(f"{out}: {allowed}", file=out, value=heights.size, allowed=allowed)
+    stored = np.where(is_ground(heights), heights, np.float32(_NODATA))
+    rows, cols = heights.shape
+    profile: dict[str, Any] = {
+        "driver": "GTiff", "height": rows, "width": cols, "count": 1, "dtype": "float32", "crs": crs,
+        "transform": rasterio.Affine(*grid), "nodata": _NODATA, "compress": "deflate", "predictor": 3,
+    }  # fmt: skip
+    with MemoryFile() as memory:
+        with memory.open(**profile) as file:
+            file.write(stored, 1)
+            file.units = ("m",)
+        write_whole(out, bytes(memory.getbuffer()))
+
+
+# ----------------------------------------------------------------------
+# From a server.
+
+
+def tile_name(lat: int, lon: int) -> str:
+    """Name of a GLO-30 tile by its south-west corner, degrees.
+
+    >>> tile_name(46, 8), tile_name(-34, -71)
+    ('Copernicus_DSM_COG_10_N46_00_E008_00_DEM', 'Copernicus_DSM_COG_10_S34_00_W071_00_DEM')
+    """
+    north, east = "N" if lat >= 0 else "S", "E" if lon >= 0 else "W"
+    return f"Copernicus_DSM_COG_10_{north}{abs(lat):02d}_00_{east}{abs(lon):03d}_00_DEM"
+
+
+def degrees_of(box: Box) -> list[tuple[int, int]]:
+    """South-west corners of the degrees that an area touches; longitudes in -180..179.
+
+    >>> degrees_of(Box(46.9, 8.2, 47.1, 8.3)), degrees_of(Box(-0.1, 179.9, 0.0, 180.1))
+    ([(46, 8), (47, 8)], [(-1, 179), (-1, -180), (0, 179), (0, -180)])
+    """
+    lats = range(math.floor(box.south), math.floor(box.north) + 1)
+    lons = range(math.floor(box.west), math.floor(box.east) + 1)
+    return [(lat, (lon + 180) % 360 - 180) for lat in lats for lon in lons]
+
+
+def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told) -> CutTerrain:
+    """Fetch what an area needs of a server's tiles, and write it as one GeoTIFF.
+
+    server: the address of the folder of tiles.  cache: keeps what was fetched.  told: of the progress.
+    Where tiles of different pitch meet (at 50, 60, 70, 75, 80 and 85 degrees of latitude they do), the coarser are
+    interpolated to the grid of the finest.
+    Raises TerrainError where the server cannot be reached or does not answer as such a server does.
+    """
+    # The edge of a tile is half a pixel off its degree: neighbours are needed within one.
+    wide = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
+    degrees = degrees_of(wide)
+    if len(degrees) > MAX_FETCHED:
+        allowed = f"at most {MAX_FETCHED} are fetched: a smaller area is expected"
+        raise TerrainError(f"{server}: {len(degrees)} tiles: {allowed}", file=server, allowed=allowed)
+    found = {}
+    for number, degree in enumerate(degrees):
+        name = tile_name(*degree)
+        told(number, 10.0 * len(degrees), f"looking for {name}")
+        found[degree] = find_remote(f"{server.rstrip('/')}/{name}/{name}.tif", cache)
+    there = {degree: remote for degree, remote in found.items() if remote is not None}
+    if not there:
+        raise TerrainError(f"{server}: no tile of the area is there: open sea, or not such a server", file=server)
+    fetched = 0
+    tiles = []
+    for number, remote in enumerate(there.values()):
+
+        def count(came: int, done: int = number, name: str = remote.copy.name) -> None:
+            nonlocal fetched
+            fetched += came
+            told(len(there) + 9.0 * done, 10.0 * len(there), f"{name}: {fetched / 1e6:.1f} MB")
+
+        tiles.append(_placed(_fetched_tile(remote, wide, count), box))
+    heights, grid = _on_one_grid(tiles, box)
+    sea = tuple(degree for degree, remote in found.items() if remote is None)
+    _fill_sea(heights, grid, sea)
+    _write(out, heights, grid, _SYSTEM)
+    rows, cols = heights.shape
+    return CutTerrain(out, (rows, cols), tuple(tile_name(*degree) for degree in there), sea, fetched)
+
+
+def _fetched_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
+    """A tile's copy with the blocks that an area needs.  Raises TerrainError."""
+    size = _DIRECTORY
+    while True:
+        remote.fetch(0, size, count)
+        try:
+            tile = open_geotiff(remote.copy, remote.url)
+            break
+        except TerrainError:
+            # The directory may be longer, or stand at the end: then the file is no cloud-optimised one.
+            if size >= remote.size:
+                raise TerrainError(f"{remote.url}: not a GeoTIFF that can be read", file=remote.url) from None
+            size = remote.size
+    for begin, end in _blocks(remote.copy, _touched(tile, box)):
+        remote.fetch(begin, end, count)
+    return replace(tile, name=remote.url)
+
+
+def _touched(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
+    """Rows and columns of a tile in an area, and one more on each side."""
+    col, row = tile.to_source(*_outline(box))
+    rows, cols = tile.shape
+    top, bottom = (int(np.clip(value, 0, rows)) for value in (math.floor(row.min()) - 1, math.ceil(row.max()) + 2))
+    left, right = (int(np.clip(value, 0, cols)) for value in (math.floor(col.min()) - 1, math.ceil(col.max()) + 2))
+    return top, bottom, left, right
+
+
+def _blocks(copy: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int, int]]:
+    """Bytes [begin, end) of the blocks of a window.  Raises TerrainError for a file that does not state them."""
+    import rasterio
+
+    top, bottom, left, right = window
+    if top >= bottom or left >= right:
+        return
+    with rasterio.Env(**GUARD), rasterio.open(copy, driver="GTiff") as file:
+        high, wide = file.block_shapes[0]
+        for down in range(top // high, (bottom - 1) // high + 1):
+            for across in range(left // wide, (right - 1) // wide + 1):
+                at, size = (
+                    file.get_tag_item(f"BLOCK_{what}_{across}_{down}", "TIFF", bidx=1) for what in ("OFFSET", "SIZE")
+                )
+                # A block without data is not there.
+                if at is not None and size is not None:
+                    yield int(at), int(at) + int(size)
+
+
+class _Placed(NamedTuple):
+    """A tile on its grid of longitudes and latitudes.
+
+    west, north: of its outer edge, longitude counted as those of the area.  dx, dy: degrees of a pixel.
+    """
+
+    raster: RasterFile
+    west: float
+    north: float
+    dx: float
+    dy: float
+
+
+def _placed(tile: RasterFile, box: Box) -> _Placed:
+    """A tile beside others.  Raises TerrainError for one whose grid is turned."""
+    dx, turn, west, other_turn, dy, north = tile.grid
+    if turn or other_turn or not dx > 0.0 > dy:
+        raise TerrainError(f"{tile.name}: a grid of longitudes and latitudes is expected", file=tile.name)
+    turns = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
+    return _Placed(tile, west + 360.0 * turns, north, dx, -dy)
+
+
+def _on_one_grid(tiles: list[_Placed], box: Box) -> tuple[Heights, tuple[float, ...]]:
+    """Heights of an area on the grid of the finest tile, NaN where no tile is, and the grid."""
+    finest = min(tiles, key=lambda tile: tile.dx)
+    # Pixels whose centres lie about the area, counted from the finest tile's first.
+    left = math.floor((box.west - finest.west) / finest.dx - 0.5) - 1
+    right = math.ceil((box.east - finest.west) / finest.dx - 0.5) + 2
+    top = math.floor((finest.north - box.north) / finest.dy - 0.5) - 1
+    bottom = math.ceil((finest.north - box.south) / finest.dy - 0.5) + 2
+    if (right - left) * (bottom - top) > MAX_PIXELS:
+        allowed = f"at most {MAX_PIXELS:,} are written: a smaller area is expected"
+        count = (right - left) * (bottom - top)
+        raise TerrainError.at(finest.raster.name, "pixels", count, allowed, shown=f"{count:,}")
+    west, north = finest.west + left * finest.dx, finest.north - top * finest.dy
+    lon, lat = west + (np.arange(right - left) + 0.5) * finest.dx, north - (np.arange(bottom - top) + 0.5) * finest.dy
+    heights = np.full((lat.size, lon.size), np.nan, dtype=np.float32)
+    for tile in sorted(tiles, key=lambda tile: tile.dx):
+        _put(heights, lat, lon, tile)
+    return heights, (finest.dx, 0.0, west, 0.0, -finest.dy, north)
+
+
+def _put(heights: Heights, lat: Floats, lon: Floats, tile: _Placed) -> None:
+    """Fill what is still empty of a grid, by its latitudes and longitudes, from a tile: at its pixels, or between."""
+    rows, cols = tile.raster.shape
+    col, row = (lon - tile.west) / tile.dx - 0.5, (tile.north - lat) / tile.dy - 0.5
+    # A tile of another pitch reaches half a pixel of its own beyond its centres.
+    over, down = np.flatnonzero((col > -0.5) & (col < cols - 0.5)), np.flatnonzero((row > -0.5) & (row < rows - 0.5))
+    if not over.size or not down.size:
+        return
+    col, row = np.clip(col[over], 0.0, cols - 1.0), np.clip(row[down], 0.0, rows - 1.0)
+    left, top = int(col[0]), int(row[0])
+    read = tile.raster.read(top, min(rows, int(row[-1]) + 2), left, min(cols, int(col[-1]) + 2))
+    read[~is_ground(read)] = np.nan
+    part = heights[down[0] : down[-1] + 1, over[0] : over[-1] + 1]
+    values = _between(read, row - top, col - left)
+    empty = np.isnan(part)
+    part[empty] = values[empty]
+
+
+def _between(read: Heights, row: Floats, col: Floats) -> Heights:
+    """Heights between pixels, bilinear, at rows (m,) and columns (n,): (m, n)."""
+    # On the tile's own grid no height is touched.
+    row, col = (np.where(np.abs(at - np.round(at)) < 1e-3, np.round(at), at) for at in (row, col))
+    r0, c0 = np.floor(row).astype(int), np.floor(col).astype(int)
+    r1, c1 = np.minimum(r0 + 1, read.shape[0] - 1), np.minimum(c0 + 1, read.shape[1] - 1)
+    v, u = (row - r0)[:, None], (col - c0)[None, :]
+
+    def weighed(one: Heights, other: Heights, share: Floats) -> Floats:
+        return np.where(share == 0.0, one, (1.0 - share) * one + share * other)
+
+    upper = weighed(read[np.ix_(r0, c0)], read[np.ix_(r0, c1)], u)
+    lower = weighed(read[np.ix_(r1, c0)], read[np.ix_(r1, c1)], u)
+    return weighed(upper.astype(np.float32), lower.astype(np.float32), v).astype(np.float32)
+
+
+def _fill_sea(heights: Heights, grid: Sequence[float], sea: Sequence[tuple[int, int]]) -> None:
+    """Put 0 m where there is no tile, in degrees that have none."""
+    dx, _, west, _, dy, north = grid
+    lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy
+    for south, left in sea:
+        # By half a pixel: a tile's pixels lie about its degree.
+        over = np.abs((lon - left - 0.5 + 180.0) % 360.0 - 180.0) <= 0.5 + abs(dx)
+        down = np.abs(lat - south - 0.5) <= 0.5 + abs(dy)
+        part = heights[np.ix_(down, over)]
+        part[np.isnan(part)] = 0.0
+        heights[np.ix_(down, over)] = part
