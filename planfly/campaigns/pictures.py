@@ -342,8 +342,20 @@ def draw_go_no_go(
         axes.fill_between(fine, 0.0, low, color=PLANNED, alpha=0.45, linewidth=0.0)
         axes.fill_between(fine, boundary, most, color=FAIL, alpha=0.13, linewidth=0.0)
         axes.fill_between(fine, low, high, color=INTERVAL, alpha=0.45, linewidth=0.0)
-        axes.plot(fine, boundary, color=INK, linewidth=1.8)
+        # The edge of what was looked at is no limit.
+        axes.plot(fine, np.where(boundary < most - 1e-6, boundary, np.nan), color=INK, linewidth=1.8)
         for one in spokes:
+            if one.reaches:
+                outwards = (3, 0, -one.from_deg)
+                axes.plot(
+                    np.radians(one.from_deg),
+                    most,
+                    marker=outwards,
+                    color=QUIET,
+                    markersize=7,
+                    linewidth=0.0,
+                    clip_on=False,
+                )
             for speed, flights, flyable in one.flights:
                 all_well = flights == flyable
                 axes.plot(
@@ -362,11 +374,15 @@ def draw_go_no_go(
             0.03, 0.922, f"wind from each direction, m/s; flies with a probability of {target:g} or more",
             fontsize=9, color=QUIET,
         )  # fmt: skip
-        _legend(figure, target, confidence, wind)
+        edge = most if any(one.reaches for one in spokes) else None
+        _legend(figure, target, confidence, wind, edge)
     return figure
 
 
-def _legend(figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None) -> None:
+def _legend(
+    figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, edge: float | None
+) -> None:
+    """What stands for what.  edge: largest wind that was looked at, m/s, where some direction has no limit below it."""
     from matplotlib.artist import Artist
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -379,6 +395,10 @@ def _legend(figure: Figure, target: float, confidence: float, wind: tuple[float,
         (Line2D([], [], color=BLUE, marker="o", markersize=3, linewidth=0), "flown, all flyable"),
         (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not"),
     ]
+    if edge is not None:
+        entries.append((
+            Line2D([], [], color=QUIET, marker="^", markersize=7, linewidth=0), f"no limit found up to\n{edge:g} m/s"
+        ))  # fmt: skip
     if wind is not None:
         entries.append((Line2D([], [], color=INK, marker="*", markersize=11, linewidth=0), "the scenario's wind"))
     figure.legend(

@@ -6,21 +6,36 @@ A frame is a function of the log and the time alone: the same log and time give 
 import bisect
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import control_limits
 from logs.recording.reader import FlightLog
+from logs.views.charts import shorten
 from logs.views.replay.timeline import TimelineEntry, log_with_legs, timeline_of_legs, waypoint_name
 
 Floats = NDArray[np.float64]
 
-MIN_WIDTH = 64
+MIN_WIDTH = 60
 # All of a frame, and the line below it, fit a terminal of 24 lines.
-_HORIZON_ROWS, _HORIZON_COLUMNS = 7, 25
+_HORIZON_ROWS = 7
+
 _DEGREES_A_ROW = 5.0
 _LATEST = 3  # entries of the timeline at the foot
+
+
+class _Size(NamedTuple):
+    """Columns of a frame from which on it is drawn so, of its horizon, and of the bar of a control."""
+
+    columns: int
+    horizon: int
+    bar: int
+
+
+# In the narrow one, too, the numbers beside the horizon are whole.
+_WIDE, _NARROW = _Size(80, 25, 31), _Size(MIN_WIDTH, 11, 21)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +55,15 @@ class Instruments:
         columns = max(MIN_WIDTH, width)
         log = self.log
         k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
-        left, right = self._horizon(k), self._numbers(k)
+        size = _WIDE if columns >= _WIDE.columns else _NARROW
+        left, right = self._horizon(k, size.horizon), self._numbers(k)
         rows = max(len(left), len(right))
-        left += [" " * (_HORIZON_COLUMNS + 2)] * (rows - len(left))
+        left += [" " * (size.horizon + 2)] * (rows - len(left))
         right += [""] * (rows - len(right))
         lines = self._head(k, columns)
         lines += [f"{a}  {b}" for a, b in zip(left, right, strict=True)]
-        lines += ["", *self._controls(k), self._threats(k), *self._latest_entries(float(log.track.time[k]))]
-        return [line[:columns].rstrip() for line in lines]
+        lines += ["", *self._controls(k, size.bar), self._threats(k), *self._latest_entries(float(log.track.time[k]))]
+        return [shorten(line, columns).rstrip() for line in lines]
 
     def _head(self, k: int, columns: int) -> list[str]:
         log, track = self.log, self.log.track
@@ -67,14 +83,14 @@ class Instruments:
         free = max(1, columns - len(clock))
         return [_printable(title)[: free - 1].ljust(free) + clock, bar, ahead]
 
-    def _horizon(self, k: int) -> list[str]:
+    def _horizon(self, k: int, columns: int) -> list[str]:
         """Draw the artificial horizon: sky above, ground (:) below, the aircraft's wings in the middle."""
         roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[k])
         rows = []
         for row in range(_HORIZON_ROWS):
             cells = []
-            for column in range(_HORIZON_COLUMNS):
-                across = (column - _HORIZON_COLUMNS // 2) / 2.0  # a letter is twice as high as wide
+            for column in range(columns):
+                across = (column - columns // 2) / 2.0  # a letter is twice as high as wide
                 up = _HORIZON_ROWS // 2 - row
                 # Height of this cell over the horizon, in rows, turned by the roll.
                 over = up * math.cos(roll) + across * math.sin(-roll) + math.degrees(pitch) / _DEGREES_A_ROW
@@ -82,8 +98,8 @@ class Instruments:
             rows.append(cells)
         middle = rows[_HORIZON_ROWS // 2]
         for offset, mark in ((-5, "="), (-4, "="), (-3, "="), (0, "o"), (3, "="), (4, "="), (5, "=")):
-            middle[_HORIZON_COLUMNS // 2 + offset] = mark
-        edge = "+" + "-" * _HORIZON_COLUMNS + "+"
+            middle[columns // 2 + offset] = mark
+        edge = "+" + "-" * columns + "+"
         return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
 
     def _numbers(self, k: int) -> list[str]:
@@ -111,20 +127,20 @@ class Instruments:
             f"battery      {_number(used, 1)} of {_number(setup.battery, 0)} Wh used, {_number(current, 1)} A",
         ]
 
-    def _controls(self, k: int) -> list[str]:
+    def _controls(self, k: int, bar: int) -> list[str]:
         """Draw one bar a control: where it stands (O) between its limits, and its command (|)."""
         lines = []
         controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
         for (name, limit), stands, asked in zip(self.limits, controls, commands, strict=True):
             throttle = name == "throttle"
             full = limit if math.isfinite(limit) else math.radians(30.0)
-            cells = list("." * 31)
+            cells = list("." * bar)
             if not throttle:
-                cells[15] = "+"
+                cells[bar // 2] = "+"
             for value, mark in ((asked, "|"), (stands, "O")):
                 if math.isfinite(value):
                     share = value if throttle else 0.5 + 0.5 * value / full
-                    cells[round(30 * min(max(share, 0.0), 1.0))] = mark
+                    cells[round((bar - 1) * min(max(share, 0.0), 1.0))] = mark
             state = f"{_number(100.0 * stands, 0)} %" if throttle else f"{_number(math.degrees(stands), 1, '+')}°"
             held = "  AT ITS LIMIT" if (asked >= 1.0 if throttle else abs(asked) >= full) else ""
             lines.append(f"{name:<9} [{''.join(cells)}] {state}{held}")

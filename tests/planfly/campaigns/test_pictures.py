@@ -1,6 +1,7 @@
 """Failures: the most frequent first."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -137,3 +138,22 @@ def test_the_boundary_passes_through_each_direction() -> None:
     # A mark for each wind flown in, and the star.
     assert len(figure.axes[0].lines) == 1 + 8 + 1
     assert png_bytes(figure) == png_bytes(draw_go_no_go(SPOKES, 20.0, 0.99, 0.95, "demo", (5.0, 250.0)))
+
+
+def test_the_edge_of_the_search_is_no_limit() -> None:
+    """Where nothing failed the boundary is the largest wind that was looked at: no line is drawn there, but a mark."""
+    open_ones = [replace(SPOKES[k], boundary=20.0, low=19.0, high=20.0, reaches=True) for k in (1, 2)]
+    figure = draw_go_no_go([SPOKES[0], *open_ones, SPOKES[3]], 20.0, 0.99, 0.95, "demo", None)
+    [axes] = figure.axes
+    [outline] = [line for line in axes.lines if len(line.get_xdata()) > 100]
+    angle, speed = (np.asarray(data, float) for data in (outline.get_xdata(), outline.get_ydata()))
+    beside = (angle > np.radians(91.0)) & (angle < np.radians(179.0))
+    assert np.isnan(speed[beside]).all()
+    assert np.nanmax(speed) < 20.0
+    assert np.isfinite(speed[angle < np.radians(80.0)]).all()
+    edge = [line for line in axes.lines if len(line.get_xdata()) == 1 and line.get_ydata()[0] == 20.0]
+    assert [round(float(np.degrees(line.get_xdata()[0]))) for line in edge] == [90, 180]
+    said = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "no limit found up to\n20 m/s" in said
+    without = draw_go_no_go(SPOKES, 20.0, 0.99, 0.95, "demo", None)
+    assert not any("no limit" in text.get_text() for text in without.legends[0].get_texts())

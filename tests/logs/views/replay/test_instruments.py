@@ -33,6 +33,19 @@ def test_frames_fit_their_width_and_24_lines(log_file: Path, width: int) -> None
     assert all(len(frame) <= 21 for frame in frames)
 
 
+def test_in_sixty_columns_every_number_is_whole(log_file: Path) -> None:
+    show = make_instruments(read_log(log_file))
+    for time in TIMES:
+        wide, narrow = ("\n".join(show.frame(float(time), width=width)) for width in (300, 60))
+        numbers = [line[29:].strip() for line in wide.splitlines()[3:11]]
+        assert all(numbers)
+        assert all(text in narrow for text in numbers)
+        # The controls' states, and that one is at its limit.
+        states = [line.partition("] ")[2] for line in wide.splitlines() if line.startswith(("throttle", "elevator"))]
+        assert len(states) == 2
+        assert all(f"] {state}" in narrow for state in states)
+
+
 def test_the_numbers_are_those_of_the_row(log_file: Path, track: Track) -> None:
     show = make_instruments(read_log(log_file))
     k = 200
