@@ -9,6 +9,7 @@ colour vision deficiencies tell apart, and ColorBrewer's violet for limits; dash
 distinction a second time.
 """
 
+import re
 from dataclasses import dataclass
 
 # Wong's names of Okabe and Ito's palette.
@@ -187,6 +188,22 @@ def css_variables() -> str:
         rules.append(f":root {{ color-scheme: {'dark' if dark else 'light'}; {values} }}")
     light, night = rules
     return f"{light}\n@media screen and (prefers-color-scheme: dark) {{ {night} }}\n"
+
+
+_HEX = re.compile(r"#[0-9a-f]{6}\b")
+
+
+def with_variables(drawn: str) -> str:
+    """A drawing's text with the variables of `css_variables` in place of its light colours.
+
+    Of roles that have one light colour the first counts, what stands around the data before the data.
+
+    >>> with_variables("fill: #1d1d1f; stroke: #123456")
+    'fill: var(--ink); stroke: #123456'
+    """
+    names = {text: f"ground-{k}" for k, text in reversed(list(enumerate(GROUND)))}
+    names |= {colour(name): name for name in reversed((*PAGE, *LOOKS))}
+    return _HEX.sub(lambda found: f"var(--{names[found[0]]})" if found[0] in names else found[0], drawn)
 
 
 # Pixels of a page to a point of print, and plotly.js' names of markers.

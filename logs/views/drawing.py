@@ -2,10 +2,12 @@
 
 import io
 import math
+import re
 import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -115,6 +117,25 @@ def few_colours(png: bytes) -> bytes:
 def svg_bytes(figure: Figure) -> bytes:
     """Render the figure as an SVG, its letters as outlines; the same figure gives the same bytes."""
     return _rendered(figure, "svg", {"Date": None, "Creator": None})
+
+
+def page_svg(figure: Figure, words: str) -> str:
+    """The figure as an element of a page, in the colours of the page's style, light and dark (`theme.css_variables`).
+
+    words: what it shows, for those who do not see it.
+
+    >>> page_svg(new_figure(2.0), "nothing")[:62]
+    '<svg role="img" aria-label="nothing" viewBox="0 0 720 144" xml'
+    """
+    text = svg_bytes(figure).decode("utf-8")
+    text = text[text.index("<svg") :]
+    opening, rest = text.split(">", 1)
+    box = re.search(r'viewBox="[^"]*"', opening)
+    names = re.findall(r'xmlns(?::\w+)?="[^"]*"', opening)
+    # Nobody asks for the names of groups, which would come twice in a page of several pictures.
+    drawn = re.sub(r'<g id="[^"]*"', "<g", re.sub(r"<metadata>.*?</metadata>", "", rest, flags=re.DOTALL))
+    head = " ".join(['<svg role="img"', f'aria-label="{escape(words)}"', box[0] if box else "", *sorted(names)])
+    return f"{head}>{theme.with_variables(drawn)}".rstrip()
 
 
 def _rendered(figure: Figure, kind: str, metadata: Any) -> bytes:

@@ -257,7 +257,8 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
             good = np.isfinite(here).all(axis=1)
             axes.axhline(0.0, color=GRID, linewidth=0.6)
             axes.axvline(0.0, color=GRID, linewidth=0.6)
-            axes.plot(*here[good & ~failed].T, ".", color=BLUE, markersize=2.2, alpha=0.5)
+            # Thousands of them, as pixels; their colour is one that shows on light and on dark paper.
+            axes.plot(*here[good & ~failed].T, ".", color=PLANNED, markersize=2.6, alpha=0.8, rasterized=True)
             axes.plot(*here[good & failed].T, "x", color=FAIL, markersize=3.5)
             reach = _reach(here)
             if good.sum() > 2:

@@ -1,6 +1,5 @@
 """The files of a campaign's folder: summary, report page, worst flights' logs, and the go/no-go chart of winds."""
 
-import base64
 import json
 import math
 import tempfile
@@ -19,7 +18,7 @@ from matplotlib.figure import Figure
 from logs.theme import css_variables
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text
-from logs.views.drawing import png_bytes
+from logs.views.drawing import page_svg, png_bytes
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import BY_NAME
 from planfly.campaigns.find_winds import ACCURACY, FEWEST, WindsFound
@@ -52,7 +51,7 @@ _DRAWN = 3000
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
     """The page's bytes; command: the line that flies it again."""
-    pictures = [(_embedded(figure), words) for figure, words in _pictures(base, summary, store)]
+    pictures = [Markup(page_svg(figure, words)) for figure, words in _pictures(base, summary, store)]
     lines = campaign_lines(summary)
     text = _render(
         "campaign.html",
@@ -104,15 +103,10 @@ def _render(template: str, **values: object) -> str:
     return environment.get_template(template).render(colours=Markup(css_variables()), **values)
 
 
-def _embedded(figure: Figure) -> str:
-    return "data:image/png;base64," + base64.b64encode(png_bytes(figure)).decode("ascii")
-
-
 def winds_page(name: str, figure: Figure, lines: list[str], rows: Sequence[tuple[str, ...]], command: str) -> bytes:
     """The page of a go/no-go chart."""
-    return _render("winds.html", name=name, picture=_embedded(figure), lines=lines, rows=rows, command=command).encode(
-        "utf-8"
-    )
+    picture = Markup(page_svg(figure, "Go/no-go chart: wind from each direction"))
+    return _render("winds.html", name=name, picture=picture, lines=lines, rows=rows, command=command).encode("utf-8")
 
 
 def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:

@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.report import campaign_page
@@ -12,7 +13,24 @@ def test_it_holds_pictures_tables_and_no_link(base: CampaignBase, tmp_path: Path
     with made_report(base, tmp_path) as (store, summary):
         page = campaign_page(base, summary, store, "planfly campaign <x>").decode()
         assert page == campaign_page(base, summary, store, "planfly campaign <x>").decode()
-    assert page.count('<img src="data:image/png;base64,') == 5
+    assert page.count('<svg role="img" aria-label="') == 5
     assert "planfly campaign &lt;x&gt;" in page
     assert "leg 1" in page
-    assert not re.search(r'(src|href)="(?!data:)', page)
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+
+
+def test_its_pictures_are_dark_where_the_page_is(base: CampaignBase, tmp_path: Path) -> None:
+    """Every colour that is drawn is a variable of the page's style, which has a light and a dark one for each."""
+    with made_report(base, tmp_path) as (store, summary):
+        page = campaign_page(base, summary, store, "planfly campaign x").decode()
+    pictures = re.findall(r"<svg .*?</svg>", page, re.DOTALL)
+    assert len(pictures) == 5
+    for picture in pictures:
+        assert re.findall(r"#[0-9a-f]{6}\b", picture) == []
+        used = set(re.findall(r"var\(--([a-z0-9-]+)\)", picture))
+        assert {"paper", "ink"} <= used
+        style = page[: page.index("</style>")]
+        assert all(style.count(f"--{name}: #") == 2 for name in used)
+        # Names of groups would come twice in the page.
+        assert "<g id=" not in picture
+        assert ElementTree.fromstring(picture.replace("&ndash;", "")).tag.endswith("svg")
