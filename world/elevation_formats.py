@@ -30,5 +30,7 @@ FORMATS = (
 SUFFIXES = tuple(known.suffix for known in FORMATS)
 # A list of such files, of which only their names are read (`world.elevation_tiles`).
 VIRTUAL = ".vrt"
+# Tiles of one terrain at most.
+MAX_TILES = 100
 # Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
 EMBEDDED = {"jacksboro": "jacksboro.npz"}

@@ -15,14 +15,14 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from world.elevation_formats import SUFFIXES, VIRTUAL
+from world.elevation_formats import MAX_TILES, SUFFIXES, VIRTUAL
 from world.errors import TerrainError
 
 if TYPE_CHECKING:
     from world.raster import RasterFile
 
-# Tiles of one terrain at most, and bytes of a virtual raster.
-MAX_TILES, _MAX_BYTES = 100, 4 * 2**20
+# Bytes of a virtual raster at most.
+_MAX_BYTES = 4 * 2**20
 # Data that is missing without a stated nodata value: these, and what is lower or higher than any ground, m.
 UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
 LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0

@@ -377,6 +377,18 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
     raise TerrainError(f"{file}: not an elevation file: {expected} is expected", file=file)
 
 
+def open_tiles(paths: Sequence[str], base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
+    """Open one elevation file, as `open_raster` does, or several on one grid as one.
+
+    Where they overlap, the first that has data counts.  Raises TerrainError as `open_raster` does.
+
+    >>> open_tiles(["jacksboro", "jacksboro"]).name
+    'jacksboro and 1 more'
+    """
+    tiles = [open_raster(path, base, datum) for path in paths]
+    return tiles[0] if len(tiles) == 1 else joined(tiles, f"{paths[0]} and {len(paths) - 1} more")
+
+
 def _datum_of(raster: RasterFile, stated: StatedDatum | None) -> HeightDatum:
     try:
         return height_datum(raster.crs, stated)

@@ -19,7 +19,7 @@ from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
 from world.files import did_you_mean, whole_path
 from world.frames import GeoOrigin, to_geo, to_map
-from world.raster import RasterFile, open_raster, read_terrain, tile_bounds
+from world.raster import RasterFile, open_tiles, read_terrain, tile_bounds
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
 from world.scenario_tables import (
     MAX_ZONES,
@@ -355,16 +355,17 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
     """Open a scenario's elevation file, and say where it was found and what its hash is."""
-    path = str(table.path)
+    paths = [str(table.path)] if not isinstance(table.path, list) else table.path
+    shown = ", ".join(paths)
     try:
-        raster = open_raster(path, base, table.height_datum)
+        raster = open_tiles(paths, base, table.height_datum)
     except TerrainError as error:
-        raise TerrainError.from_error(error, source, "terrain.path", path) from error
+        raise TerrainError.from_error(error, source, "terrain.path", shown) from error
     if table.sha256 not in (None, raster.sha256):
-        raise ScenarioError.at(source, "terrain.path", path, "the file has changed since (its SHA-256 differs)")
-    if path not in EMBEDDED:
-        path = whole_path(Path(base or "", path))
-    return raster, table.model_copy(update={"path": path, "sha256": raster.sha256})
+        raise ScenarioError.at(source, "terrain.path", shown, "the file has changed since (its SHA-256 differs)")
+    whole = [path if path in EMBEDDED else whole_path(Path(base or "", path)) for path in paths]
+    found = whole if isinstance(table.path, list) else whole[0]
+    return raster, table.model_copy(update={"path": found, "sha256": raster.sha256})
 
 
 def _assemble(

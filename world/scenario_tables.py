@@ -6,9 +6,10 @@ into a `Scenario`.
 
 from typing import Annotated, Literal, NamedTuple, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from world.airspace.zone_times import parse_period, parse_span
+from world.elevation_formats import MAX_TILES
 from world.height_datum import MAX_SEA_LEVEL, NamedDatum, StatedDatum
 
 # ----------------------------------------------------------------------
@@ -185,15 +186,24 @@ def _known_datum(datum: StatedDatum) -> StatedDatum:
     raise ValueError(f"allowed {listed} or {-MAX_SEA_LEVEL:g}..{MAX_SEA_LEVEL:g} m")
 
 
+def _file_or_tiles(path: object) -> object:
+    """A file's name, or a list of them; a union alone would say of either what the other is not."""
+    listed = path if isinstance(path, list) else [path]
+    if path is None or (1 <= len(listed) <= MAX_TILES and all(isinstance(one, str) for one in listed)):
+        return path
+    raise ValueError(f"a file's name, or a list of 1 to {MAX_TILES}, is expected")
+
+
 class TerrainTable(ScenarioTable):
     """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file.
 
+    path: an elevation file, a folder or .vrt of tiles, an embedded name, or a list of these on one grid.
     vertical_error_m: of the heights, as their source states it; none where it is not stated, for no file says.
     height_datum: what a file's heights count from, or the height of mean sea level in it, m; none takes what it says.
     """
 
     kind: Literal["dem", "peaks", "flat", "none"]
-    path: FilePath | None = None
+    path: Annotated[FilePath | list[FilePath] | None, BeforeValidator(_file_or_tiles)] = None
     peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
     amsl_m: Amsl | None = None
     vertical_error_m: Annotated[float, within(0.0, 1000.0)] | None = None

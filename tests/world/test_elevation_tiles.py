@@ -21,7 +21,9 @@ from tests.world.made.elevation_files import (
     write_hgt,
     write_raster,
 )
+from world.errors import PlanflyError, ScenarioError
 from world.raster import open_raster, read_terrain, tile_bounds
+from world.scenario import Scenario, from_spec, load_scenario
 
 
 def cut(folder: Path, name: str, rows: slice, cols: slice, shift: float = 0.0, crs: str = "EPSG:4326") -> Path:
@@ -176,3 +178,79 @@ def test_a_virtual_raster_that_is_none(case: str, tmp_path: Path) -> None:
     content, match = VIRTUAL[case]
     (tmp_path / "a.vrt").write_bytes(content)
     assert_refused(tmp_path / "a.vrt", match)
+
+
+SCENARIO = """
+name = "four"
+[terrain]
+kind = "dem"
+path = {path}
+[origin]
+lat_deg = {lat}
+lon_deg = {lon}
+[area]
+east_m = [-2500, 2500]
+north_m = [-2500, 2500]
+ceiling_amsl_m = 4000
+[start]
+east_m = -2000
+north_m = 0
+amsl_m = 3500
+[destination]
+east_m = 2000
+north_m = 0
+amsl_m = 3500
+"""
+
+
+def scenario(folder: Path, path: str) -> Scenario:
+    file = folder / "four.toml"
+    file.write_text(SCENARIO.format(path=path, lat=MIDDLE.lat_deg, lon=MIDDLE.lon_deg), encoding="ascii")
+    return load_scenario(str(file))
+
+
+def test_a_scenario_lists_its_tiles(tmp_path: Path) -> None:
+    four(tmp_path / "dem", 3)
+    listed = scenario(tmp_path, '["dem/00.tif", "dem/01.tif", "dem/10.tif", "dem/11.tif"]')
+    folder = scenario(tmp_path, '"dem"')
+    assert listed.terrain is not None
+    assert folder.terrain is not None
+    assert np.array_equal(listed.terrain.heights, folder.terrain.heights, equal_nan=True)
+    assert listed.terrain.source == "dem/00.tif and 3 more"
+    # Written down with whole paths, and made again from there; a tile that has changed is told.
+    written = listed.to_json()
+    assert written["terrain"]["path"][3] == str(tmp_path / "dem" / "11.tif")
+    assert from_spec(written, "a plan").terrain.sha256 == listed.terrain.sha256  # type: ignore[union-attr]
+    cut(tmp_path / "dem", "11.tif", slice(ROWS // 2, ROWS), slice(COLS // 2, COLS - 1))
+    with pytest.raises(ScenarioError, match="has changed since"):
+        from_spec(written, "a plan")
+
+
+def test_of_listed_tiles_the_first_counts(tmp_path: Path) -> None:
+    write_geotiff(tmp_path / "b.tif")
+    lower = write_raster(tmp_path / "a.tif", made_tile() - 50.0, "EPSG:4326", from_origin(WEST, NORTH, PITCH, PITCH))
+    assert lower.name < "b.tif"
+    first, second = (scenario(tmp_path, f'["{names[0]}.tif", "{names[1]}.tif"]').terrain for names in ("ab", "ba"))
+    assert first is not None
+    assert second is not None
+    assert float(second.height(0.0, 0.0) - first.height(0.0, 0.0)) == pytest.approx(50.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ("[]", "four.toml: terrain.path: a file's name, or a list of 1 to 100, is expected"),
+        ("5", "terrain.path: 5: a file's name, or a list of 1 to 100, is expected"),
+        ('["dem/00.tif", 5]', "a list of 1 to 100, is expected"),
+        ('["dem/00.tif", ""]', "terrain.path"),
+        ('["dem/00.tif", "none.tif"]', "none.tif: terrain path: no such file"),
+        ('["dem/00.tif", "http://x/y.tif"]', "only local files are read"),
+        (str(["a.tif"] * 101), "a list of 1 to 100, is expected"),
+    ],
+)
+def test_a_list_that_is_none_is_one_line(path: str, said: str, tmp_path: Path) -> None:
+    four(tmp_path / "dem", 0)
+    with pytest.raises(PlanflyError) as found:
+        scenario(tmp_path, path)
+    assert said in str(found.value)
+    assert "\n" not in str(found.value)
