@@ -37,7 +37,7 @@ from planfly.reference_flights import judge_with_reference_flights
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import end_with_parent
-from world.scenario import Scenario, load_scenario, with_flight
+from world.scenario import Scenario, at_time, load_scenario, with_flight
 
 DEFAULT_SCENARIO = "jacksboro"
 # Most texts about one verdict; the log has the rest.
@@ -53,6 +53,7 @@ class ServeOptions:
     flight: entries of the scenario's [flight] that take the place of its own; None for those it keeps.
     speed: times real time.
     logs: the folder of the flight logs.
+    at: when it is flown, None where not stated.
     fences: named beside the mission; a station that uploads another fence replaces the items, not the zones.
     """
 
@@ -63,6 +64,7 @@ class ServeOptions:
     logs: Path
     flight: dict[str, str | float | None] = field(default_factory=dict)
     fences: NamedFences = field(default_factory=NamedFences)
+    at: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,7 @@ def open_served(options: ServeOptions) -> ServedScenario:
     """Load what is served.  Raises PlanflyError."""
 
     def change(scenario: Scenario) -> Scenario:
-        return with_flight(scenario, **options.flight)
+        return with_flight(at_time(scenario, options.at), **options.flight)
 
     if options.mission:
         opened = open_mission(

@@ -2,6 +2,7 @@
 
 import contextlib
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from flight.mission.fences import numbered, zone_fences
@@ -17,7 +18,7 @@ from planfly.targets import refuse_existing
 from planner.plan import Plan, plan_json
 from world.errors import MissionError, PlanflyError
 from world.files import temporary_folder, write_whole
-from world.scenario import Scenario
+from world.scenario import Scenario, at_time
 
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
 # What a flight log alone can be written as.
@@ -64,6 +65,7 @@ def export(
     source: FlightLog | FlownMission | Plan | str | Path,
     *files: str | Path,
     fence: FencePaths = (),
+    at: str | None = None,
     overwrite: bool = False,
 ) -> ExportedFiles:
     """Write a plan, a mission or a flight in the forms that the files' suffixes name.
@@ -71,6 +73,7 @@ def export(
     source: a plan, a flight with a log, or the path of a plan.json, mission file or log.
     files: .waypoints, .plan, .fence, .rally, .kml, .gpx; of a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
     fence: files of fences or zones beside its own.
+    at: when it is flown, as of `planfly.plan`: zones that are not active then are in none of the files.
     overwrite: whether files that are there may be replaced.
     Raises a `planfly.PlanflyError` for bad input; nothing is written then.
 
@@ -89,7 +92,7 @@ def export(
             if target.suffix.lower() not in (*MAPS, *LOGS):
                 _refuse_unknown(target)
             refuse_existing(target, overwrite, path)
-        found = _read(path, targets, named_fences(fence), fenced=bool(fence))
+        found = _read(path, targets, named_fences(fence), at, fenced=bool(fence))
         texts = [_text(found, target) for target in targets]
     for target, (text, _) in zip(targets, texts, strict=True):
         write_whole(target, text)
@@ -122,9 +125,12 @@ def _refuse_unknown(target: Path) -> None:
         raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
 
 
-def _read(path: Path, targets: tuple[Path, ...], fences: NamedFences, *, fenced: bool) -> _Source:
+def _read(path: Path, targets: tuple[Path, ...], fences: NamedFences, at: str | None, *, fenced: bool) -> _Source:
     """A source, as far as the targets ask for it."""
     if path.is_file() and is_log(path):
+        if at is not None:
+            allowed = "a log is exported with the zones of its own time"
+            raise MissionError.of_argument("at", at, allowed, file=path)
         if fenced:
             allowed = "a log is exported with the fence that it was flown with"
             raise MissionError.of_argument("fence", fences, allowed, shown="", file=path)
@@ -134,7 +140,7 @@ def _read(path: Path, targets: tuple[Path, ...], fences: NamedFences, *, fenced:
         if suffix.lower() in LOGS:
             message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
             raise MissionError(message, file=target, field="suffix", value=suffix)
-    return _read_mission(path, any(target.suffix.lower() in MAPS for target in targets), fences)
+    return _read_mission(path, any(target.suffix.lower() in MAPS for target in targets), fences, at)
 
 
 def _read_log(path: Path) -> _Source:
@@ -145,14 +151,15 @@ def _read_log(path: Path) -> _Source:
     return _Source(log.setup.mission, log.setup.scenario.name, lines, map_zones(log.setup), log=log)
 
 
-def _read_mission(path: Path, maps: bool, fences: NamedFences) -> _Source:
+def _read_mission(path: Path, maps: bool, fences: NamedFences, at: str | None) -> _Source:
     """A plan or a mission file; a map, zones and a plan's fence need its place, too, which not every mission has."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan = path.suffix.lower() == ".json"
-    if not (maps or is_plan or fences.zones):
+    if not (maps or is_plan or fences.zones or at is not None):
         return _Source(fences.on_mission(read_mission(path)), path.stem)
-    setup = open_mission(path, None, None, fences=fences).setup
+    # What a station uploads has no times: which zones count is decided here.
+    setup = open_mission(path, None, None, change=partial(at_time, at=at), fences=fences).setup
     source = _Source(setup.mission, setup.scenario.name, {"plan": plan_line(setup)}, map_zones(setup))
     if not is_plan:
         return _with_zones(source, setup.scenario)

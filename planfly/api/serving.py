@@ -46,6 +46,7 @@ def serve(
     scenario: str | Path | None = None,
     terrain: str | Path | None = None,
     fence: FencePaths = (),
+    at: str | None = None,
     params: str | Path | None = None,
     guidance: Guidance | None = None,
     autopilot_law: str | None = None,
@@ -62,8 +63,8 @@ def serve(
     """Be a MAVLink vehicle in a simulated world, until ``stop`` is true.
 
     mission: a file to begin with; None waits for an upload.
-    scenario, terrain, fence, params, guidance, autopilot_law, nav: as of `planfly.fly`; without a mission the scenario
-    is "jacksboro" unless another is named.
+    scenario, terrain, fence, at, params, guidance, autopilot_law, nav: as of `planfly.fly`; without a mission the
+    scenario is "jacksboro" unless another is named.
     to: where ground stations listen, IP:PORT, one or several.  bind: where the vehicle listens.
     allow: IP addresses beyond this machine that may talk to it.  sign_key: a file with a MAVLink signing key.
     speed: times real time, 0.1 to 100.  log: the folder of the flight logs.
@@ -76,7 +77,8 @@ def serve(
     check_arguments(served_speed=speed)
     named = ["" if one is None else str(one) for one in (mission, scenario, terrain)]
     entries = flight_entries(params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav)
-    options = ServeOptions(named[0], named[1] or None, named[2] or None, speed, Path(log), entries, named_fences(fence))
+    fences = named_fences(fence)
+    options = ServeOptions(named[0], named[1] or None, named[2] or None, speed, Path(log), entries, fences, at)
     served = open_served(options)
     if options.logs.exists() and not options.logs.is_dir():
         raise PlanflyError.of_argument("log", log, "is a file; a folder is expected")

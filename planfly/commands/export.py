@@ -6,7 +6,7 @@ import planfly
 from planfly.terminal.arguments import MISSIONS, completed, files
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.options import fence_option, result_options
+from planfly.terminal.options import fence_option, result_options, time_option
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import print_warnings
 
@@ -33,12 +33,13 @@ def export_options(line: LineParser) -> None:
         " of a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink), .ulg (PX4)",
     )
     fence_option(parser)
+    time_option(parser)
     result_options(parser)
 
 
 def export(args: argparse.Namespace) -> int:
     """Read the source, then write every target; 3 for a log that is cut short."""
-    written = planfly.export(args.source, *args.files, fence=args.fence, overwrite=args.overwrite)
+    written = planfly.export(args.source, *args.files, fence=args.fence, at=args.at, overwrite=args.overwrite)
     print_warnings(written.notes)
     for file, content in zip(written.files, written.contents, strict=True):
         print(f"{_kind(file.suffix.lower()):<9} {file} ({content})")

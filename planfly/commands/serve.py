@@ -12,6 +12,7 @@ from planfly.terminal.options import (
     print_at_once,
     steering_options,
     stop_signals,
+    time_option,
     world_options,
 )
 
@@ -27,7 +28,7 @@ def serve_options(line: LineParser) -> None:
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="a mission file to begin with"),
         files(*MISSIONS),
     )
-    world_options(parser)
+    time_option(world_options(parser))
     steering_options(parser)
     parser.add_argument(
         "--to", metavar="IP:PORT,...", default="127.0.0.1:14550",

@@ -81,7 +81,7 @@ def json_option(group: OptionTaker, command: str) -> None:
 # Where a mission flies, and with what.
 
 
-def world_options(parser: CommandParser) -> None:
+def world_options(parser: CommandParser) -> OptionTaker:
     """What a mission is judged in."""
     group = parser.group("where it flies")
     completed(
@@ -92,6 +92,7 @@ def world_options(parser: CommandParser) -> None:
     )
     terrain_option(group)
     fence_option(group)
+    return group
 
 
 def terrain_option(group: OptionTaker) -> None:

@@ -147,6 +147,39 @@ def test_serve_begins_with_the_fence_that_is_named(mission: Path) -> None:
     assert [zone.name for zone in served.scenario.zones] == ["mill"]
 
 
+# Active on one day only.
+TIMED = """AC R
+AN mill
+AL GND
+AH 5000FT AMSL
+AA 2026-05-01T00:00Z/2026-05-02T00:00Z
+V X=36:32:00N 084:10:00W
+DC 0.1
+"""
+
+
+@pytest.mark.parametrize(("at", "count"), [(None, 1), ("2026-05-01T10:00Z", 1), ("2026-05-03T10:00Z", 0)])
+def test_export_and_serve_leave_out_what_is_not_active_then(at: str | None, count: int, mission: Path) -> None:
+    Path("mill.openair").write_text(TIMED, encoding="ascii")
+    asked = [] if at is None else ["--at", at]
+    fenced = ["--fence", "mill.openair", *asked]
+    assert main(["export", str(mission), "map.kml", "out.plan", *fenced]) == 0
+    assert Path("map.kml").read_text(encoding="utf-8").count("<name>mill (R) (keep out)") == count
+    assert bool(read_mission(Path("out.plan")).fences) == bool(count)
+    fences = read_named_fences(["mill.openair"])
+    served = open_served(ServeOptions(str(mission), None, None, 1.0, Path("logs"), {}, fences, at))
+    assert len(served.scenario.zones) == count
+
+
+def test_the_time_of_a_log_is_its_own(mission: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fly", str(mission), "--guidance", "path", "--log", "f.mcap", "--log-hz", "10"]) == 0
+    assert main(["export", "f.mcap", "map.kml", "--at", "2026-05-03T10:00Z"]) == 2
+    assert "f.mcap: --at 2026-05-03T10:00Z: a log is exported with the zones of its own time" in capsys.readouterr().err
+    for command in (["export", str(mission), "map.kml"], ["serve", str(mission), "--bind", "127.0.0.1:0"]):
+        assert main([*command, "--at", "tomorrow"]) == 2
+        assert "--at tomorrow: " in capsys.readouterr().err
+
+
 def test_a_file_that_holds_no_fence_is_named(mission: Path) -> None:
     with pytest.raises(MissionError, match=r"leg\.waypoints: no fence in it"):
         read_named_fences([str(mission)])
