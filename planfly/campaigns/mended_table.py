@@ -43,13 +43,13 @@ class Examined(NamedTuple):
 
     sound: whether SQLite finds nothing wrong with the file, whatever its rows hold.
     after: of a file that is not, the last flight that is known of, if fewer are known of than were asked for: others
-        may have been lost behind it; -1 where that is not so.
+        may have been lost behind it, all of them behind -1; None where that is not so.
     """
 
     whole: list[int]
     damaged: list[int]
     sound: bool = True
-    after: int = -1
+    after: int | None = None
 
     def text(self) -> str:
         """What is damaged, and what becomes of it, in words.
@@ -58,7 +58,9 @@ class Examined(NamedTuple):
         'flight 2 is damaged and was taken out: 3 flights are whole and stay; --resume flies what is missing'
         """
         stay = f"{len(self.whole)} flights are whole and stay; --resume flies what is missing"
-        behind = f", and any after flight {self.after} were lost" if self.after >= 0 else ""
+        behind = ""
+        if self.after is not None:
+            behind = f", and any after flight {self.after} were lost" if self.after >= 0 else ", and no flight is found"
         if not self.damaged:
             return f"is damaged{behind}: {stay}"
         listed = ", ".join(map(str, self.damaged[:_LISTED]))
@@ -88,14 +90,15 @@ def examine(connection: sqlite3.Connection, columns: Sequence[str], asked: int, 
     whole, damaged = _by_checksum(rows)[:2]
     # Of a broken file a row that is not found may have been lost with its page.  A number that no checksum vouches for
     # is believed where it was asked for: flights are numbered from 0 on.
-    last = max([-1, *whole, *(number for number in (*damaged, *_seen(connection)) if number < asked)])
+    numbers = (number for number in (*damaged, *_seen(connection)) if isinstance(number, int) and number < asked)
+    last = max([-1, *whole, *numbers])
     missing = set(range(last + 1)) - set(whole)
-    return Examined(whole, sorted(missing), sound=False, after=last if last + 1 < asked else -1)
+    return Examined(whole, sorted(missing), sound=False, after=last if last + 1 < asked else None)
 
 
-def _seen(connection: sqlite3.Connection) -> list[int]:
-    """Numbers of flights that can be read one after the other, up to where the file is broken."""
-    seen: list[int] = []
+def _seen(connection: sqlite3.Connection) -> list[Any]:
+    """Numbers of flights, or what became of them, that can be read one after the other, up to where the file breaks."""
+    seen: list[Any] = []
     with contextlib.suppress(sqlite3.Error):
         for (number,) in connection.execute("SELECT flight FROM flights"):
             seen.append(number)

@@ -112,8 +112,8 @@ def gone_on_with(kept: Kept, path: Path) -> int | None:
     return len(left)
 
 
-# Among the 20 from 180 on is a page whose rows' numbers are any.
-@pytest.mark.parametrize("first", sorted({*range(0, scaled(1000, 40), 20), 180}))
+# Among the 20 from 180 on is a page whose rows' numbers are any; from 320 and from 820 on one whose rows have none.
+@pytest.mark.parametrize("first", sorted({*range(0, scaled(1000, 40), 20), 180, 320, 820}))
 def test_changed_bytes_leave_rows_that_are_whole(
     kept: Kept, tmp_path: Path, first: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -138,7 +138,7 @@ def test_changed_bytes_leave_rows_that_are_whole(
         found = gone_on_with(kept, path)
         if examined and not examined[0].sound:
             # Each flight that is gone is named, but for those behind the last that is known of.
-            last = examined[0].after if examined[0].after >= 0 else FLIGHTS - 1
+            last = examined[0].after if examined[0].after is not None else FLIGHTS - 1
             assert examined[0].damaged == sorted(set(range(last + 1)) - set(examined[0].whole)), seed
         if found is None:
             refused += 1
@@ -243,4 +243,6 @@ def test_many_damaged_flights_are_counted() -> None:
             "flight 1 is damaged and was taken out, and any after flight 2 were lost: 2 flights are whole and stay;"
         )
     )
+    found = Examined([], [], sound=False, after=-1).text()
+    assert found.startswith("is damaged, and no flight is found: 0 flights are whole and stay;")
     assert Examined([], list(range(20))).text().startswith("flights 0, 1, 2, 3, 4, 5, 6, 7 and 12 more are damaged")
