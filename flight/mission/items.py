@@ -122,6 +122,11 @@ PLACES = frozenset(
 )
 TAKEOFFS = frozenset({C.NAV_TAKEOFF, C.NAV_VTOL_TAKEOFF})
 LANDINGS = frozenset({C.NAV_LAND, C.NAV_VTOL_LAND})
+# Commands to the camera, which change nothing of how an aircraft flies.
+CAMERA = frozenset(
+    {C.DO_DIGICAM_CONTROL, C.DO_SET_CAM_TRIGG_DIST, C.SET_CAMERA_MODE, C.IMAGE_START_CAPTURE, C.IMAGE_STOP_CAPTURE}
+    | {C.VIDEO_START_CAPTURE, C.VIDEO_STOP_CAPTURE}
+)
 FENCES = frozenset(range(5001, 5005))
 # Other commands whose fifth to seventh numbers are latitude, longitude and height.
 _LOCATED_DO = frozenset(

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from flight.mission.items import (
+    CAMERA,
     LANDINGS,
     OVER_TERRAIN,
     PLACES,
@@ -234,6 +235,8 @@ class _Walk:
             self._change_speed(item)
         elif item.command == Command.DO_LAND_START:
             self.notes.add("DO_LAND_START: a mark, nothing to fly", item.seq)
+        elif item.command in CAMERA:
+            self.notes.add(f"{command_name(item.command)}: the camera's, nothing to fly", item.seq)
         elif item.command != Command.DO_JUMP:
             self.notes.add(f"{command_name(item.command)}: not flown", item.seq)
 

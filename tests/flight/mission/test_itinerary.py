@@ -58,6 +58,15 @@ def test_a_speed_by_its_value_alone_is_that_or_the_autopilots_own(
     assert flown.notes[-1:] == (() if noted is None else (f"item 4: {noted}",))
 
 
+def test_what_is_the_cameras_is_not_called_not_flown() -> None:
+    items = wp(0, 0), "2 206 25 0 1 0 0 0 0", wp(0, 900), "2 203 0 0 0 0 1 0 0", "2 181 0 1 0 0 0 0 0", wp(0, 1800)
+    assert route(*items).notes == (
+        "item 2: DO_SET_CAM_TRIGG_DIST: the camera's, nothing to fly",
+        "item 4: DO_DIGICAM_CONTROL: the camera's, nothing to fly",
+        "item 5: DO_SET_RELAY: not flown",
+    )
+
+
 def test_jumps_are_followed_as_often_as_they_say() -> None:
     corners = [wp(0, 0), wp(0, 900), wp(900, 900)]
     assert route(*corners, "2 177 2 2 0 0 0 0 0").items.tolist() == [1, 2, 3, 2, 3, 2, 3]
