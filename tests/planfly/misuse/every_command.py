@@ -70,7 +70,8 @@ EVERY = {
         Given(("paper", "--problems", "7", "--runs", "1", "--jobs", "1", "--out", "out"), target="out"),
         Given(("aircraft", "aerosonde")),
         Given(("scenarios",)),
-        Given(("new", "site", "--from", "46.5,8", "--to", "46.55,8.05"), target="site"),
+        # What it writes is less than the page that a full disk has left.
+        Given(("new", "site", "--from", "46.5,8", "--to", "46.55,8.05")),
         Given(
             ("terrain", "--box", "36.25,-84.3,36.3,-84.2", "--source", "jacksboro", "--out", "new.tif"),
             target="new.tif",

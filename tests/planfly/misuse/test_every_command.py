@@ -10,6 +10,7 @@ import resource
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -108,7 +109,11 @@ def full_disk(folder: Path, inputs: Path) -> Iterator[Callable[[], None] | None]
         (folder / "filler").write_bytes(bytes(free.f_bavail * free.f_frsize - LEFT))
         yield None
     finally:
-        subprocess.run(["umount", str(folder)], check=True)
+        # A worker that was killed may take a moment to be gone.
+        until = time.monotonic() + 10.0
+        while subprocess.run(["umount", str(folder)], check=False, capture_output=True).returncode:
+            assert time.monotonic() < until, f"{folder} is still in use"
+            time.sleep(0.1)
 
 
 @some("check")
