@@ -7,11 +7,14 @@ it.  A part counts when as many bytes have come as were asked for, of the versio
 import http.client
 import json
 import os
+import tempfile
 import time
 import urllib.error
+import urllib.parse
 import urllib.request
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -22,8 +25,10 @@ from world.files import write_whole
 _PATIENCE, _TRIES, _PAUSE = 30.0, 3, 0.5
 # Bytes that are written at a time.
 _AT_ONCE = 2**18
-# Answers of a server that say that there is no such file; Amazon's storage says 403 to those who may not list it.
-_ABSENT = (403, 404, 410)
+# A file is refused beyond this, bytes: a tile of GLO-30 has some 40 MB.
+MAX_BYTES = 2**29
+# Answers of a server that say that there is no such file.  403 is none: a proxy or a limit of requests says so, too.
+_ABSENT = (404, 410)
 # Of these a server may have recovered the next time.
 _PASSING = (408, 425, 429, 500, 502, 503, 504)
 
@@ -39,23 +44,23 @@ class RemoteFile:
     """A file on a server, and its copy.
 
     size: bytes.  version: its ETag, or when it was changed; "" where the server says neither.
-    held: parts of the copy that are there, [begin, end), in order and apart.
+    held: parts of the copy that are there, [begin, end), and the SHA-256 of each.
     """
 
     url: str
     size: int
     version: str
     copy: Path
-    held: list[tuple[int, int]] = field(default_factory=list)
+    held: dict[tuple[int, int], str] = field(default_factory=dict)
 
     def missing(self, begin: int, end: int) -> list[tuple[int, int]]:
         """Parts of [begin, end) that are not there yet.
 
-        >>> RemoteFile("", 100, "", Path("a"), [(10, 20), (30, 40)]).missing(15, 50)
+        >>> RemoteFile("", 100, "", Path("a"), {(10, 20): "", (30, 40): ""}).missing(15, 50)
         [(20, 30), (40, 50)]
         """
         found = []
-        for low, high in [*self.held, (end, end)]:
+        for low, high in [*sorted(self.held), (end, end)]:
             if low > begin:
                 found.append((begin, min(low, end)))
             begin = max(begin, high)
@@ -70,7 +75,7 @@ class RemoteFile:
                 try:
                     self._get(low, high, fetched)
                     break
-                except (_Unfinished, OSError, http.client.HTTPException) as error:
+                except (_Unfinished, OSError, ValueError, http.client.HTTPException) as error:
                     if attempt == _TRIES - 1 or not _may_pass(error):
                         raise TerrainError(f"{self.url}: cannot be fetched: {_why(error)}", file=self.url) from error
                     time.sleep(_PAUSE * 2.0**attempt)
@@ -87,28 +92,32 @@ class RemoteFile:
                 raise _Unfinished(f"the server answers with {answer.headers.get('Content-Range')!r}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
-                at = begin
+                at, digest = begin, sha256()
                 while at < end and (part := answer.read(min(_AT_ONCE, end - at))):
                     file.write(part)
+                    digest.update(part)
                     at += len(part)
                     fetched(len(part))
+                file.flush()
+                # What is noted as there is there, also after a power cut.
+                os.fsync(file.fileno())
+            if at > begin:
+                self.held[begin, at] = digest.hexdigest()
+                write_whole(_notes(self.copy), json.dumps([[*part, text] for part, text in self.held.items()]))
             if at < end:
-                self._hold(begin, at)
                 raise _Unfinished(f"{at - begin:,} of {end - begin:,} bytes came")
-        self._hold(begin, end)
 
-    def _hold(self, begin: int, end: int) -> None:
-        parts: list[tuple[int, int]] = []
-        for low, high in sorted([*self.held, (begin, end)]):
-            if parts and low <= parts[-1][1]:
-                parts[-1] = (parts[-1][0], max(high, parts[-1][1]))
-            elif low < high:
-                parts.append((low, high))
-        self.held = parts
-        write_whole(_notes(self.copy), json.dumps(self.held))
+    def forget(self) -> None:
+        """Begin anew, with a copy that holds nothing.  Raises OSError."""
+        _notes(self.copy).unlink(missing_ok=True)
+        self.held = {}
+        # A file of its own, so that another process that reads the old one keeps that.
+        with tempfile.NamedTemporaryFile(dir=self.copy.parent, delete=False) as file:
+            os.truncate(file.fileno(), self.size)
+        Path(file.name).replace(self.copy)
 
 
-def find_remote(url: str, cache: Path) -> RemoteFile | None:
+def find_remote(url: str, folder: Path) -> RemoteFile | None:
     """A file on a server and what the cache has of it; None where the server has no such file.
 
     Raises TerrainError where the server cannot be reached, and OSError where the cache cannot be written.
@@ -124,28 +133,56 @@ def find_remote(url: str, cache: Path) -> RemoteFile | None:
                 return None
             if attempt == _TRIES - 1 or not _may_pass(error):
                 raise TerrainError(f"{url}: cannot be fetched: {_why(error)}", file=url) from error
-        except (OSError, http.client.HTTPException) as error:
+        except (OSError, ValueError, http.client.HTTPException) as error:
             if attempt == _TRIES - 1 or not _may_pass(error):
                 raise TerrainError(f"{url}: cannot be reached: {_why(error)}", file=url) from error
         time.sleep(_PAUSE * 2.0**attempt)
-    if size <= 0:
-        raise TerrainError(f"{url}: the server does not say how large it is", file=url)
+    if not 0 < size <= MAX_BYTES:
+        allowed = f"1 to {MAX_BYTES:,} bytes are expected"
+        raise TerrainError.at(url, "Content-Length", size, allowed, shown=f"{size:,}")
     key = sha256(f"{url}\0{version}\0{size}".encode()).hexdigest()[:16]
-    copy = cache / key / url.rpartition("/")[2]
+    copy = folder / key / url.rpartition("/")[2]
     copy.parent.mkdir(parents=True, exist_ok=True)
     found = RemoteFile(url, size, version, copy)
-    if copy.is_file() and copy.stat().st_size == size:
-        found.held = _read_notes(copy, size)
-    else:
-        with copy.open("wb") as file:
-            os.truncate(file.fileno(), size)
+    if not (copy.is_file() and copy.stat().st_size == size):
+        found.forget()
+    found.held = _read_notes(copy, size)
     return found
 
 
 def _open(url: str, headers: dict[str, str], method: str = "GET") -> http.client.HTTPResponse:
     request = urllib.request.Request(url, headers={"User-Agent": "planfly"} | headers, method=method)
-    answer: http.client.HTTPResponse = urllib.request.urlopen(request, timeout=_PATIENCE)
+    answer: http.client.HTTPResponse = _opener().open(request, timeout=_PATIENCE)
     return answer
+
+
+@cache
+def _opener() -> urllib.request.OpenerDirector:
+    """What speaks http and https, wherever it is led, and nothing else."""
+    opener = urllib.request.OpenerDirector()
+    for handler in (
+        urllib.request.ProxyHandler, urllib.request.UnknownHandler, urllib.request.HTTPHandler,
+        urllib.request.HTTPSHandler, urllib.request.HTTPRedirectHandler, urllib.request.HTTPDefaultErrorHandler,
+        urllib.request.HTTPErrorProcessor,
+    ):  # fmt: skip
+        opener.add_handler(handler())
+    return opener
+
+
+def is_address(text: str) -> bool:
+    """Whether a text is the address of a folder on a web server: http or https, and what it holds can be asked for.
+
+    >>> is_address("HTTPS://example.com:8443/tiles"), is_address("http://[::1/"), is_address("http://a/?b")
+    (True, False, False)
+    """
+    try:
+        parts = urllib.parse.urlsplit(text)
+        named = bool(parts.hostname) and (parts.port is None or parts.port > 0)
+        (parts.hostname or "").encode("idna")
+    except ValueError:
+        return False
+    plain = text.isascii() and text.isprintable() and " " not in text and "?" not in text and "#" not in text
+    return plain and named and parts.scheme in ("http", "https")
 
 
 def _length(answer: http.client.HTTPResponse) -> int:
@@ -174,11 +211,19 @@ def _notes(copy: Path) -> Path:
     return copy.with_name(copy.name + ".held")
 
 
-def _read_notes(copy: Path, size: int) -> list[tuple[int, int]]:
-    """Parts that a copy is known to hold; none where the note of them is damaged."""
+def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
+    """Parts that a copy holds as they were fetched; none where the note of them is damaged."""
     try:
-        parts = [(int(low), int(high)) for low, high in json.loads(_notes(copy).read_text(encoding="ascii"))]
-    except (OSError, ValueError, TypeError):
-        return []
-    ordered = all(low < high <= size for low, high in parts) and parts == sorted(parts)
-    return parts if ordered and all(low >= 0 for low, _ in parts) else []
+        noted = json.loads(_notes(copy).read_text(encoding="ascii"))
+        parts = {(int(low), int(high)): str(digest) for low, high, digest in noted}
+    except (OSError, ValueError, TypeError, OverflowError):
+        return {}
+    with copy.open("rb") as file:
+
+        def is_whole(low: int, high: int, digest: str) -> bool:
+            if not 0 <= low < high <= size:
+                return False
+            file.seek(low)
+            return sha256(file.read(high - low)).hexdigest() == digest
+
+        return {(low, high): digest for (low, high), digest in parts.items() if is_whole(low, high, digest)}

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,16 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.elevation_formats import EMBEDDED
-from world.errors import ArgumentError
+from world.errors import ArgumentError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import RasterFile, cover_text, is_covered, read_terrain, tile_bounds
 
 Floats = NDArray[np.float64]
 
-# Ground beside the straight line that a way round may lead over, as a share of the line's length, and its limits, m.
+# Ground beside the straight line that a way round may lead over, as a share of the line's length, and its limits, m;
+# less of it where there is no data further away.
 _MARGIN_SHARE, _MARGIN_LEAST, _MARGIN_MOST = 0.3, 1500.0, 15_000.0
+_SMALLER = (1.0, 0.5, 0.25, 0.12)
 # The ends may be no closer to the edge of the elevation file, and no further from each other, m.
-_EDGE, _FURTHEST = 200.0, 300_000.0
+_EDGE, _NEAREST, _FURTHEST = 100.0, 100.0, 300_000.0
+# Latitude of a map's origin at most, degrees.
+_HIGHEST = 89.0
 # Room above the highest ground and the ends, and the step that the ceiling is rounded up to, m.
 _HEADROOM, _CEILING_STEP = 300.0, 50.0
 # What paths keep above ground, m, and at most as a share of the height of the ends.
@@ -77,28 +82,26 @@ def make_draft(
     """Lay out a scenario from one place to another.
 
     height: of both above ground, m.  raster: its ground, None for flat ground; terrain: as its path is written down.
-    The area takes in the straight line and a third of its length about it, as far as the elevation file covers it.
-    Raises ArgumentError for places that are outside of the file, or too far from each other, and TerrainError.
+    The area takes in the straight line and a third of its length about it, as far as the elevation file covers it, and
+    less where it has no data there.
+    Raises ArgumentError for places that are outside of the file, too near or too far from each other, and TerrainError
+    where there is no data even near the line.
     """
     east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
     length = math.hypot(east, north)
-    if length > _FURTHEST:
-        allowed = f"at most {_FURTHEST / 1000.0:g} km from `start` is expected"
+    if not _NEAREST <= length <= _FURTHEST:
+        allowed = f"{_NEAREST:g} m to {_FURTHEST / 1000.0:g} km from `start` are expected"
         raise ArgumentError.of_argument("destination", destination, allowed, shown=_shown(destination, length))
     middle = to_geo(GeoOrigin(*start), east / 2.0, north / 2.0)
     origin = GeoOrigin(round(float(middle[0]), 5), round(float(middle[1]), 5))
+    if abs(origin.lat_deg) > _HIGHEST:
+        allowed = f"a way that stays within {_HIGHEST:g} degrees of latitude is expected"
+        raise ArgumentError.of_argument("destination", destination, allowed, shown=_shown(destination))
     ends = np.array([to_map(origin, *place) for place in (start, destination)])
-    margin = min(max(_MARGIN_SHARE * length, _MARGIN_LEAST), _MARGIN_MOST)
-    box = np.stack([ends.min(axis=0) - margin, ends.max(axis=0) + margin], axis=1)
-    highest = 0.0
+    widest = min(max(_MARGIN_SHARE * length, _MARGIN_LEAST), _MARGIN_MOST)
+    highest, box = 0.0, _about(ends, widest)
     if raster is not None:
-        box = _within_file(box, raster, origin)
-        for keyword, place, end in zip(("start", "destination"), (start, destination), ends, strict=True):
-            if not ((box[:, 0] + _EDGE <= end) & (end <= box[:, 1] - _EDGE)).all():
-                allowed = f"outside {raster.name} or within {_EDGE:g} m of its edge: it covers {cover_text(raster)}"
-                raise ArgumentError.of_argument(keyword, place, allowed, shown=_shown(place))
-        ground = read_terrain(raster, origin, box, 0.0)
-        highest = float(np.nanmax(ground.heights))
+        box, highest = _ground_about(raster, origin, {"start": start, "destination": destination}, ends, widest)
     ceiling = math.ceil((highest + height + _HEADROOM) / _CEILING_STEP) * _CEILING_STEP
     box = np.stack([np.ceil(box[:, 0] / 10.0), np.floor(box[:, 1] / 10.0)], axis=1) * 10.0
     return Draft(
@@ -106,9 +109,36 @@ def make_draft(
     )
 
 
+def _ground_about(
+    raster: RasterFile, origin: GeoOrigin, places: Mapping[str, Place], ends: Floats, widest: float
+) -> tuple[Floats, float]:
+    """The area (2, 2) about two places that an elevation file has data of, and the highest ground in it, m.
+
+    places: by their keywords; ends: (2, 2) the same on the map, m.  widest: ground beside them, m.
+    Raises ArgumentError for a place that the file does not cover, and TerrainError.
+    """
+    for share in _SMALLER:
+        box = _within_file(_about(ends, share * widest), raster, origin)
+        for (keyword, place), end in zip(places.items(), ends, strict=True):
+            if not ((box[:, 0] + _EDGE <= end) & (end <= box[:, 1] - _EDGE)).all():
+                allowed = f"outside {raster.name} or within {_EDGE:g} m of its edge: it covers {cover_text(raster)}"
+                raise ArgumentError.of_argument(keyword, place, allowed, shown=_shown(place))
+        try:
+            return box, float(np.nanmax(read_terrain(raster, origin, box, 0.0).heights))
+        except TerrainError:
+            if share == _SMALLER[-1]:
+                raise
+    raise AssertionError
+
+
+def _about(ends: Floats, margin: float) -> Floats:
+    """The box (2, 2) about two places (2, 2), m."""
+    return np.stack([ends.min(axis=0) - margin, ends.max(axis=0) + margin], axis=1)
+
+
 def _shown(place: Place, length: float | None = None) -> str:
     there = f"{place.lat:g},{place.lon:g}"
-    return there if length is None else f"{there}, {length / 1000.0:,.0f} km away"
+    return there if length is None else f"{there}, {length / 1000.0:,.3g} km away"
 
 
 def _within_file(box: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:

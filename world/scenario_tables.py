@@ -189,7 +189,7 @@ def _known_datum(datum: StatedDatum) -> StatedDatum:
 def _file_or_tiles(path: object) -> object:
     """A file's name, or a list of them; a union alone would say of either what the other is not."""
     listed = path if isinstance(path, list) else [path]
-    if path is None or (1 <= len(listed) <= MAX_TILES and all(isinstance(one, str) for one in listed)):
+    if path is None or (1 <= len(listed) <= MAX_TILES and all(isinstance(one, str) and one for one in listed)):
         return path
     raise ValueError(f"a file's name, or a list of 1 to {MAX_TILES}, is expected")
 

@@ -1,7 +1,8 @@
 """The ground of an area as one GeoTIFF: from a folder of tiles, or from a server of Copernicus GLO-30 tiles.
 
 The server's layout is that of the Copernicus DEM in the registry of open data of AWS: a folder for each degree, with a
-cloud-optimised GeoTIFF in it, of which only the blocks that the area needs are fetched.  Where there is no tile is sea.
+cloud-optimised GeoTIFF in it, of which only the blocks that the area needs are fetched.  A degree
+without a tile is open sea, or land of which none is published: the Copernicus DEM lacks some.
 Heights are above EGM2008 (Copernicus DEM Product Handbook, GEO.2018-1988-2, "Vertical datum").
 """
 
@@ -26,6 +27,8 @@ Floats = NDArray[Any]
 COPERNICUS = "https://copernicus-dem-30m.s3.amazonaws.com"
 # Tiles of an area at most: 100 would be some 3 GB.
 MAX_FETCHED = 25
+# Pixels that are fetched about an area.
+_MORE = 5
 # What a tile's directory takes at its beginning, bytes: that of a GLO-30 tile takes 6 kB.
 _DIRECTORY = 2**16
 # WGS 84 with heights above EGM2008.
@@ -49,13 +52,15 @@ class CutTerrain(NamedTuple):
     """What was written.
 
     file: the GeoTIFF.  shape: its rows and columns.  tiles: names of those it is from.
-    sea: degrees (south-west corners) without a tile, at 0 m.  fetched: bytes that came from the server.
+    absent: degrees (south-west corners) of which the server has no tile.
+    empty: pixels without data.  fetched: bytes that came from the server.
     """
 
     file: Path
     shape: tuple[int, int]
     tiles: tuple[str, ...]
-    sea: tuple[tuple[int, int], ...]
+    absent: tuple[tuple[int, int], ...]
+    empty: int
     fetched: int
 
 
@@ -66,13 +71,13 @@ class CutTerrain(NamedTuple):
 def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
     """Write the part of local tiles that an area needs, in their own reference system and on their own grid.
 
-    Raises TerrainError where the tiles do not reach beyond the area, or cannot be read.
+    Raises TerrainError where the tiles do not reach beyond the area, have no data in it, or cannot be read.
     """
     raster = open_raster(str(source))
     top, bottom, left, right = _window(raster, box)
     heights = raster.read(top, bottom, left, right)
     _write(out, heights, moved_grid(raster.grid, top, left), raster.crs or "EPSG:4326")
-    return CutTerrain(out, (bottom - top, right - left), (raster.name,), (), 0)
+    return CutTerrain(out, (bottom - top, right - left), (raster.name,), (), _empty(heights), 0)
 
 
 def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
@@ -96,6 +101,10 @@ def _outline(box: Box) -> tuple[Floats, Floats]:
     return lon, lat
 
 
+def _empty(heights: Heights) -> int:
+    return int(heights.size - is_ground(heights).sum())
+
+
 def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
     """Write a GeoTIFF, whole or not at all.  grid: affine coefficients, from columns and rows to the system."""
     import rasterio
@@ -104,6 +113,8 @@ def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None
     if heights.size > MAX_PIXELS:
         allowed = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
         raise TerrainError(f"{out}: {allowed}", file=out, value=heights.size, allowed=allowed)
+    if _empty(heights) == heights.size:
+        raise TerrainError(f"{out}: no data in the area: the tiles have none there", file=out)
     stored = np.where(is_ground(heights), heights, np.float32(_NODATA))
     rows, cols = heights.shape
     profile: dict[str, Any] = {
@@ -142,10 +153,11 @@ def degrees_of(box: Box) -> list[tuple[int, int]]:
     return [(lat, (lon + 180) % 360 - 180) for lat in lats for lon in lons]
 
 
-def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told) -> CutTerrain:
+def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told, *, sea: bool) -> CutTerrain:
     """Fetch what an area needs of a server's tiles, and write it as one GeoTIFF.
 
     server: the address of the folder of tiles.  cache: keeps what was fetched.  told: of the progress.
+    sea: whether degrees without a tile are sea, at 0 m; they have no data otherwise.
     Where tiles of different pitch meet (at 50, 60, 70, 75, 80 and 85 degrees of latitude they do), the coarser are
     interpolated to the grid of the finest.
     Raises TerrainError where the server cannot be reached or does not answer as such a server does.
@@ -166,46 +178,80 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, told: Told) -
         raise TerrainError(f"{server}: no tile of the area is there: open sea, or not such a server", file=server)
     fetched = 0
     tiles = []
-    for number, remote in enumerate(there.values()):
+    for number, (degree, remote) in enumerate(there.items()):
 
         def count(came: int, done: int = number, name: str = remote.copy.name) -> None:
             nonlocal fetched
             fetched += came
             told(len(there) + 9.0 * done, 10.0 * len(there), f"{name}: {fetched / 1e6:.1f} MB")
 
-        tiles.append(_placed(_fetched_tile(remote, wide, count), box))
+        tiles.append(_placed(_fetched_tile(remote, wide, count), degree, box))
     heights, grid = _on_one_grid(tiles, box)
-    sea = tuple(degree for degree, remote in found.items() if remote is None)
-    _fill_sea(heights, grid, sea)
+    absent = tuple(degree for degree, remote in found.items() if remote is None)
+    if sea:
+        _fill_sea(heights, grid, absent)
     _write(out, heights, grid, _SYSTEM)
     rows, cols = heights.shape
-    return CutTerrain(out, (rows, cols), tuple(tile_name(*degree) for degree in there), sea, fetched)
+    names = tuple(tile_name(*degree) for degree in there)
+    return CutTerrain(out, (rows, cols), names, absent, _empty(heights), fetched)
 
 
 def _fetched_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) -> RasterFile:
-    """A tile's copy with the blocks that an area needs.  Raises TerrainError."""
-    size = _DIRECTORY
-    while True:
+    """A tile's copy with the blocks that an area needs.  Raises TerrainError.
+
+    A copy that cannot be read, which a power cut or a proxy may have spoilt, is fetched once more.
+    """
+    for is_last in (not remote.held, True):
+        try:
+            tile = _opened_copy(remote, count, (_DIRECTORY, remote.size) if is_last else (_DIRECTORY,))
+            window = _touched(tile, box)
+            for begin, end in _blocks(remote.copy, window):
+                remote.fetch(begin, end, count)
+            if window[0] < window[1] and window[2] < window[3]:
+                tile.read(*window)
+            return replace(tile, name=remote.url)
+        except _UnreadableError as error:
+            remote.forget()
+            if is_last:
+                message = f"{remote.url}: what the server gives is no GeoTIFF that can be read"
+                raise TerrainError(message, file=remote.url) from error
+    raise AssertionError
+
+
+class _UnreadableError(Exception):
+    """A copy that is no GeoTIFF, or has a block that cannot be unpacked."""
+
+
+def _opened_copy(remote: RemoteFile, count: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
+    """A tile of which the directory is there.  Raises TerrainError, and _UnreadableError.
+
+    sizes: bytes of the beginning to try with.  The directory may be longer than that of a cloud-optimised file, or
+    stand at the end.
+    """
+    for size in sizes:
         remote.fetch(0, size, count)
         try:
             tile = open_geotiff(remote.copy, remote.url)
-            break
         except TerrainError:
-            # The directory may be longer, or stand at the end: then the file is no cloud-optimised one.
-            if size >= remote.size:
-                raise TerrainError(f"{remote.url}: not a GeoTIFF that can be read", file=remote.url) from None
-            size = remote.size
-    for begin, end in _blocks(remote.copy, _touched(tile, box)):
-        remote.fetch(begin, end, count)
-    return replace(tile, name=remote.url)
+            continue
+
+        def read(*window: int, tile: RasterFile = tile) -> Heights:
+            try:
+                return tile.read(*window)
+            except TerrainError as error:
+                raise _UnreadableError from error
+
+        return replace(tile, read=read)
+    raise _UnreadableError
 
 
 def _touched(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Rows and columns of a tile in an area, and one more on each side."""
+    """Rows and columns of a tile in an area, and as many more on each side as its neighbours' grids may ask for."""
     col, row = tile.to_source(*_outline(box))
     rows, cols = tile.shape
-    top, bottom = (int(np.clip(value, 0, rows)) for value in (math.floor(row.min()) - 1, math.ceil(row.max()) + 2))
-    left, right = (int(np.clip(value, 0, cols)) for value in (math.floor(col.min()) - 1, math.ceil(col.max()) + 2))
+    ends = (row.min() - _MORE, row.max() + _MORE + 2.0), (col.min() - _MORE, col.max() + _MORE + 2.0)
+    top, bottom = (int(np.clip(value, 0, rows)) for value in ends[0])
+    left, right = (int(np.clip(value, 0, cols)) for value in ends[1])
     return top, bottom, left, right
 
 
@@ -228,6 +274,10 @@ def _blocks(copy: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int
                     yield int(at), int(at) + int(size)
 
 
+# Degrees by which a tile may lie off its own; pixels that are none.
+_OFF, _HAIR = 0.02, 1e-3
+
+
 class _Placed(NamedTuple):
     """A tile on its grid of longitudes and latitudes.
 
@@ -241,11 +291,15 @@ class _Placed(NamedTuple):
     dy: float
 
 
-def _placed(tile: RasterFile, box: Box) -> _Placed:
-    """A tile beside others.  Raises TerrainError for one whose grid is turned."""
+def _placed(tile: RasterFile, degree: tuple[int, int], box: Box) -> _Placed:
+    """A tile beside others.  Raises TerrainError for one that does not lie on its degree."""
     dx, turn, west, other_turn, dy, north = tile.grid
     if turn or other_turn or not dx > 0.0 > dy:
         raise TerrainError(f"{tile.name}: a grid of longitudes and latitudes is expected", file=tile.name)
+    off = max(abs(north - degree[0] - 1.0), abs((west - degree[1] + 180.0) % 360.0 - 180.0))
+    if off > _OFF or abs(dx * tile.shape[1] - 1.0) > _OFF or abs(-dy * tile.shape[0] - 1.0) > _OFF:
+        allowed = f"the degree from {degree[0]} N {degree[1]} E on is expected"
+        raise TerrainError(f"{tile.name}: another place: {allowed}", file=tile.name, allowed=allowed)
     turns = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
     return _Placed(tile, west + 360.0 * turns, north, dx, -dy)
 
@@ -253,11 +307,11 @@ def _placed(tile: RasterFile, box: Box) -> _Placed:
 def _on_one_grid(tiles: list[_Placed], box: Box) -> tuple[Heights, tuple[float, ...]]:
     """Heights of an area on the grid of the finest tile, NaN where no tile is, and the grid."""
     finest = min(tiles, key=lambda tile: tile.dx)
-    # Pixels whose centres lie about the area, counted from the finest tile's first.
-    left = math.floor((box.west - finest.west) / finest.dx - 0.5) - 1
-    right = math.ceil((box.east - finest.west) / finest.dx - 0.5) + 2
-    top = math.floor((finest.north - box.north) / finest.dy - 0.5) - 1
-    bottom = math.ceil((finest.north - box.south) / finest.dy - 0.5) + 2
+    # Pixels between whose centres the area lies, counted from the finest tile's first; a hair is none.
+    left = math.floor((box.west - finest.west) / finest.dx - 0.5 + _HAIR)
+    right = math.ceil((box.east - finest.west) / finest.dx - 0.5 - _HAIR) + 1
+    top = math.floor((finest.north - box.north) / finest.dy - 0.5 + _HAIR)
+    bottom = math.ceil((finest.north - box.south) / finest.dy - 0.5 - _HAIR) + 1
     if (right - left) * (bottom - top) > MAX_PIXELS:
         allowed = f"at most {MAX_PIXELS:,} are written: a smaller area is expected"
         count = (right - left) * (bottom - top)
@@ -278,7 +332,11 @@ def _put(heights: Heights, lat: Floats, lon: Floats, tile: _Placed) -> None:
     over, down = np.flatnonzero((col > -0.5) & (col < cols - 0.5)), np.flatnonzero((row > -0.5) & (row < rows - 0.5))
     if not over.size or not down.size:
         return
-    col, row = np.clip(col[over], 0.0, cols - 1.0), np.clip(row[down], 0.0, rows - 1.0)
+    # On the tile's own grid no height is touched, and none beside it is needed.
+    col, row = (
+        np.where(np.abs(at - np.round(at)) < _HAIR, np.round(at), at)
+        for at in (np.clip(col[over], 0.0, cols - 1.0), np.clip(row[down], 0.0, rows - 1.0))
+    )
     left, top = int(col[0]), int(row[0])
     read = tile.raster.read(top, min(rows, int(row[-1]) + 2), left, min(cols, int(col[-1]) + 2))
     read[~is_ground(read)] = np.nan
@@ -290,8 +348,6 @@ def _put(heights: Heights, lat: Floats, lon: Floats, tile: _Placed) -> None:
 
 def _between(read: Heights, row: Floats, col: Floats) -> Heights:
     """Heights between pixels, bilinear, at rows (m,) and columns (n,): (m, n)."""
-    # On the tile's own grid no height is touched.
-    row, col = (np.where(np.abs(at - np.round(at)) < 1e-3, np.round(at), at) for at in (row, col))
     r0, c0 = np.floor(row).astype(int), np.floor(col).astype(int)
     r1, c1 = np.minimum(r0 + 1, read.shape[0] - 1), np.minimum(c0 + 1, read.shape[1] - 1)
     v, u = (row - r0)[:, None], (col - c0)[None, :]

@@ -77,7 +77,9 @@ def _bytes_of(path: Path) -> bytes:
 
 def _earliest(stamps: NDArray[np.float64]) -> float:
     """The earliest time of a track (n,) s; one further from the middle one than a log can hold is damaged."""
-    return float(stamps[np.abs(stamps - np.median(stamps)) < LATEST].min())
+    # A time of the track itself: the mean of two may be near none.
+    middle = np.sort(stamps)[stamps.size // 2]
+    return float(stamps[np.abs(stamps - middle) < LATEST].min())
 
 
 # ----------------------------------------------------------------------

@@ -5,6 +5,7 @@ import math
 import re
 import textwrap
 import warnings
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
@@ -134,6 +135,9 @@ def page_svg(figure: Figure, words: str) -> str:
     names = re.findall(r'xmlns(?::\w+)?="[^"]*"', opening)
     # Nobody asks for the names of groups, which would come twice in a page of several pictures.
     drawn = re.sub(r'<g id="[^"]*"', "<g", re.sub(r"<metadata>.*?</metadata>", "", rest, flags=re.DOTALL))
+    # And those that are asked for are the picture's own.
+    own = f"p{zlib.crc32(words.encode()):x}-"
+    drawn = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{own}", drawn)
     head = " ".join(['<svg role="img"', f'aria-label="{escape(words)}"', box[0] if box else "", *sorted(names)])
     return f"{head}>{theme.with_variables(drawn)}".rstrip()
 

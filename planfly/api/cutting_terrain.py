@@ -12,6 +12,7 @@ from planfly.arguments import check_arguments
 from planfly.stages import stage
 from planfly.targets import refuse_existing
 from world.errors import ArgumentError, PlanflyError
+from world.remote_files import is_address
 from world.terrain_cut import COPERNICUS, Box, CutTerrain, cut_from_files, cut_from_server
 
 # km on a degree of latitude, and the furthest from the equator that areas reach, degrees.
@@ -25,6 +26,7 @@ def terrain(
     box: Sequence[float] | None = None,
     margin: float = 3.0,
     source: str | Path = COPERNICUS,
+    sea: bool = False,
     overwrite: bool = False,
 ) -> CutTerrain:
     """Write the ground of an area as a GeoTIFF that all else of planfly reads as terrain.
@@ -34,7 +36,9 @@ def terrain(
     margin: ground beside them, km.
     source: a folder of tiles or an elevation file; or the address (http or https) of a server that has GLO-30 tiles of
     the Copernicus DEM as the registry of open data of AWS has them, which is the default: what is fetched of it is kept
-    in the user's cache.  Degrees of which such a server has no tile are sea, at 0 m.
+    in the user's cache.
+    sea: whether degrees of which such a server has no tile are sea, at 0 m.  They are left without data otherwise: some
+    countries' tiles are not published.
     Raises a `planfly.PlanflyError` for bad input, and where the server cannot be reached; nothing is written then.
 
     >>> import planfly
@@ -45,7 +49,7 @@ def terrain(
     """
     check_arguments(margin=margin)
     if (around is None) == (box is None):
-        raise ArgumentError.of_argument("box", "", "`around` MISSION or `box`: one of them is expected", shown="")
+        raise PlanflyError("`around`, `box`: one of them is expected", field="around, box")
     target = Path(out)
     if target.suffix.lower() not in (".tif", ".tiff"):
         raise PlanflyError(f"{target}: a name that ends with .tif is expected", file=target)
@@ -56,10 +60,11 @@ def terrain(
         if "://" not in named:
             refuse_existing(target, True, Path(named))
             return cut_from_files(Path(named), area, target)
-        if not named.startswith(("http://", "https://")):
-            raise ArgumentError.of_argument("source", named, "a folder, or an address by http or https, is expected")
+        if not is_address(named):
+            allowed = "a folder, or the address of one by http or https, is expected"
+            raise ArgumentError.of_argument("source", named, allowed, shown=ascii(named))
         with tempfile.TemporaryDirectory() as instead:
-            return cut_from_server(named, area, target, _cache(Path(instead)), advance)
+            return cut_from_server(named, area, target, _cache(Path(instead)), advance, sea=sea)
 
 
 def _box(given: Sequence[float]) -> Box:

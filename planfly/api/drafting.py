@@ -1,5 +1,6 @@
 """Begin a scenario of one's own."""
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -50,7 +51,7 @@ def new_scenario(
     check_arguments(height=height, autopilot_law=autopilot_law)
     ends = _place("start", start), _place("destination", destination)
     target = Path(folder)
-    name = Path(whole_path(target)).name
+    name = Path(whole_path(target)).name if ".." in target.parts else target.absolute().name
     file = _target(target, name, overwrite=overwrite)
     law, _, version = (autopilot_law or DEFAULT_AUTOPILOT).partition("-")
     ground = None if terrain is None else _whole(terrain, is_name=terrain in EMBEDDED)
@@ -72,6 +73,9 @@ def new_scenario(
 
 def _target(folder: Path, name: str, *, overwrite: bool) -> Path:
     """The file to write.  Raises PlanflyError for one that is there, and for a folder that cannot be made."""
+    if not name.isprintable() or not 1 <= len(name) <= 100:
+        allowed = "a folder with a name of 1 to 100 printable characters is expected"
+        raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
     if folder.suffix == ".toml" or (folder.exists() and not folder.is_dir()):
         raise PlanflyError(f"{folder}: a folder is expected; the scenario is written into it", file=folder)
     file = folder / f"{name}.toml"
@@ -84,9 +88,13 @@ def _target(folder: Path, name: str, *, overwrite: bool) -> Path:
 
 def _place(keyword: str, given: Sequence[float]) -> Place:
     """Latitude and longitude.  Raises ArgumentError."""
-    if isinstance(given, str) or len(given) != 2 or not is_place(*given):
+    try:
+        lat, lon = (float(value) for value in given)
+    except (TypeError, ValueError):
+        lat = lon = math.nan
+    if not is_place(lat, lon):
         raise ArgumentError.of_argument(keyword, given, "latitude -89..89 and longitude -180..180 are expected")
-    return Place(float(given[0]), float(given[1]))
+    return Place(lat, lon)
 
 
 def _whole(given: str | Path, *, is_name: bool) -> str:

@@ -154,6 +154,8 @@ def plan_then_fly(
     (True, False)
     """
     check_arguments(seed=seed)
+    if log is not None:
+        refuse_existing(Path(log), overwrite=True)
     world = changed_scenario(
         opened_scenario(scenario, terrain), wind=wind, turbulence=turbulence, at=at, aircraft=aircraft,
         airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav,

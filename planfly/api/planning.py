@@ -111,7 +111,7 @@ def changed_scenario(
     (8.0, 28.0)
     """
     speed, from_deg = (None, None) if wind is None else _two_numbers(wind)
-    if speed is not None and from_deg is not None and not is_wind(0.0, from_deg):
+    if from_deg is not None and not is_wind(0.0, from_deg):
         raise ArgumentError.of_argument("wind", wind, "degrees from north that it blows from, -360..360, are expected")
     entries = flight_entries(
         aircraft=aircraft,

@@ -88,7 +88,7 @@ def replay(
     """Play a flight by the clock, as the command does on a terminal: ten times a second, and once at its end.
 
     start, end: of the part that is played, s of the flight; None for all of it.  speed: times real time, 1 if None.
-    width: of the lines, in characters, or what tells it when they are made.
+    width: of the lines, in characters, 60 at least, or what tells it when they are made.
     Gives the time, s of the flight, and the instruments as lines of text.  A machine that sleeps makes it wait, too.
     Raises a `planfly.PlanflyError` for bad input, at once.
 

@@ -1,6 +1,7 @@
 """``planfly new``: a scenario of one's own to begin with, and whether it can be planned."""
 
 import argparse
+import shlex
 
 import planfly
 from planfly.arguments import CHOICES
@@ -60,7 +61,7 @@ def new(args: argparse.Namespace) -> int:
         print(coloured("plans     no safe path", "bad"))
         for said in (*made.certificate.problems, *planfly.what_blocks(made)):
             print(f"  {said}")
-    print(f"next      planfly run {file}")
+    print(f"next      planfly run {shlex.quote(str(file))}")
 
     def answer() -> object:
         from planfly.terminal.answers import NewAnswer

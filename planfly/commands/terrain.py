@@ -1,6 +1,7 @@
 """``planfly terrain``: the ground of an area, from tiles that are there or from a server."""
 
 import argparse
+import shlex
 
 import planfly
 from planfly.terminal.arguments import MISSIONS, area, completed, files, number
@@ -8,8 +9,9 @@ from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call, result_options
 from planfly.terminal.output import give_answer
+from planfly.terminal.results import print_warnings
 
-# How many degrees of sea are named.
+# How many degrees are named.
 _NAMED = 4
 
 
@@ -30,10 +32,16 @@ def terrain_options(line: LineParser) -> None:
     where.add_argument(
         "--margin", metavar="KM", type=number("margin"), default=3.0, help="ground beside them, km (default: 3)"
     )
-    parser.group("the tiles").add_argument(
+    tiles = parser.group("the tiles")
+    tiles.add_argument(
         "--source", metavar="DIR|URL",
         help="a folder of tiles or an elevation file; or a server of GLO-30 tiles of the Copernicus DEM (default: the "
         "public one in Amazon's registry of open data, of which the parts that are needed are fetched, and kept)",
+    )  # fmt: skip
+    tiles.add_argument(
+        "--sea", action="store_true",
+        help="degrees of which the server has no tile are sea, at 0 m (default: no data there, for some countries' "
+        "tiles are not published)",
     )  # fmt: skip
     result_options(parser, "the file to write (default: dem.tif)", "FILE")
 
@@ -42,26 +50,27 @@ def terrain(args: argparse.Namespace) -> int:
     """Write it."""
     made = call(planfly.terrain, args, out=args.out or "dem.tif")
     rows, cols = made.shape
-    print(f"terrain   {made.file}: {rows:,} x {cols:,} pixels from {len(made.tiles)} {_tiles(len(made.tiles))}")
+    tiles = made.tiles[0] if len(made.tiles) == 1 else f"{len(made.tiles)} tiles"
+    print(f"terrain   {made.file}: {rows:,} x {cols:,} pixels from {tiles}")
     if made.fetched:
         print(f"fetched   {made.fetched / 1e6:.1f} MB")
-    if made.sea:
-        named = ", ".join(f"{lat} {lon}" for lat, lon in made.sea[:_NAMED])
-        more = f" and {len(made.sea) - _NAMED} more" if len(made.sea) > _NAMED else ""
-        print(f"sea       no tile at {named}{more} (south-west corners, degrees): 0 m there")
-    print(f"next      planfly fly MISSION --terrain {made.file}")
+    if made.absent:
+        named = ", ".join(f"{lat} {lon}" for lat, lon in made.absent[:_NAMED])
+        more = f" and {len(made.absent) - _NAMED} more" if len(made.absent) > _NAMED else ""
+        taken = "taken for sea, at 0 m" if args.sea else "open sea, or not published (--sea takes it for sea)"
+        print_warnings([f"no tile at {named}{more} (south-west corners, degrees): {taken}"])
+    if made.empty:
+        print_warnings([f"{made.empty:,} of {rows * cols:,} pixels have no data"])
+    print(f"next      planfly fly MISSION --terrain {shlex.quote(str(made.file))}")
 
     def answer() -> object:
         from planfly.terminal.answers import TerrainAnswer
 
         return TerrainAnswer(
             exit_code=FLYABLE, file=str(made.file), rows=rows, columns=cols, tiles=list(made.tiles),
-            sea=[list(degree) for degree in made.sea], fetched_bytes=made.fetched,
+            absent=[list(degree) for degree in made.absent],
+            empty_pixels=made.empty, fetched_bytes=made.fetched,
         )  # fmt: skip
 
     give_answer(args, answer)
     return FLYABLE
-
-
-def _tiles(count: int) -> str:
-    return "tile" if count == 1 else "tiles"

@@ -956,8 +956,10 @@ class TerrainAnswer:
     rows: int
     columns: int
     tiles: list[str]
-    sea: list[list[int]]
-    """South-west corners, degrees, of what has no tile and is at 0 m."""
+    absent: list[list[int]]
+    """South-west corners, degrees, of what the server has no tile of."""
+    empty_pixels: int
+    """Pixels without data."""
     fetched_bytes: int
 
 

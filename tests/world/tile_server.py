@@ -45,6 +45,8 @@ class TileServer(ThreadingHTTPServer):
 
     asked: method, path and range of each request.  sent: bytes of bodies.
     cut: bodies that are still to be cut off half way.  status: of every answer in place of its own.
+    length: that it states in place of a file's own.  garbage: whether it gives other bytes than a file's.
+    moved: parts of a path that are taken for each other.
     ranges: whether it gives parts.  odd: whether it names another part than it gives.  tag: the version that it states.
     """
 
@@ -57,6 +59,9 @@ class TileServer(ThreadingHTTPServer):
         self.sent = 0
         self.cut = 0
         self.status = 0
+        self.length: int | None = None
+        self.garbage = False
+        self.moved = ("", "")
         self.ranges = True
         self.odd = False
         self.tag = '"1"'
@@ -86,18 +91,20 @@ class _Handler(BaseHTTPRequestHandler):
         server, part = self.server, str(self.headers.get("Range") or "")
         with server.lock:
             server.asked.append((self.command, self.path, part))
-        file = server.folder / self.path.lstrip("/")
+        file = server.folder / self.path.lstrip("/").replace(*server.moved)
         if server.status or not file.is_file():
             self.send_error(server.status or 404)
             return
         data = file.read_bytes()
+        if server.garbage:
+            data = bytes(byte ^ 0x55 for byte in data)
         begin, end = 0, len(data)
         whole = not (part and server.ranges and self.headers.get("If-Range") in (None, server.tag))
         if not whole:
             first, last = (int(text) for text in part.removeprefix("bytes=").split("-"))
             begin, end = first, min(last + 1, len(data))
         self.send_response(200 if whole else 206)
-        self.send_header("Content-Length", str(end - begin))
+        self.send_header("Content-Length", str(end - begin if server.length is None else server.length))
         if server.tag:
             self.send_header("ETag", server.tag)
         if not whole:

@@ -128,6 +128,19 @@ def test_a_time_that_is_damaged_costs_its_row(row: int, stamp: str, first: str, 
     assert (flight.time[0], flight.time.size) == (0.0, rows)
 
 
+@pytest.mark.parametrize("before", [1, 46, 91])
+def test_times_of_before_the_receiver_knew_its_own_cost_their_rows(before: int, tmp_path: Path) -> None:
+    """As many as half of the rows: the track is the later ones."""
+    path = gpx(tmp_path / "a.gpx")
+    text = path.read_text(encoding="utf-8")
+    for k, was in enumerate(re.findall(r"<time>[^<]*</time>", text)[:before]):
+        text = text.replace(was, f"<time>1970-01-01T00:{k // 60:02}:{k % 60:02}Z</time>", 1)
+    path.write_text(text, encoding="utf-8")
+    raw = read_gpx(path)
+    began = datetime.fromtimestamp(raw.utc_start, UTC).year
+    assert began == (2024 if before <= 46 else 1970)
+
+
 def test_a_route_is_a_plan(tmp_path: Path) -> None:
     (logged,) = read_gpx(gpx(tmp_path / "a.gpx")).missions
     assert [item.alt for item in logged.mission.items] == [500.0] * 3

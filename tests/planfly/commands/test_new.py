@@ -115,15 +115,15 @@ def test_where_there_is_no_way_it_says_why_and_leaves_the_file(here: Path, capsy
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--from", "46,8", "--to", "49,8"], "planfly: --to 49,8, 334 km away: at most 300 km from --from is expected"),
+        (["--from", "46,8", "--to", "49,8"], "planfly: --to 49,8, 334 km away: 100 m to 300 km from --from"),
         (["--from", "91,8", "--to", "46,8"], "argument --from: '91,8': LAT,LON is expected: degrees north"),
         (["--from", "46", "--to", "46,8"], "argument --from: '46': LAT,LON is expected"),
-        (["--from", "46,8", "--to", "46,8"], "destination: less than 10 m from start"),
+        (["--from", "46,8", "--to", "46,8"], "--to 46,8, 0 km away: 100 m to 300 km from --from are expected"),
         (["--from", "46,8"], "the following arguments are required: --to"),
         (["--from", "46,8", "--to", "46,8.1", "--height", "0"], "argument --height: '0': m above ground"),
         (["--from", "46,8", "--to", "46,8.1", "--aircraft", "x9"], "x9"),
         (["--from", "36.3,-84.2", "--to", "36.9,-84.2", "--terrain", "jacksboro"],
-         "planfly: --to 36.9,-84.2: outside jacksboro or within 200 m of its edge: it covers latitude 36.16"),
+         "planfly: --to 36.9,-84.2: outside jacksboro or within 100 m of its edge: it covers latitude 36.16"),
         (["--from", "46,8", "--to", "46,8.1", "--terrain", "none.tif"], "none.tif"),
     ],
 )  # fmt: skip
@@ -138,6 +138,36 @@ def test_bad_input_is_one_line_and_nothing_is_made(
     [line] = [text for text in capsys.readouterr().err.splitlines() if not text.startswith("laying out")]
     assert said in line
     assert list(here.iterdir()) == []
+
+
+def test_ground_without_data_beside_the_way_makes_the_area_smaller(here: Path) -> None:
+    """A lake of 3 x 3 km without data to the north of a way of 6 km: 1.3 km, and 0.1 km."""
+    heights = np.full((400, 400), 500.0)
+    heights[100:200, 150:250] = np.nan
+    tile(here / "lake.tif", heights)
+    # The lake ends at 20.79988 S.
+    file = planfly.new_scenario("site", (-20.812, 8.97), (-20.812, 9.028), terrain="lake.tif")
+    found = load_scenario(str(file))
+    assert 800.0 < found.bounds[1, 1] < 1300.0
+    with pytest.raises(planfly.PlanflyError, match="no data at"):
+        planfly.new_scenario("other", (-20.801, 8.97), (-20.801, 9.028), terrain="lake.tif")
+    assert not (here / "other").exists()
+
+
+def test_names_and_places_that_are_none_are_told_in_python_too(here: Path) -> None:
+    for given in (None, ("a", "b"), (46.0,), "46,8", (float("nan"), 8.0)):
+        with pytest.raises(planfly.PlanflyError, match=r"^start .*: latitude -89\.\.89 and longitude"):
+            planfly.new_scenario("site", given, (46.0, 8.1))  # type: ignore[arg-type]
+    for name in ("a\x7fb", "a\nb", "x" * 101, "caf\udce9"):
+        with pytest.raises(planfly.PlanflyError, match="a folder with a name of 1 to 100 printable characters"):
+            planfly.new_scenario(name, (46.0, 8.0), (46.0, 8.1))
+    with pytest.raises(planfly.PlanflyError, match=r"^destination .*: a way that stays within 89 degrees of latitude"):
+        planfly.new_scenario("pole", (88.9, 0.0), (88.95, 170.0))
+    assert list(here.iterdir()) == []
+    file = planfly.new_scenario("b q'u é", (46.0, 8.0), (46.0, 8.1))
+    assert load_scenario(str(file)).name == "b q'u é"
+    (here / "link").symlink_to(here / "b q'u é")
+    assert planfly.new_scenario("link", (46.0, 8.0), (46.0, 8.1)).name == "link.toml"
 
 
 def test_what_lies_there_stays(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

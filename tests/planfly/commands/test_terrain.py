@@ -63,7 +63,7 @@ def check_ground(file: Path, box: tuple[float, ...] = BOX, off: float = 1e-3) ->
     assert np.abs(heights - ground(lat[:, None], lon[None, :])).max() <= off
     south, west, north, east = box
     edges = np.array([south - lat[-1], west - lon[0], lat[0] - north, lon[-1] - east])
-    assert ((edges >= 0.0) & (edges < 0.02)).all()
+    assert ((edges > -1e-9) & (edges < 0.02)).all()
 
 
 def test_four_tiles_of_a_server_are_one_file(
@@ -73,7 +73,7 @@ def test_four_tiles_of_a_server_are_one_file(
     check_ground(here / "dem.tif")
     answer = json.loads((here / "a.json").read_text(encoding="utf-8"))
     assert sorted(answer["tiles"]) == sorted(tile_name(lat, lon) for lat in (46, 47) for lon in (8, 9))
-    assert answer["sea"] == []
+    assert (answer["absent"], answer["empty_pixels"]) == ([], 0)
     # A part of each, and each part once.
     size = sum(file.stat().st_size for file in tiles.rglob("*.tif"))
     assert server.sent == answer["fetched_bytes"] < size
@@ -145,6 +145,12 @@ def test_nobody_there_is_one_line(here: Path, capsys: pytest.CaptureFixture[str]
     [
         ({"status": 500}, "cannot be fetched: the server answers 500 Internal Server Error"),
         ({"status": 401}, "cannot be fetched: the server answers 401 Unauthorized"),
+        ({"status": 403}, "cannot be fetched: the server answers 403 Forbidden"),
+        ({"length": 0}, "Content-Length: 0: 1 to 536,870,912 bytes are expected"),
+        ({"length": 10**9}, "Content-Length: 1,000,000,000: 1 to 536,870,912 bytes are expected"),
+        ({"length": 10**20}, "Content-Length: 100,000,000,000,000,000,000: 1 to"),
+        ({"garbage": True}, "what the server gives is no GeoTIFF that can be read"),
+        ({"moved": ("N46", "N47")}, "another place: the degree from 46 N 8 E on is expected"),
         ({"odd": True}, "cannot be fetched: the server answers with 'bytes 1-"),
         ({"status": 404}, "no tile of the area is there: open sea, or not such a server"),
     ],
@@ -179,22 +185,64 @@ def test_a_file_that_has_changed_is_fetched_anew(tag: str, here: Path, server: T
 def test_a_note_of_the_cache_that_is_damaged_is_not_believed(here: Path, server: TileServer) -> None:
     first = planfly.terrain("a.tif", box=BOX, margin=0.0, source=server.url)
     notes = sorted((here / "cache").rglob("*.held"))
-    for note, text in zip(notes, ("{", "[[5, 2]]", "[[-4, 9]]", "[[0, 9e99]]"), strict=True):
+    for note, text in zip(notes, ("{", '[[5, 2, ""]]', "[[0, 65536]]", '[[0, 9e999, ""]]'), strict=True):
         note.write_text(text, encoding="ascii")
     assert planfly.terrain("b.tif", box=BOX, margin=0.0, source=server.url).fetched == first.fetched
     check_ground(here / "b.tif")
 
 
-def test_where_no_tile_is_is_sea(here: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_tile(tmp_path / "coast", 46, 8)
-    write_tile(tmp_path / "coast", 47, 8)
-    with serving(tmp_path / "coast") as server:
-        assert main(["terrain", *AREA, "--source", server.url]) == 0
-    assert "sea       no tile at 46 9, 47 9 (south-west corners, degrees): 0 m there" in capsys.readouterr().out
-    heights, lat, lon = seen(here / "dem.tif")
-    west = lon < 9.0 - 0.5 / ROWS
-    assert np.abs(heights[:, west] - ground(lat[:, None], lon[None, west])).max() <= 1e-3
-    assert (heights[:, ~west] == 0.0).all()
+def test_where_no_tile_is_has_no_data_unless_it_is_sea(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of some countries no tiles are published: mountains must not be taken for sea unasked."""
+    write_tile(here / "coast", 46, 8)
+    write_tile(here / "coast", 47, 8)
+    with serving(here / "coast") as server:
+        assert main(["terrain", *AREA, "--source", server.url, "--out", "open.tif", "--json", "a.json"]) == 0
+        said = capsys.readouterr().err
+        assert "no tile at 46 9, 47 9 (south-west corners, degrees): open sea, or not published (--sea takes" in said
+        assert main(["terrain", *AREA, "--source", server.url, "--sea", "--out", "sea.tif"]) == 0
+        assert "46 9, 47 9 (south-west corners, degrees): taken for sea, at 0 m" in capsys.readouterr().err
+    for name, value in (("open.tif", -32768.0), ("sea.tif", 0.0)):
+        heights, lat, lon = seen(here / name)
+        west = lon < 9.0 - 0.5 / ROWS
+        assert np.abs(heights[:, west] - ground(lat[:, None], lon[None, west])).max() <= 1e-3
+        assert (heights[:, ~west] == value).all()
+    answer = json.loads((here / "a.json").read_text(encoding="utf-8"))
+    assert (answer["absent"], answer["empty_pixels"]) == ([[46, 9], [47, 9]], int((~west).sum()) * len(lat))
+    assert f"{answer['empty_pixels']:,} of {heights.size:,} pixels have no data" in said
+
+
+@pytest.mark.parametrize("spoilt", ["directory", "block"])
+def test_a_copy_that_is_spoilt_is_fetched_once_more(spoilt: str, here: Path, server: TileServer) -> None:
+    """A power cut, or a proxy that gave something else."""
+    first = planfly.terrain("a.tif", box=BOX, margin=0.0, source=server.url)
+    for copy in (here / "cache").rglob("*.tif"):
+        held = json.loads(copy.with_name(copy.name + ".held").read_text(encoding="ascii"))
+        with copy.open("r+b") as file:
+            file.seek(0 if spoilt == "directory" else held[-1][1] - 500)
+            file.write(bytes(400))
+    again = planfly.terrain("b.tif", box=BOX, margin=0.0, source=server.url)
+    assert 0 < again.fetched <= first.fetched
+    assert (here / "a.tif").read_bytes() == (here / "b.tif").read_bytes()
+
+
+def test_a_copy_that_is_gone_takes_its_note_with_it(here: Path, server: TileServer) -> None:
+    first = planfly.terrain("a.tif", box=BOX, margin=0.0, source=server.url)
+    for copy in (here / "cache").rglob("*.tif"):
+        copy.unlink()
+    server.status = 500
+    with pytest.raises(planfly.PlanflyError):
+        planfly.terrain("b.tif", box=BOX, margin=0.0, source=server.url)
+    server.status = 0
+    assert planfly.terrain("b.tif", box=BOX, margin=0.0, source=server.url).fetched == first.fetched
+    check_ground(here / "b.tif")
+
+
+def test_no_pixel_is_read_that_was_not_fetched(here: Path, server: TileServer) -> None:
+    """Edges at and beside those of blocks of 128 pixels, and of tiles."""
+    for k, at in enumerate((8.0, 8.355, 8.35556, 8.356, 8.4, 8.7111, 8.999)):
+        box = (46.3, at, 46.3 + 0.05 * (k + 1), at + 0.1)
+        planfly.terrain(f"{k}.tif", box=box, margin=0.0, source=server.url)
+        check_ground(here / f"{k}.tif", box)
 
 
 def test_tiles_of_two_pitches_meet(here: Path, tmp_path: Path) -> None:
@@ -271,6 +319,20 @@ def test_a_turned_grid_in_metres_stays_as_it_is(here: Path) -> None:
         assert np.array_equal(found, heights[top : top + rows, left : left + cols], equal_nan=True)
 
 
+def test_an_area_without_data_is_refused_and_a_gap_is_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = {"driver": "GTiff", "width": 100, "height": 100, "count": 1, "dtype": "float32", "crs": "EPSG:4326"}
+    heights = np.full((100, 100), 300.0, np.float32)
+    heights[:, 50:] = np.nan
+    with rasterio.open(here / "half.tif", "w", transform=Affine(0.01, 0, 8.0, 0, -0.01, 47.0), **made) as file:
+        file.write(heights, 1)
+    argv = ["terrain", "--margin", "0", "--source", "half.tif"]
+    assert main([*argv, "--box", "46.2,8.7,46.3,8.8"]) == 2
+    assert "dem.tif: no data in the area" in capsys.readouterr().err
+    assert not (here / "dem.tif").exists()
+    assert main([*argv, "--box", "46.2,8.4,46.3,8.6"]) == 0
+    assert " pixels have no data" in capsys.readouterr().err
+
+
 def test_an_area_beyond_the_tiles_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["terrain", "--box", "36.2,-84.3,36.5,-84.2", "--source", "jacksboro"]) == 2
     said = capsys.readouterr().err
@@ -308,7 +370,7 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
 @pytest.mark.parametrize(
     ("argv", "said"),
     [
-        ([], "--box: --around MISSION or --box: one of them is expected"),
+        ([], "planfly: --around, --box: one of them is expected"),
         (["--box", "46,8,47,9", "--around", "m.waypoints"], "one of them is expected"),
         (["--box", "46,8,47"], "argument --box: '46,8,47': S,W,N,E is expected"),
         (["--box", "47,8,46,9"], "--box (47.0, 8.0, 46.0, 9.0): south, west, north, east are expected"),
@@ -317,8 +379,12 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
         (["--box", "46,8,47,9", "--out", "dem.png"], "dem.png: a name that ends with .tif is expected"),
         (
             ["--box", "46,8,47,9", "--source", "ftp://x/y"],
-            "--source ftp://x/y: a folder, or an address by http",
+            "--source 'ftp://x/y': a folder, or the address of one by http",
         ),
+        (["--box", "46,8,47,9", "--source", "http://127.0.0.1:9/\u00e4"], "or the address of one by http or https"),
+        (["--box", "46,8,47,9", "--source", "http://[::1/"], "or the address of one by http or https"),
+        (["--box", "46,8,47,9", "--source", f"http://{'a' * 64}.example/"], "or the address of one by http or https"),
+        (["--box", "46,8,47,9", "--source", "http://a/?b"], "or the address of one by http or https"),
         (["--box", "46,8,47,9", "--source", "none"], "none: terrain path: no such file"),
         (["--box", "40,0,46,9", "--source", "http://127.0.0.1:9"], "tiles: at most 25 are fetched"),
         (["--around", "none.waypoints"], "none.waypoints"),
