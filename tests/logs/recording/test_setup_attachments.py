@@ -83,7 +83,7 @@ def test_a_dem_comes_from_the_log_and_not_from_its_file(
     def refuse(*_: object) -> None:
         raise AssertionError("the elevation file was opened")
 
-    monkeypatch.setattr(scenario_module, "open_raster", refuse)
+    monkeypatch.setattr(scenario_module, "open_tiles", refuse)
     same(read_log(path).setup.scenario, scenario)
 
 
@@ -220,6 +220,6 @@ def test_a_log_does_not_make_its_reader_open_files(track: Track, monkeypatch: py
     data["sha256"]["scenario.json"] = hashlib.sha256(attachments["scenario.json"]).hexdigest()
     del data["sha256"]["terrain.json"]
     attachments["setup.json"] = json.dumps(data).encode()
-    monkeypatch.setattr(scenario_module, "open_raster", trap)
+    monkeypatch.setattr(scenario_module, "open_tiles", trap)
     with pytest.raises(LogError, match=r"terrain\.kind: 'dem'"):
         unpack_setup(attachments, "x.mcap")
