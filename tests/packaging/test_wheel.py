@@ -10,14 +10,19 @@ import venv
 import zipfile
 from email import message_from_bytes
 from email.message import Message
+from importlib.metadata import distributions
 from pathlib import Path
 
 import pytest
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
 
 from tests.packaging.conftest import PACKAGES, ROOT
 from tests.soak import SOAK
 
 VERSIONS = ("3.11", "3.12", "3.13")
+# The oldest Python that a fresh machine brings: Debian 12's.
+DEBIANS = "3.11.2"
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +37,18 @@ def test_a_package_index_shows_it(wheel: Path) -> None:
         [sys.executable, "-m", "twine", "check", "--strict", wheel], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout
+
+
+def test_every_pinned_version_installs_on_debians_python() -> None:
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pinned = dict(line.split("==") for line in lines if "==" in line)
+    here = {canonicalize_name(one.name): one for one in distributions() if one.name}
+    refused = {}
+    for name in pinned:
+        needs = here[canonicalize_name(name)].metadata["Requires-Python"] if canonicalize_name(name) in here else None
+        if needs and not SpecifierSet(needs).contains(DEBIANS):
+            refused[name] = needs
+    assert refused == {}
 
 
 def test_it_says_who_where_and_for_what(metadata: Message) -> None:
