@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
-from aircraft.tracking import TrackingError, air_density_factor
+from aircraft.tracking import TrackingError, air_density_factor, density_factor
 from world.by_reference import by_reference
 from world.geometry import wrap
 from world.kernels import compiled, compiled_inline, inlined
@@ -40,6 +40,8 @@ class PerformanceTable(NamedTuple):
     gust_sigma: standard deviation of the gusts, m/s.
     amsl: (h,) m, increasing; altitudes of the two tables.
     climb, descent: (h,) rad, steepest angles relative to the air, positive in the direction of their name.
+    equivalent: 1 if `airspeed` is an equivalent one, so that slopes are those of the true airspeed at each altitude; 0
+    if it is the true one.
     """
 
     airspeed: float
@@ -52,6 +54,7 @@ class PerformanceTable(NamedTuple):
     amsl: Floats
     climb: Floats
     descent: Floats
+    equivalent: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,33 +92,23 @@ class Limits:
         """The limits with the slopes that the aircraft can for certain, as far as that is known."""
         return replace(self, envelope=self.envelope.surely())
 
-    def for_plans(self) -> "Limits":
-        """The limits that plans keep to: those of an aircraft that is not known for certain leave nothing open.
-
-        An autopilot that takes airspeeds for equivalent ones flies faster with height, where the aircraft climbs less.
-        """
-        sure = self.surely()
-        if sure.envelope is self.envelope or self.tracking is None:
-            return sure
-        table, speeds = sure.envelope.climb, sure.envelope.airspeed
-        faster = [
-            np.interp(speeds * air_density_factor(float(amsl)), speeds, table[:, j])
-            for j, amsl in enumerate(sure.envelope.amsl)
-        ]
-        climb = np.minimum(table, np.column_stack(faster))
-        return replace(sure, envelope=replace(sure.envelope, climb=climb))
-
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
         """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed in the turn."""
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
     def performance(self, airspeed: float | None = None) -> PerformanceTable:
-        """Performance at an airspeed (m/s; None for that of the limits), for compiled functions.
+        """Performance at a true airspeed (m/s), for compiled functions.
 
+        airspeed: None for that of the limits, which an autopilot that strays from its legs takes for an equivalent one:
+        with height it flies faster, where the aircraft climbs less.
         Climb and descent are NaN where `Envelope.air_angles` is.
         """
         speed, heights, wind = self.airspeed if airspeed is None else airspeed, self.envelope.amsl, self.wind
-        angles = np.array([self.envelope.air_angles(speed, float(amsl)) for amsl in heights])
+        equivalent = airspeed is None and self.tracking is not None
+        faster = [air_density_factor(float(amsl)) if equivalent else 1.0 for amsl in heights]
+        angles = np.array(
+            [self.envelope.air_angles(speed * more, float(amsl)) for more, amsl in zip(faster, heights, strict=True)]
+        )
         return PerformanceTable(
             airspeed=float(speed),
             tan_max_bank=math.tan(self.max_bank),
@@ -128,6 +121,7 @@ class Limits:
             amsl=heights,
             climb=_read_only(angles[:, 0]),
             descent=_read_only(angles[:, 1]),
+            equivalent=float(equivalent),
         )
 
 
@@ -153,7 +147,8 @@ def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -
     >>> slower.climb.round(3).tolist(), slower.descent.tolist()
     ([0.201, 0.201], [0.3, 0.3])
     """
-    climb_limit, descent_limit = [math.asin(min(1.0, rate / table.airspeed)) for rate in (climb_rate, sink_rate)]
+    speeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
+    climb_limit, descent_limit = [np.arcsin(np.minimum(1.0, rate / speeds)) for rate in (climb_rate, sink_rate)]
     climb, descent = (
         _read_only(np.minimum(table.climb, climb_limit)),
         _read_only(np.minimum(table.descent, descent_limit)),
@@ -175,11 +170,18 @@ def wind_speed_at(table: PerformanceTable, amsl: float) -> float:  # pragma: no 
 
 
 @compiled_inline
+def true_airspeed(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
+    """True airspeed at an altitude, m/s."""
+    speed: float = table.airspeed * (1.0 + table.equivalent * (density_factor(amsl) - 1.0))
+    return speed
+
+
+@compiled_inline
 def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> float:  # pragma: no cover - compiled
     """Ground speed on a course held against the mean wind, m/s; NaN where it cannot be held."""
     wind = wind_speed_at(table, amsl)
     angle = table.wind_to - course
-    return ground_speed(table.airspeed, wind * math.cos(angle), wind * math.sin(angle))
+    return ground_speed(true_airspeed(table, amsl), wind * math.cos(angle), wind * math.sin(angle))
 
 
 @compiled_inline
@@ -202,10 +204,14 @@ def slopes_along(
     share = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
     climb = table.climb[k] + share * (table.climb[k + 1] - table.climb[k])
     dive = table.descent[k] + share * (table.descent[k + 1] - table.descent[k])
-    up = ground_slope(climb, table.airspeed, wind * tail_share, wind * cross_share)
-    down = ground_slope(dive, table.airspeed, wind * tail_share, wind * cross_share)
+    speed = true_airspeed(table, amsl)
+    up = ground_slope(climb, speed, wind * tail_share, wind * cross_share)
+    down = ground_slope(dive, speed, wind * tail_share, wind * cross_share)
     if math.isnan(up) or math.isnan(down):
         return 0.0, 0.0
+    # Where the thin air makes it faster than its fastest level flight, no leg may lead.
+    if table.equivalent > 0.0 and climb < 0.0:
+        down = 0.0
     return up, down
 
 
@@ -223,19 +229,19 @@ def _turn_radius(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
 ) -> float:  # pragma: no cover - compiled
     """Arc radius between the unit courses u and v; w: `downwind`; side: sign of the turn, 0 for either direction."""
-    wind = wind_speed_at(table, amsl)
+    wind, speed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
     if wind == 0.0:
         # Without wind the speed is the same on every course.
-        fastest = table.airspeed
+        fastest = speed
     else:
-        before = ground_speed(table.airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
-        after = ground_speed(table.airspeed, wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
+        before = ground_speed(speed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
+        after = ground_speed(speed, wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
         if math.isnan(before) or math.isnan(after):
             return math.inf
         fastest = max(before, after)
         # The highest ground speed is downwind, if the turn passes through that course.
         if side == 0.0 or (side * (ux * wy - uy * wx) > 0.0 and side * (wx * vy - wy * vx) > 0.0):
-            fastest = max(fastest, table.airspeed + wind)
+            fastest = max(fastest, speed + wind)
     fastest += table.gust_sigma
     radius: float = fastest * fastest / (GRAVITY * table.tan_max_bank)
     return radius
@@ -335,7 +341,8 @@ def roll_reversal_length(
     u: the leg's unit course. w: `downwind`. 0 if the aircraft cannot make progress along the leg.
     """
     wind = wind_speed_at(table, amsl)
-    speed = ground_speed(table.airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx)) + table.gust_sigma
+    airspeed = true_airspeed(table, amsl)
+    speed = ground_speed(airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx)) + table.gust_sigma
     if math.isnan(speed):
         return 0.0
     pull = speed * speed / GRAVITY

@@ -96,22 +96,16 @@ def air_density_factor(amsl: float) -> float:
     >>> round(air_density_factor(0.0), 3), round(air_density_factor(1000.0), 3)
     (1.0, 1.05)
     """
-    return float(_density_factor(amsl))
+    return float(density_factor(amsl))
 
 
 @compiled
-def _density_factor(amsl: float) -> float:  # pragma: no cover - compiled
+def density_factor(amsl: float) -> float:  # pragma: no cover - compiled
+    """As `air_density_factor`, for compiled functions."""
     # Two terms of (1 - 2.2558e-5 h)^-2.128, accurate to 0.5 % up to 4,000 m; a library's power rounds differently on
     # different machines.
     factor: float = 1.0 + amsl * (4.8e-5 + 1.8e-9 * amsl)
     return factor
-
-
-@inlined
-def true_airspeed_excess(tracking: Record, amsl: float) -> float:  # pragma: no cover - compiled
-    """Excess of the true airspeed over the nominal airspeed at an altitude, m/s."""
-    faster: float = tracking.airspeed * (_density_factor(amsl) - 1.0)
-    return faster
 
 
 @compiled

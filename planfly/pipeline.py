@@ -125,7 +125,7 @@ def make_plan(
     scenario: Scenario, airframe: Airframe, seed: int, algorithm: str | None = None, advance: Advance | None = None
 ) -> Plan:
     """Plan within the scenario's and the aircraft's limits, as far as these are known for certain."""
-    return plan_path(scenario, airframe.limits.for_plans(), seed=seed, algorithm=algorithm, progress=advance)
+    return plan_path(scenario, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
 
 
 def make_setup(

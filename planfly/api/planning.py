@@ -283,7 +283,7 @@ def _planned(
     if out is not None:
         read = None if isinstance(source, Scenario) else Path(source)
         target = file_target(out, world.name, number, overwrite=overwrite, source=read)
-    limits, ends = load_airframe(world).limits.for_plans(), _stop_condition(seconds, stop)
+    limits, ends = load_airframe(world).limits.surely(), _stop_condition(seconds, stop)
     with stage(f"planning {world.name}") as advance:
         if flown is None:
             made = plan_path(world, limits, seed=number, algorithm=algorithm, progress=advance, stop=ends)
@@ -317,7 +317,7 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
     """
     if plan.feasible:
         return ()
-    return tuple(explain_failure(plan, load_airframe(plan.scenario).limits.for_plans()))
+    return tuple(explain_failure(plan, load_airframe(plan.scenario).limits.surely()))
 
 
 def scenarios() -> dict[str, str]:

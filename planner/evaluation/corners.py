@@ -17,10 +17,11 @@ from aircraft.path_limits import (
     corner_tangent,
     fly_over_run,
     roll_reversal_length,
+    true_airspeed,
     turn_tangents,
     wind_speed_at,
 )
-from aircraft.tracking import corner_deviation, true_airspeed_excess
+from aircraft.tracking import corner_deviation
 from planner.evaluation.problem import ProblemArrays
 from world.geometry import turning_angle
 from world.kernels import Record, Records, compiled, compiled_inline, copy_into, inlined, inner
@@ -95,7 +96,7 @@ def measure_corner(
     if tracking.has_error and 0.0 < tangent < math.inf:
         turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
         # The highest ground speed in the turn, for which the radius of the arc was computed.
-        speed = math.sqrt(radius * GRAVITY * aircraft.tan_max_bank) + true_airspeed_excess(tracking, amsl)
+        speed = math.sqrt(radius * GRAVITY * aircraft.tan_max_bank)
         excursion, length_before, length_after = corner_deviation(tracking, turn, speed)
         before, after = max(tangent, length_before), max(tangent, length_after)
     corner.tangent, corner.radius = tangent, radius
@@ -163,7 +164,7 @@ ARC_STEP = math.radians(15.0)
 @inlined
 def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
     """Half the length of the parabola that blends two slopes, m per unit of slope difference, with a full tailwind."""
-    speed = aircraft.airspeed + wind_speed_at(aircraft, amsl)
+    speed = true_airspeed(aircraft, amsl) + wind_speed_at(aircraft, amsl)
     length: float = speed * speed / (2.0 * BLEND_ACCELERATION)
     return length
 

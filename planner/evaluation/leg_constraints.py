@@ -175,6 +175,9 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no c
         climb = _slope_everywhere(data, data.aircraft.climb)
     if math.isnan(dive):
         dive = _slope_everywhere(data, data.aircraft.descent)
+        # Where it cannot fly level no leg may lead, whatever its slope.
+        if data.aircraft.equivalent > 0.0 and _slope_everywhere(data, data.aircraft.climb) < 0.0:
+            dive = -1.0
     return PrecomputedLimits(
         # No turn exceeds half a circle; -2 is below any rounded cosine.
         math.cos(data.max_turn) if data.max_turn < math.pi else -2.0,

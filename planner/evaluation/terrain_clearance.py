@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import ground_speed
-from aircraft.path_limits import PerformanceTable, wind_speed_at
-from aircraft.tracking import true_airspeed_excess
+from aircraft.path_limits import PerformanceTable, true_airspeed, wind_speed_at
 from planner.evaluation.corners import Wind
 from planner.evaluation.problem import RequiredClearance, SlopeBounds, clearance_at
 from world.frames import PolyMapRecord, polymap
@@ -49,11 +48,10 @@ def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
 ) -> float:  # pragma: no cover - compiled
     """Distance (m) that the aircraft covers over the ground during the lag, on a unit course."""
-    speed, (wx, wy) = wind_speed_at(aircraft, amsl), wind
-    along = ground_speed(aircraft.airspeed, speed * (east * wx + north * wy), speed * (east * wy - north * wx))
+    (wx, wy), speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
+    along = ground_speed(airspeed, speed * (east * wx + north * wy), speed * (east * wy - north * wx))
     # A course that cannot be held against the wind has no plan either.
-    along = aircraft.airspeed if math.isnan(along) else along
-    length: float = tracking.lag * (along + true_airspeed_excess(tracking, amsl))
+    length: float = tracking.lag * (airspeed if math.isnan(along) else along)
     return max(1e-6, length)
 
 

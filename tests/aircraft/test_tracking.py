@@ -13,7 +13,6 @@ from aircraft.tracking import (
     corner_deviation,
     corridor_half_width,
     no_tracking,
-    true_airspeed_excess,
 )
 
 
@@ -52,7 +51,6 @@ def test_an_exact_autopilot_has_nothing_to_leave_room_for() -> None:
 def test_true_airspeed_grows_with_height(amsl: float, factor: float) -> None:
     """The standard atmosphere's density ratios at 1, 2 and 4 km are 0.9075, 0.8217 and 0.6689 (ICAO Doc 7488)."""
     assert air_density_factor(amsl) == pytest.approx(factor, rel=0.006)
-    assert true_airspeed_excess(error_of().record, amsl) == pytest.approx(25.0 * (factor - 1.0), abs=0.15)
 
 
 # ----------------------------------------------------------------------

@@ -45,7 +45,8 @@ def test_every_pinned_version_installs_on_debians_python() -> None:
     here = {canonicalize_name(one.name): one for one in distributions() if one.name}
     refused = {}
     for name in pinned:
-        needs = here[canonicalize_name(name)].metadata["Requires-Python"] if canonicalize_name(name) in here else None
+        one = here.get(canonicalize_name(name))
+        needs = one and one.metadata.get("Requires-Python")
         if needs and not SpecifierSet(needs).contains(DEBIANS):
             refused[name] = needs
     assert refused == {}

@@ -1,0 +1,93 @@
+"""Whether what the planner calls safe is flyable: on fresh scenarios, by the geometry of the plan and by its flight.
+
+``python -m benchmarks.plans_and_verdicts [--plans N] [--from NUMBER] [--json FILE]`` plans random scenarios over ground
+from 0 to 4,000 m, in wind, among zones and missiles, for each shipped fixed wing and each autopilot
+(`tests.fresh_plans`), judges each plan without a flight, flies it, judges the flight, and counts where they differ.
+"""
+
+import argparse
+import json
+import time
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from flight.mission.from_plan import plan_mission
+from logs.verdict.judge_geometry import judge_geometry
+from planfly.airframe import load_airframe
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from tests.fresh_plans import fresh_scenario
+from world.errors import PlanflyError
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What became of one scenario.
+
+    plan: "safe", or why there is none.  drawn, flown: the verdicts without and with a flight, "" where there is none.
+    wrong: what failed of either.  seconds: of a core for the plan, and for its flight and verdicts.
+    """
+
+    name: str
+    turbulence: str
+    plan: str
+    drawn: str = ""
+    flown: str = ""
+    wrong: str = ""
+    seconds: tuple[float, float] = (0.0, 0.0)
+
+
+def answer(number: int, *, flown: bool = True) -> Answer:
+    """Plan the scenario of this number and judge the plan; where it is to be flown, fly it and judge the flight."""
+    scenario = fresh_scenario(number)
+    whose = scenario.name, scenario.wind.turbulence
+    began = time.process_time()
+    airframe = load_airframe(scenario)
+    try:
+        plan = make_plan(scenario, airframe, number + 1)
+    except PlanflyError as error:
+        return Answer(*whose, f"refused: {error}")
+    planned = time.process_time()
+    if not plan.safe:
+        why = "; ".join(plan.certificate.problems[:2])
+        return Answer(*whose, f"no plan: {why}", seconds=(planned - began, 0.0))
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+    setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
+    verdicts = {"drawn": judge_geometry(setup)}
+    if flown:
+        verdicts["flown"] = fly_and_judge(setup, airframe, None).verdict
+    wrong = [
+        f"{level} {one.rule} {one.reason}"
+        for level, verdict in verdicts.items()
+        for one in verdict.findings
+        if one.ok is False
+    ]
+    spent = (planned - began, time.process_time() - planned)
+    said = {level: verdict.answer for level, verdict in verdicts.items()}
+    return Answer(*whose, "safe", said["drawn"], said.get("flown", ""), "; ".join(wrong[:3]), spent)
+
+
+def main() -> None:
+    """Answer, print a line each, and count."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.plans_and_verdicts")
+    parser.add_argument("--plans", type=int, default=300)
+    parser.add_argument("--from", dest="first", type=int, default=0, help="number of the first scenario")
+    parser.add_argument("--json", type=Path, help="file for the answers")
+    args = parser.parse_args()
+    answers = []
+    for number in range(args.first, args.first + args.plans):
+        answers.append(answer(number))
+        one = answers[-1]
+        told = f"{one.plan[:60]:10s} {one.drawn} {one.flown}  {one.wrong}"
+        print(f"{one.name:28s} {one.seconds[0]:5.1f} s {told}", flush=True)
+    safe = [one for one in answers if one.plan == "safe"]
+    print(f"{len(safe)} of {len(answers)} planned safely; without a flight {dict(Counter(one.drawn for one in safe))}")
+    for turbulence in ("none", "light", "moderate"):
+        flown = Counter(one.flown for one in safe if one.turbulence == turbulence)
+        print(f"flown in {turbulence:8s} turbulence: {dict(flown)}")
+    if args.json:
+        args.json.write_text(json.dumps([asdict(one) for one in answers], indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
