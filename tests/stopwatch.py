@@ -52,12 +52,20 @@ class Stopwatch:
         found = {}
         session = [] if self._session is None else processes_of(self._session)
         # Not of the thread that looks: it waits for a core of itself.
-        for task in (self._own, *(one for k in session for one in Path(f"/proc/{k}/task").glob("*/schedstat"))):
+        for task in (self._own, *(one for k in session for one in _threads(k))):
             try:
                 found[task.parent.name] = int(task.read_text(encoding="ascii").split()[1]) * 1e-9
             except (OSError, IndexError):
                 continue
         return found
+
+
+def _threads(process: int) -> list[Path]:
+    """What Linux says of each thread of a process; of none where it has ended."""
+    try:
+        return list(Path(f"/proc/{process}/task").glob("*/schedstat"))
+    except OSError:
+        return []
 
 
 def processes_of(session: int) -> list[int]:

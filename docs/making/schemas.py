@@ -3,13 +3,13 @@
 import json
 from typing import Any
 
-from planfly.commands.registry import answering_commands, schema_text
+from planfly.commands.registry import answer_objects, answering_commands, schema_text
 
 
 def schema_tables(command: str) -> str:
     """The fields of a command's answer and of its nested objects: name, type, meaning."""
     schema = json.loads(schema_text(command))
-    parts = [_table(schema)]
+    parts = [_table(answer_objects(schema)[0])]
     for name, one in schema.get("$defs", {}).items():
         parts.append(f"**{name}**: {one.get('description', '')}\n\n{_table(one)}")
     return "\n\n".join(parts)
@@ -33,6 +33,8 @@ def _type(one: dict[str, Any]) -> str:
     for key in ("anyOf", "oneOf"):
         if key in one:
             return " or ".join(_type(other) for other in one[key])
+    if "additionalProperties" in one and "properties" not in one:
+        return f"object of {_type(one['additionalProperties'])}"
     if one.get("type") == "array":
         return f"list of {_type(one.get('items', {}))}"
     return str(one.get("type", "any"))
@@ -43,7 +45,8 @@ def answer_table() -> str:
     rows = []
     for command in answering_commands():
         schema = json.loads(schema_text(command))
-        fields = schema.get("properties", {})
-        name = fields.get("schema", {}).get("const", "")
-        rows.append(f"| `{command}` | `{name}` | {', '.join(f'`{one}`' for one in fields if one != 'schema')} |")
+        for one in answer_objects(schema):
+            fields = one.get("properties", {})
+            name = fields.get("schema", {}).get("const", "")
+            rows.append(f"| `{command}` | `{name}` | {', '.join(f'`{key}`' for key in fields if key != 'schema')} |")
     return "| command | schema | fields |\n|---|---|---|\n" + "\n".join(rows)

@@ -189,7 +189,7 @@ class Verdict:
         """The verdict as JUnit XML, as continuous integration shows test results.  name: of what was judged."""
         from logs.verdict.junit import junit_text
 
-        return junit_text(self, name)
+        return junit_text({name: self})
 
     def _repr_html_(self) -> str:
         """How a notebook shows it."""

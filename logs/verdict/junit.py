@@ -1,31 +1,33 @@
 """A verdict as JUnit XML, as continuous integration shows test results: a case for each finding, one for the answer."""
 
 from collections import Counter
+from collections.abc import Mapping
 from xml.etree import ElementTree
 
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.wording import place_text, suggestions_text
 
 
-def junit_text(verdict: Verdict, name: str) -> str:
-    """The text of the file.  name: of what was judged, a mission or a log.
+def junit_text(verdicts: Mapping[str, Verdict]) -> str:
+    """The text of the file, a test suite for each verdict.  verdicts: by the name of what was judged.
 
     A finding that fails is a failure, and one that was not judged is skipped.  The case ``verdict`` fails where the
     answer is not "flyable", also where nothing failed but a part was not judged.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown")
-    >>> "<testcase" in junit_text(verdict, "m.waypoints"), "<failure" in junit_text(verdict, "m.waypoints")
+    >>> "<testcase" in junit_text({"m.waypoints": verdict}), "<failure" in junit_text({"m.waypoints": verdict})
     (True, False)
     """
-    cases = [_answer_case(verdict), *_finding_cases(verdict.findings)]
-    counts = Counter(child.tag for case in cases for child in case)
     root = ElementTree.Element("testsuites")
-    suite = ElementTree.SubElement(
-        root, "testsuite", name=_plain(name), tests=str(len(cases)), failures=str(counts["failure"]),
-        errors="0", skipped=str(counts["skipped"]),
-    )  # fmt: skip
-    suite.extend(cases)
-    ElementTree.SubElement(suite, "system-out").text = _plain(verdict.summary, keep="\n")
+    for name, verdict in verdicts.items():
+        cases = [_answer_case(verdict), *_finding_cases(verdict.findings)]
+        counts = Counter(child.tag for case in cases for child in case)
+        suite = ElementTree.SubElement(
+            root, "testsuite", name=_plain(name), tests=str(len(cases)), failures=str(counts["failure"]),
+            errors="0", skipped=str(counts["skipped"]),
+        )  # fmt: skip
+        suite.extend(cases)
+        ElementTree.SubElement(suite, "system-out").text = _plain(verdict.summary, keep="\n")
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

@@ -1,6 +1,7 @@
 """``planfly check``: a log judged from what it holds, or a mission by its geometry alone."""
 
 import argparse
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import planfly
@@ -21,7 +22,8 @@ from planfly.terminal.results import print_returns, print_verdict, print_warning
 from world.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from planfly import Judged
+    from planfly import Judged, Verdict
+    from planfly.terminal.answers import VerdictsDocument
 
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
@@ -60,7 +62,7 @@ def check(args: argparse.Namespace) -> int:
     if judged.verdict.level == "geometric":
         print_warnings([*judged.setup.mission.warnings, *judged.setup.scenario.notes])
     give_answer(args, lambda: _document(judged))
-    give_junit(args, judged.verdict, args.what)
+    give_junit(args, {args.what: judged.verdict})
     print_warnings([judged.loss] if judged.loss else [])
     print_verdict(judged.verdict, judged.setup.route.notes)
     print_returns(judged.returns_line)
@@ -70,7 +72,7 @@ def check(args: argparse.Namespace) -> int:
 
 
 # What does not go with several autopilots: what belongs to one of them, or to a log.
-_OF_ONE = ("params", "guidance", "autopilot_law", "plan", "flight", "datum", "json", "junit")
+_OF_ONE = ("params", "guidance", "autopilot_law", "plan", "flight", "datum")
 
 
 def _check_for(args: argparse.Namespace) -> int:
@@ -82,8 +84,18 @@ def _check_for(args: argparse.Namespace) -> int:
             raise ArgumentError.of_argument(name, value, "not with --for, which flies several autopilots")
     flown = call(planfly.fly_by_each, args, mission=args.what)
     verdicts = {name: one.verdict for name, one in flown.items()}
+    code = max(verdict_code(verdict) for verdict in verdicts.values())
+    give_answer(args, lambda: _documents(verdicts, args.what, code))
+    give_junit(args, {f"{args.what} by {name}": verdict for name, verdict in verdicts.items()})
     print("\n".join(autopilot_lines(verdicts)))
-    return max(verdict_code(verdict) for verdict in verdicts.values())
+    return code
+
+
+def _documents(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
+    from planfly.terminal.answers import VerdictsDocument, verdict_document
+
+    documents = {name: verdict_document(verdict) for name, verdict in verdicts.items()}
+    return VerdictsDocument(exit_code=code, mission=mission, verdicts=documents)
 
 
 def _document(judged: "Judged") -> str:

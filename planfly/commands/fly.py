@@ -57,7 +57,7 @@ def fly(args: argparse.Namespace) -> int:
         print(coloured(f"next      planfly report {shlex.quote(str(flown.log))}", "hint"))
     code = verdict_code(flown.verdict)
     give_answer(args, lambda: _answer(args.mission, flown, code))
-    give_junit(args, flown.verdict, args.mission)
+    give_junit(args, {args.mission: flown.verdict})
     return code
 
 

@@ -49,7 +49,7 @@ def import_log(args: argparse.Namespace) -> int:
     print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
     code = LOSS if flight.lossy else verdict_code(flight.verdict)
     give_answer(args, lambda: _import_answer(Path(args.target), flight, code))
-    give_junit(args, flight.verdict, args.log)
+    give_junit(args, {args.log: flight.verdict})
     return code
 
 

@@ -46,7 +46,7 @@ COMMANDS = (
     Command("export", _FLY, "ExportAnswer"),
     Command("fly", _FLY, "FlyAnswer"),
     Command("serve", _FLY),
-    Command("check", _LOOK, "VerdictDocument"),
+    Command("check", _LOOK, "CheckDocument"),
     Command("returns", _LOOK, "ReturnsAnswer"),
     Command("survey", _LOOK, "SurveyAnswer"),
     Command("report", _LOOK, "ReportAnswer"),
@@ -129,6 +129,16 @@ def answer_schema(name: str) -> dict[str, Any]:
         raise KeyError(name)
     made = TypeAdapter(getattr(answers, _named(name).answer)).json_schema(mode="serialization")
     return {"$schema": _DRAFT, **made, "title": f"planfly {name} --json"}
+
+
+def answer_objects(schema: dict[str, Any]) -> list[dict[str, Any]]:
+    """The object that an answer is, by its schema; each of them, where options choose one.
+
+    >>> [one["properties"]["schema"]["const"] for one in answer_objects(answer_schema("check"))]
+    ['planfly.verdict/3', 'planfly.verdicts/1']
+    """
+    refs = [one["$ref"].rpartition("/")[2] for one in schema.get("anyOf", ())]
+    return [schema["$defs"][ref] for ref in refs] or [schema]
 
 
 def schema_text(name: str) -> str:

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
         _print_rounds(result)
     code = verdict_code(result.verdict)
     give_answer(args, lambda: _answer(result, bool(args.refine), code))
-    give_junit(args, result.verdict, result.scenario)
+    give_junit(args, {result.scenario: result.verdict})
     return code
 
 

@@ -190,6 +190,20 @@ def verdict_document(verdict: Verdict) -> VerdictDocument:
     return TypeAdapter(VerdictDocument).validate_python(json.loads(verdict_json(verdict)))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class VerdictsDocument:
+    """planfly check --for: whether a mission really flies, by each autopilot."""
+
+    schema: Literal["planfly.verdicts/1"] = "planfly.verdicts/1"
+    exit_code: int
+    mission: str
+    verdicts: dict[str, VerdictDocument]
+    """By the name of the autopilot's law."""
+
+
+CheckDocument = VerdictDocument | VerdictsDocument
+
+
 # ----------------------------------------------------------------------
 # What ``planfly aircraft`` answers with ``--json``.
 

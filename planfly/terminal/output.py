@@ -6,7 +6,7 @@ import io
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -225,10 +225,12 @@ def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) ->
         write_whole(Path(target), text)
 
 
-def give_junit(args: argparse.Namespace, verdict: "Verdict", name: str) -> None:
-    """Write a verdict as JUnit XML, where that was asked for.  name: of what was judged."""
+def give_junit(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:
+    """Write verdicts as JUnit XML, where that was asked for.  verdicts: by the name of what was judged."""
     if args.junit is not None:
-        write_whole(Path(args.junit), verdict.to_junit(name))
+        from logs.verdict.junit import junit_text
+
+        write_whole(Path(args.junit), junit_text(verdicts))
 
 
 def _refuse_inputs(target: Path, args: argparse.Namespace) -> None:

@@ -30,7 +30,7 @@ def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
         make_finding("slope", leg, ok=True, reason=""),
         make_finding("clearance", FLIGHT, ok=None, reason="no terrain"),
     )
-    made = cases(junit_text(verdict(*found, flyable=False, line="not flyable: slope"), "a & b.waypoints"))
+    made = cases(junit_text({"a & b.waypoints": verdict(*found, flyable=False, line="not flyable: slope")}))
     assert len(made) == 4
     failed, passed, unknown, answer = (
         made["planfly.slope", "leg 1, to item 3"],
@@ -47,5 +47,11 @@ def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
 @pytest.mark.parametrize(("flyable", "failures"), [(True, 0), (False, 1)])
 def test_what_was_not_judged_in_full_is_no_success(flyable: bool, failures: int) -> None:
     """Nothing failed, but slopes are within what is not known of the aircraft: exit code 3, and no green case."""
-    text = junit_text(verdict(flyable=flyable, line="not judged in full: slopes"), "m")
+    text = junit_text({"m": verdict(flyable=flyable, line="not judged in full: slopes")})
     assert len(list(ElementTree.fromstring(text).iter("failure"))) == failures
+
+
+def test_each_of_several_verdicts_is_a_suite() -> None:
+    text = junit_text({"m by a": verdict(flyable=True, line="flyable"), "m by b": verdict(flyable=False, line="no")})
+    suites = {suite.get("name"): suite.get("failures") for suite in ElementTree.fromstring(text)}
+    assert suites == {"m by a": "0", "m by b": "1"}

@@ -2,10 +2,12 @@
 
 import json
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
 from planfly.cli import main
+from tests.planfly.terminal.answers.checked_answers import validate
 
 MISSIONS = Path(__file__).parents[2] / "flight" / "missions"
 MISSION = """QGC WPL 110
@@ -166,7 +168,14 @@ def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest
     lines = MISSION.format(up=200).splitlines()
     lines[4:] = ["3\t0\t3\t16\t0\t0\t0\t0\t46.012\t8.02\t200\t1"]
     mission.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    assert main(["check", str(mission), "--for", "ardupilot,px4"]) == 4
+    written, junit = tmp_path / "both.json", tmp_path / "both.xml"
+    asked = ["--for", "ardupilot,px4", "--json", str(written), "--junit", str(junit)]
+    assert main(["check", str(mission), *asked]) == 4
+    answer = json.loads(written.read_text(encoding="utf-8"))
+    validate("check", answer)
+    assert {name: one["flyable"] for name, one in answer["verdicts"].items()} == {"ardupilot": True, "px4": False}
+    suites = {suite.get("name"): suite.get("failures") for suite in ElementTree.parse(junit).getroot()}
+    assert suites[f"{mission} by ardupilot"] == "0" < suites[f"{mission} by px4"]
     said = capsys.readouterr().out.splitlines()
     assert said[0].split() == ["ardupilot", "px4"]
     assert said[1].split() == ["verdict", "flyable", "not", "flyable"]

@@ -5,7 +5,7 @@ import json
 import jsonschema
 import pytest
 
-from planfly.commands.registry import answer_schema, answering_commands, build_parser, schema_text
+from planfly.commands.registry import answer_objects, answer_schema, answering_commands, build_parser, schema_text
 
 
 def test_every_command_with_json_has_a_schema_and_no_other() -> None:
@@ -17,14 +17,16 @@ def test_every_command_with_json_has_a_schema_and_no_other() -> None:
 def test_each_is_a_schema_that_asks_for_its_name(command: str) -> None:
     schema = answer_schema(command)
     jsonschema.Draft202012Validator.check_schema(schema)
-    assert "schema" in schema["required"]
-    assert schema["additionalProperties"] is False
+    for one in answer_objects(schema):
+        assert "schema" in one["required"]
+        assert one["additionalProperties"] is False
+        assert "planfly" in one["properties"]["schema"]["const"]
     assert json.loads(schema_text(command)) == schema
-    assert "planfly" in schema["properties"]["schema"]["const"]
 
 
 def test_no_two_answers_have_one_name() -> None:
-    names = [answer_schema(command)["properties"]["schema"]["const"] for command in answering_commands()]
+    objects = [one for command in answering_commands() for one in answer_objects(answer_schema(command))]
+    names = [one["properties"]["schema"]["const"] for one in objects]
     assert len(set(names)) == len(names)
 
 
