@@ -77,6 +77,11 @@ class ForwardForces:
 
     def predicted(self, unknown: Floats) -> tuple[Floats, Floats]:
         """Forward acceleration (n,), m/s^2, and current (n,), A, low-passed; unknown: parameters, then nuisances."""
+        force, current = self._raw(unknown)
+        return self.signals.smooth(force, FORCE_BAND), self.signals.smooth(current, FORCE_BAND)
+
+    def _raw(self, unknown: Floats) -> tuple[Floats, Floats]:
+        """Both as they are before the low-pass."""
         zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, of_elevator, *tilts = unknown
         motor = self.base.motor.changed(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
         signals = self.signals
@@ -85,17 +90,15 @@ class ForwardForces:
         )
         force = self.known + np.array([zero_lift, induced]) @ self.drags + (1.0 + of_elevator) * self.elevator + pull
         force = force + np.array(tilts) @ self.tilts
-        return signals.smooth(force / self.base.mass + bias, FORCE_BAND), signals.smooth(current, FORCE_BAND)
+        return force / self.base.mass + bias, current
 
     def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
         """(n, p) of both, by each of what is not known."""
-        force, current = self.predicted(unknown)
-        forces, currents = [], []
-        for step in _STEP * np.eye(len(unknown)):
-            more = self.predicted(unknown + step)
-            forces.append((more[0] - force) / _STEP)
-            currents.append((more[1] - current) / _STEP)
-        return np.column_stack(forces), np.column_stack(currents)
+        steps = _STEP * np.eye(len(unknown))
+        # One low-pass of all columns: a call of it costs far more than a column.
+        forces, currents = zip(*(self._raw(unknown + step) for step in (0.0 * steps[0], *steps)), strict=True)
+        force, current = (self.signals.smooth(np.column_stack(one), FORCE_BAND) for one in (forces, currents))
+        return (force[:, 1:] - force[:, :1]) / _STEP, (current[:, 1:] - current[:, :1]) / _STEP
 
 
 def fit_drag(
