@@ -24,6 +24,16 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures with nothing in them: drawing is most of what a description takes."""
+    from logs.views import aircraft, drawing
+
+    for name in ("draw_envelope", "draw_trims", "draw_steps"):
+        monkeypatch.setattr(aircraft, name, lambda *_: None)
+    monkeypatch.setattr(drawing, "png_bytes", lambda _: b"a picture")
+
+
 def test_without_a_name_it_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -58,6 +68,7 @@ def test_the_aerosonde_is_printed_and_drawn_as_it_is(tmp_path: Path, capsys: pyt
     assert [float(legs[25.0][k]) for k in (3, 4)] == pytest.approx([127.5, 220.8], abs=1.0)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", "aerosonde", "--motor-braking"]) == 0
     rows = _rows(capsys.readouterr().out, "steepest climb / descent to the air")
@@ -115,6 +126,7 @@ def test_arduplane_flies_the_cessna_at_equivalent_airspeeds() -> None:
     assert float(np.median(result.track.airspeed)) == pytest.approx(52.0, abs=1.0)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_new_folder_flies_as_the_aircraft_that_it_was_made_from(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", "--new", "./mine", "--from", "aerosonde"]) == 0
     assert "next      planfly aircraft ./mine" in capsys.readouterr().out
@@ -133,6 +145,7 @@ def test_a_new_folder_flies_as_the_aircraft_that_it_was_made_from(capsys: pytest
     assert track_digests(tracks[0]) == track_digests(tracks[1])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_gains_that_lack_or_are_broken_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", "--new", "mine"]) == 0
     gains = Path("mine/gains.toml")
