@@ -34,10 +34,8 @@ ABOVE_TERRAIN = {"mavproxy_terrain.txt"}
 # Flown without terrain, too: one of each end and each failure, and in make soak all that can be.
 FEW = {"by_hand.waypoints", "mission_planner_land.waypoints", "qgc_amsl.plan", "qgc_takeoff.plan"}
 WITHOUT = sorted(set(LEGS) - ABOVE_TERRAIN if SOAK else FEW)
-# And over terrain those that are not, and one of both.
-OVER = sorted(
-    LEGS if SOAK else {*LEGS} - FEW - {"endless.waypoints"} | {"by_hand.waypoints", "mission_planner.waypoints"}
-)
+# And over terrain those that are not.
+OVER = sorted(LEGS if SOAK else {*LEGS} - FEW - {"endless.waypoints"})
 
 
 def test_every_sample_is_listed() -> None:
@@ -94,7 +92,7 @@ def test_the_geometric_level_agrees(name: str, capsys: pytest.CaptureFixture[str
 
 def test_wind_turns_a_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A wind that leaves too little room or climb is told apart from calm air."""
-    name = str(MISSIONS / "qgc.waypoints")
+    name = str(MISSIONS / "mavproxy_terrain.txt")
     assert main(["fly", name, "--terrain", "jacksboro", "--log", str(tmp_path / "a.mcap")]) == 0
     windy = ["--wind", "9,250", "--turbulence", "moderate", "--seed", "4"]
     code = main(["fly", name, "--terrain", "jacksboro", "--log", str(tmp_path / "b.mcap"), *windy])
