@@ -51,6 +51,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     vehicle = Served(folder, "--scenario", "field.toml", "--speed", "50")
     yield vehicle
     assert vehicle.stop() == 0
+    assert not [line for line in vehicle.lines if line.startswith("frames dropped")]
 
 
 def test_a_served_flight_is_the_flight_of_fly_at_real_time(serve: Callable[..., Served]) -> None:
@@ -110,10 +111,9 @@ def test_a_mission_that_cannot_be_flown_is_armed_only_by_force(quick: Served) ->
     assert main(["check", str(max((quick.folder / "logs").iterdir()))]) == 4
 
 
-def test_a_station_without_heartbeats_uploads_floats_and_flies(serve: Callable[..., Served]) -> None:
+def test_a_station_without_heartbeats_uploads_floats_and_flies(quick: Served) -> None:
     """A script on this machine that knows only MISSION_ITEM; the flight starts at the item that it sets."""
-    vehicle = serve("--scenario", "field.toml", "--speed", "50")
-    with UdpStation(vehicle.port, mute=True) as station:
+    with UdpStation(quick.port, mute=True) as station:
         station.send(mavlink.MAVLink_mission_count_message(1, 1, len(LONG), 0))
         for k, one in enumerate(LONG):
             station.until(lambda m, k=k: m.get_type().startswith("MISSION_REQUEST") and m.seq == k)
@@ -128,9 +128,8 @@ def test_a_station_without_heartbeats_uploads_floats_and_flies(serve: Callable[.
         station.until(done)
         assert [m.seq for m in station.log if m.get_type() == "MISSION_ITEM_REACHED"] == [2, 3]
         assert "MISSION_ITEM_INT is exact" in station.texts()
-    assert vehicle.stop() == 0
-    assert not [line for line in vehicle.lines if line.startswith("frames dropped")]
-    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and m.text.startswith("log"))
+    log = read_log(max((quick.folder / "logs").iterdir()))
     assert [one.seq for one in log.setup.mission.items] == [2, 3]
 
 
@@ -164,10 +163,10 @@ def flown_until_a_power_cut(serve: Callable[..., Served], seed: int) -> tuple[Pa
     return vehicle.folder / f"logs-{seed}" / "flight-001.mcap", flown / 1000.0
 
 
-@pytest.mark.parametrize("first", range(0, scaled(200, 2), AT_ONCE))
+@pytest.mark.parametrize("first", range(0, scaled(200, 1), AT_ONCE))
 def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], first: int) -> None:
     """What is logged is exact, and no more than a second is lost; a few vehicles at once, since they mostly wait."""
-    seeds = range(first, min(first + AT_ONCE, scaled(200, 2)))
+    seeds = range(first, min(first + AT_ONCE, scaled(200, 1)))
     with ThreadPoolExecutor(AT_ONCE) as pool:
         found = list(pool.map(lambda seed: flown_until_a_power_cut(serve, seed), seeds))
     lost = []
@@ -219,6 +218,7 @@ def test_ctrl_c_in_flight_closes_the_log(serve: Callable[..., Served], tmp_path:
     assert log.ended == "stopped: the vehicle was shut down"
 
 
+@pytest.mark.skipif(not SOAK, reason="a stranger who attacks a signed link hears nothing either: in make soak")
 def test_a_key_shuts_strangers_out(serve: Callable[..., Served], tmp_path: Path) -> None:
     """A station that signs is served; one that does not is called by heartbeats alone."""
     key = bytes(range(32))
