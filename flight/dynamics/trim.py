@@ -60,11 +60,12 @@ class Engine:
         Without spin, only what follows its own derivative (the lift of a changing angle of attack) settles.
         """
         self._exec.set_dt(_SETTLE_STEP if spin else 0.0)
-        before = np.zeros(6)
+        before = [0.0] * 6
         for _ in range(_SETTLE_STEPS if spin else _RATE_STEPS):
             self._exec.run()
-            now = np.array([rate() for rate in self._rates])
-            if np.abs(now - before).max() < _SETTLED:
+            now = [rate() for rate in self._rates]
+            # Not by NumPy, which takes as long for six numbers as JSBSim for its step.
+            if all(abs(a - b) < _SETTLED for a, b in zip(now, before, strict=True)):
                 break
             before = now
         self._exec.set_dt(self._dt)
@@ -276,12 +277,14 @@ def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats
     # Not by NumPy, whose sines of processors with AVX-512 differ in the last digit from others'.
     ch, sh, cc, sc = math.cos(heading), math.sin(heading), math.cos(climb), math.sin(climb)
     cb, sb, ca, sa = math.cos(bank), math.sin(bank), math.cos(alpha), math.sin(alpha)
-    forward = np.array([ch * cc, sh * cc, -sc])
-    level_right = np.array([-sh, ch, 0.0])
-    level_down = np.array([ch * sc, sh * sc, cc])
-    right = cb * level_right + sb * level_down
-    down = cb * level_down - sb * level_right
-    return np.column_stack([ca * forward - sa * down, right, sa * forward + ca * down])
+    forward = (ch * cc, sh * cc, -sc)
+    level_right = (-sh, ch, 0.0)
+    level_down = (ch * sc, sh * sc, cc)
+    rows = []
+    for ahead, aside, below in zip(forward, level_right, level_down, strict=True):
+        down = cb * below - sb * aside
+        rows.append((ca * ahead - sa * down, cb * aside + sb * below, sa * ahead + ca * down))
+    return np.array(rows)
 
 
 def euler(axes: Floats) -> tuple[float, float, float]:
