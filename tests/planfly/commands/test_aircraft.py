@@ -10,6 +10,7 @@ import pytest
 import planfly
 from aircraft.catalog import load_aircraft
 from logs.recording.reader import read_log
+from logs.views import aircraft as drawn
 from planfly.cli import main
 from tests.authorities.make_digests import track_digests
 from tests.own_aircraft import write_mission, write_scenario
@@ -25,13 +26,10 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+def undrawn(monkeypatch: pytest.MonkeyPatch, unrendered: None) -> None:
     """Pictures with nothing in them: drawing is most of what a description takes."""
-    from logs.views import aircraft, drawing
-
     for name in ("draw_envelope", "draw_trims", "draw_steps"):
-        monkeypatch.setattr(aircraft, name, lambda *_: None)
-    monkeypatch.setattr(drawing, "png_bytes", lambda _: b"a picture")
+        monkeypatch.setattr(drawn, name, lambda *_: None)
 
 
 def test_without_a_name_it_lists_them(capsys: pytest.CaptureFixture[str]) -> None:

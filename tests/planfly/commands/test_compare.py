@@ -7,6 +7,7 @@ import pytest
 from planfly.cli import main
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_table_stands_alone_and_pictures_go_into_an_empty_folder(
     flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

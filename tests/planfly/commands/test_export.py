@@ -28,7 +28,7 @@ def plan_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def log_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("log") / "flight.mcap"
-    assert main(["fly", str(MISSIONS / "by_hand.waypoints"), "--log", str(file)]) == 0
+    assert main(["fly", str(MISSIONS / "by_hand.waypoints"), "--log", str(file), "--log-hz", "10"]) == 0
     return file
 
 

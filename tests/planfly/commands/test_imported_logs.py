@@ -276,6 +276,7 @@ def test_the_other_commands_take_an_imported_flight(tmp_path: Path, capsys: Outp
         assert ">nan" not in page
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_tables_pictures_and_a_log_of_the_models_flight(tmp_path: Path, capsys: Output) -> None:
     flight = tmp_path / "a.mcap"
     assert main(["import", str(dataflash(tmp_path / "a.BIN")), str(flight), "--aircraft", "aerosonde"]) == 0
@@ -294,6 +295,7 @@ def test_tables_pictures_and_a_log_of_the_models_flight(tmp_path: Path, capsys: 
     assert "not empty" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_each_stretch_has_its_tables_and_files_and_what_is_left_is_named(tmp_path: Path, capsys: Output) -> None:
     """AUTO to waypoint 2, by hand, AUTO from before it to the end; and half a second of AUTO between."""
     modes = ((20.0, 10), (40.0, 5), (60.0, 10), (60.5, 5), (68.0, 10))

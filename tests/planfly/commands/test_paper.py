@@ -7,9 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logs.views import drawing
+from logs.views.drawing import write_png
 from planfly.cli import main
 from planfly.paper import file_names
 from planfly.targets import prepare_folder
+from tests.soak import SOAK
 
 ROWS = ["umda", "umda-strip", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing"]
 STABLE = ("table.csv", "runs.csv", "runs.json", "paths-07.png", "encodings-07.png", "convergence.png")
@@ -47,10 +50,15 @@ def test_every_file_is_there_and_the_table_agrees_with_the_runs(folder: Path) ->
     assert [float(row["length_ratio"]) for row in rows] == [run["length_ratio"] for run in data["runs"]]
 
 
-def test_same_bytes_whatever_the_number_of_processes(folder: Path, tmp_path: Path) -> None:
+def test_same_bytes_whatever_the_number_of_processes(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not SOAK:
+        # Drawn of the plans that runs.json holds; the convergence, of more than that.
+        monkeypatch.setattr(drawing, "write_png", lambda figure, file: "conv" in file.name and write_png(figure, file))
     out = tmp_path / "again"
     assert main(["paper", "--problems", "7", "--runs", "2", "--jobs", "2", "--out", str(out)]) == 0
-    for name in STABLE:
+    for name in STABLE if SOAK else ("table.csv", "runs.csv", "runs.json", "convergence.png"):
         assert (out / name).read_bytes() == (folder / name).read_bytes(), name
 
 

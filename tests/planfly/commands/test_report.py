@@ -7,6 +7,7 @@ import pytest
 from planfly.cli import main
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_layout_is_written_alone_and_figures_as_svg_too(
     flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
