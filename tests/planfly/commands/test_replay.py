@@ -2,8 +2,8 @@
 
 import os
 import pty
-import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -11,33 +11,37 @@ import pytest
 from logs.recording.example_log import write_example_log
 from planfly.cli import main
 
-ROOT = Path(__file__).parents[3]
 
-
-def on_a_terminal(*argv: str, cwd: Path) -> tuple[int, str]:
+def on_a_terminal(*argv: str) -> tuple[int, str]:
     """Run planfly with its output on a pseudo-terminal: exit code and what it wrote."""
     ours, theirs = pty.openpty()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "planfly", *argv], cwd=cwd, stdout=theirs, stderr=subprocess.DEVNULL,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "90", "LINES": "40"},
-    )  # fmt: skip
-    os.close(theirs)
-    printed = b""
+    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(1) as pool:
+        reader = pool.submit(all_of, ours)
+        patch.setenv("COLUMNS", "90")
+        patch.setenv("LINES", "40")
+        with os.fdopen(theirs, "w", encoding="utf-8") as terminal:
+            patch.setattr(sys, "stdout", terminal)
+            code = main(list(argv))
+        return code, reader.result().decode()
+
+
+def all_of(terminal: int) -> bytes:
+    """What is written to a terminal until its other end closes."""
+    read = b""
     while True:
         try:
-            data = os.read(ours, 65536)
+            data = os.read(terminal, 65536)
         except OSError:  # the other end has closed
-            break
+            data = b""
         if not data:
-            break
-        printed += data
-    os.close(ours)
-    return process.wait(), printed.decode()
+            os.close(terminal)
+            return read
+        read += data
 
 
-def test_replay_on_a_terminal_shows_instruments(flight: Path, tmp_path: Path) -> None:
+def test_replay_on_a_terminal_shows_instruments(flight: Path) -> None:
     log = flight / "flight.mcap"
-    code, printed = on_a_terminal("replay", str(log), "--speed", "40", "--from", "10", "--to", "50", cwd=tmp_path)
+    code, printed = on_a_terminal("replay", str(log), "--speed", "40", "--from", "10", "--to", "50")
     assert code == 0
     assert printed.count("\x1b[H") >= 4
     # The terminal is as it was, and the last moment stays on it.
@@ -46,7 +50,7 @@ def test_replay_on_a_terminal_shows_instruments(flight: Path, tmp_path: Path) ->
     assert "\x1b" not in last
     assert "50.0 of" in last
     assert "airspeed" in last
-    code, printed = on_a_terminal("replay", str(log), "--at-once", cwd=tmp_path)
+    code, printed = on_a_terminal("replay", str(log), "--at-once")
     assert "\x1b" not in printed
     assert "leg 0 to waypoint 1" in printed
 
