@@ -13,6 +13,7 @@ import pytest
 
 from planfly.cli import main
 from tests.logs.blank_pictures import draw_nothing
+from tests.shared import made_once
 from tests.soak import at_most
 from tests.stopwatch import Stopwatch, processes_of
 
@@ -153,9 +154,17 @@ def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a short flight, its pictures blank: plan.json and flight.mcap of the scenario `tight`."""
     folder = tmp_path_factory.mktemp("flight") / "tight"
-    with pytest.MonkeyPatch.context() as patch:
-        draw_nothing(patch)
-        assert main(["run", "tight", "--out", str(folder)]) == 4
+
+    def files() -> dict[str, bytes]:
+        with pytest.MonkeyPatch.context() as patch:
+            draw_nothing(patch)
+            assert main(["run", "tight", "--out", str(folder)]) == 4
+        return {file.name: file.read_bytes() for file in folder.iterdir()}
+
+    made = made_once("tight-run", files)
+    folder.mkdir(exist_ok=True)
+    for name, data in made.items():
+        (folder / name).write_bytes(data)
     return folder
 
 

@@ -17,7 +17,7 @@ from world.scenario import Scenario, from_spec, load_scenario
 from world.scenario_file import parse_scenario
 
 RUNS = range(1, 1 + scaled(15, 2))
-INSTANCES = range(1, 1 + scaled(50, 3))
+INSTANCES = range(1, 1 + scaled(50, 2))
 
 
 def check_at_one_metre(plan: Plan) -> None:

@@ -54,23 +54,23 @@ def test_a_side_is_a_quarter_about_the_middle(aside: float, above: float, side: 
 def all_ways(data: ProblemArrays) -> list[tuple[float, tuple[tuple[int, int], ...]]]:
     """Cost and cells (across, layer) of all ways over the grid, by plain sums."""
     frame = rotated_frame(data.start, data.destination)
-    step, places = frame.length / GRID.stages, list(itertools.product(range(5), range(2)))
+    step, places, end = frame.length / GRID.stages, list(itertools.product(range(5), range(2))), (2, 0)
     obstacle = find_obstacles(data, frame, step)[0]
-    found = []
-    for inner in itertools.product(places, repeat=GRID.stages - 1):
-        way = ((2, 0), *inner, (2, 0))
-        total = 0.0
-        for stage, (before, after) in enumerate(itertools.pairwise(way), 1):
-            if abs(after[0] - before[0]) > SIDEWAYS:
-                break
-            at = stage * step, GRID.across[after[0]], GRID.layers[after[1]]
+    ways: list[tuple[float, tuple[tuple[int, int], ...]]] = [(0.0, (end,))]
+    for stage in range(1, GRID.stages + 1):
+        dear = {}
+        for place in places:
+            at = stage * step, GRID.across[place[0]], GRID.layers[place[1]]
             away = math.dist(at, (obstacle["along"], obstacle["across"], obstacle["up"]))
-            dear = 1.0 + (KILL_COST * (3.0 - 2.0 * away / obstacle["radius"]) if away < obstacle["radius"] else 0.0)
-            length = math.hypot(step, step * (after[0] - before[0]), 300.0 * (after[1] - before[1]))
-            total += dear * length
-        else:
-            found.append((total, way))
-    return found
+            inside = away < obstacle["radius"]
+            dear[place] = 1.0 + (KILL_COST * (3.0 - 2.0 * away / obstacle["radius"]) if inside else 0.0)
+        ways = [
+            (total + dear[to] * math.hypot(step, step * (to[0] - way[-1][0]), 300.0 * (to[1] - way[-1][1])), (*way, to))
+            for total, way in ways
+            for to in (places if stage < GRID.stages else [end])
+            if abs(to[0] - way[-1][0]) <= SIDEWAYS
+        ]
+    return ways
 
 
 def test_each_side_is_passed_as_cheaply_as_by_the_best_of_all_ways(data: ProblemArrays) -> None:
