@@ -15,12 +15,16 @@ from logs.recording.reader import read_log
 from planfly.cli import main
 
 ROOT = Path(__file__).parents[3]
-MISSIONS = Path(__file__).parents[2] / "flight" / "missions"
+SHORT = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t0\t1
+1\t0\t3\t16\t0\t0\t0\t0\t46.0\t8.0\t100\t1
+2\t0\t3\t16\t0\t0\t0\t0\t46.005\t8.0\t100\t1
+"""
 
 
 def test_aircraft_and_airspeed_replace_the_scenarios(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    name = str(MISSIONS / "by_hand.waypoints")
-    log = tmp_path / "f.mcap"
+    name, log = str(tmp_path / "short.waypoints"), tmp_path / "f.mcap"
+    Path(name).write_text(SHORT, encoding="ascii")
     assert main(["fly", name, "--aircraft", "aerosonde", "--airspeed", "21", "--log", str(log)]) == 0
     assert (read_log(log).setup.route.airspeed == 21.0).all()
     # The next step is a line that a shell takes as it stands.
