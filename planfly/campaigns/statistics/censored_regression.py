@@ -367,7 +367,8 @@ class _Posterior:
     def log_density(self, points: Floats) -> Floats:
         """(n,) at n points, but for what no coefficient changes."""
         beta, off, failed = self.coefficients(points), points - self._middle, self._outcomes.failed
-        x, bare = self._terms @ beta.T, self._outcomes.terms @ beta[:, : self.size].T
+        x = self._terms @ beta.T
+        bare = self._outcomes.terms @ beta[:, : self.size].T if self.by_margin else x
         # As good as impossible, and of its logarithm's own size nothing is left of what is added to it.
         possible = (bare[~failed] < _MAX_PREDICTOR).all(axis=0)
         x, bare = np.where(possible, x, 0.0), np.where(possible, bare, 0.0)

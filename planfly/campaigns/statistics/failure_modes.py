@@ -8,7 +8,7 @@ or not ways come together: the chain rule.
 """
 
 from collections import Counter
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,7 +118,7 @@ class FailureMode:
     """One way of failing.
 
     mean, covariance: (2 + d,) and (2 + d, 2 + d) of its coefficients, as those of the terms it was fitted to.
-    sample: (s, 2 + d) of what the coefficients may be, each as likely as the other.
+    sample: gives (s, 2 + d) of what the coefficients may be, each as likely as the other; rarely needed.
     log_evidence: of what came out, by this link.
     by_margin: by how much the predictor falls for a scale of margin; 0 where margins say nothing of failing.
     """
@@ -126,7 +126,7 @@ class FailureMode:
     link: BinaryLink
     mean: Floats
     covariance: Floats
-    sample: Floats
+    sample: Callable[[], Floats]
     log_evidence: float
     by_margin: float = 0.0
 
@@ -158,7 +158,7 @@ def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> 
 
 
 def _mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
-    return FailureMode(link, fit.mean, fit.covariance, fit.sample(), log_evidence, fit.by_margin)
+    return FailureMode(link, fit.mean, fit.covariance, fit.sample, log_evidence, fit.by_margin)
 
 
 # Winds are counted from here, m/s, where the constant's prior is meant.

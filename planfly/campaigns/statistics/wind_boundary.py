@@ -60,7 +60,7 @@ def boundary_quantiles(
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> sample = np.column_stack((np.linspace(-0.1, 0.1, 101), np.full(101, 0.5)))
-    >>> mode = FailureMode(PROBIT, sample.mean(axis=0), np.cov(sample.T), sample, 0.0)
+    >>> mode = FailureMode(PROBIT, sample.mean(axis=0), np.cov(sample.T), lambda: sample, 0.0)
     >>> modes = [WeightedModes((mode,), 1.0)]
     >>> [round(one, 1) for one in boundary_quantiles(modes, np.zeros((1, 0)), 0.5, 20.0, (0.5,))]
     [10.0]
@@ -79,7 +79,7 @@ def _boundaries(modes: Sequence[FailureMode], draws: Floats, share: float, most:
     """(n,) of each sample, m/s."""
     # The modes are known apart from each other: any one's samples go with any of another's.
     samples = [
-        np.random.default_rng(number).permutation(mode.sample) if number else mode.sample
+        np.random.default_rng(number).permutation(mode.sample()) if number else mode.sample()
         for number, mode in enumerate(modes)
     ]
     few, every = (_Shares(modes, samples, some) for some in (draws[:_FEW], draws))

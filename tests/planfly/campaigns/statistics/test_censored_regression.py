@@ -290,7 +290,7 @@ def test_the_evidence_of_margins_is_the_integral_over_the_prior() -> None:
     failed = margin < 0.0
     terms = np.column_stack((np.ones(200), np.zeros(200)))
     outcomes = Outcomes(terms, failed, margin.clip(0.0, 1.0))
-    a, k = np.meshgrid(np.arange(-2.0, 0.0, 0.005), np.arange(1.0, 3.5, 0.005), indexing="ij")
+    a, k = np.meshgrid(np.arange(-2.0, 0.0, 0.01), np.arange(1.0, 3.5, 0.01), indexing="ij")
     # The wind's coefficient integrates to 1 over its prior.
     fails, passes = (norm.logpdf(a, scale=20.0) + norm.logpdf(k, scale=10.0) for _ in range(2))
     for one in margin:
@@ -299,9 +299,9 @@ def test_the_evidence_of_margins_is_the_integral_over_the_prior() -> None:
         passes += 0.0 if one < 0.0 else by_so_much - norm.logsf(a)
     fit = fit_regression(outcomes, PROBIT)
     assert fit.by_margin == pytest.approx(2.0, rel=0.15)
-    assert fit.log_evidence == pytest.approx(logs_sum(fails, 0.005 * 0.005), abs=0.1)
+    assert fit.log_evidence == pytest.approx(logs_sum(fails, 0.01 * 0.01), abs=0.1)
     alone = fit_regression(outcomes.only_margin(), PROBIT)
-    assert alone.log_evidence == pytest.approx(logs_sum(passes, 0.005 * 0.005), abs=0.3)
+    assert alone.log_evidence == pytest.approx(logs_sum(passes, 0.01 * 0.01), abs=0.3)
 
 
 def logs_sum(logs: Floats, cell: float) -> float:

@@ -187,7 +187,7 @@ def test_the_way_in_which_most_failed_comes_first() -> None:
 
 
 def mode_of(beta: np.ndarray, link: BinaryLink = PROBIT) -> FailureMode:
-    return FailureMode(link, beta, np.eye(beta.size), beta[None], 0.0)
+    return FailureMode(link, beta, np.eye(beta.size), lambda: beta[None], 0.0)
 
 
 def test_the_boundary_is_where_that_share_fails() -> None:

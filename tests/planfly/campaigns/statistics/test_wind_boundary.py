@@ -29,7 +29,7 @@ PARTS = (0.025, 0.5, 0.975)
 def one_mode(mean: list[float], deviations: list[float], link: BinaryLink = PROBIT, count: int = 4096) -> FailureMode:
     """Coefficients that are normal and independent; the wind's from 10 m/s on."""
     sample = np.random.default_rng(1).normal(mean, deviations, size=(count, len(mean)))
-    return FailureMode(link, np.array(mean), np.diag(deviations) ** 2, sample, 0.0)
+    return FailureMode(link, np.array(mean), np.diag(deviations) ** 2, lambda: sample, 0.0)
 
 
 def alone(mode: FailureMode) -> list[WeightedModes]:
@@ -42,7 +42,7 @@ def test_quantiles_are_those_of_the_samples_boundaries(link: BinaryLink, share: 
     """Of a constant and a wind's coefficient, from 10 m/s on: boundary = 10 + (limit - a) / b."""
     limit = norm.ppf(share) if link is PROBIT else np.log(-np.log(1.0 - share))
     mode = one_mode([-4.0, 0.6], [0.4, 0.08], link)
-    a, b = mode.sample.T
+    a, b = mode.sample().T
     expected = np.quantile(np.clip(10.0 + (limit - a) / b, 0.0, most), PARTS)
     assert boundary_quantiles(alone(mode), NOTHING, share, most, PARTS) == pytest.approx(expected, abs=0.02)
 
@@ -162,8 +162,8 @@ def test_narrow_passes_that_no_failing_follows_from_do_not_move_it() -> None:
     found = []
     for seed in range(scaled(20, 1)):
         direction, random = Direction(20.0, 0.99, normal_numbers(3, seed)), np.random.default_rng(seed)
-        for _ in range(50):
-            for speed, draw in next_flights(direction, 6):
+        for _ in range(25):
+            for speed, draw in next_flights(direction, 12):
                 drawn = direction.numbers.first(draw + 1)[draw]
                 failed = drawn[0] + 0.1 * random.normal() > 2.0 - 0.25 * (speed - 10.0)
                 margin = abs(random.normal(0.8, 0.2))
@@ -220,7 +220,7 @@ def _summed(counts: dict[float, tuple[int, int]]) -> list[float]:
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("seed", range(scaled(500, 20)))
+@pytest.mark.parametrize("seed", range(scaled(500, 10)))
 def test_any_flights_have_an_answer(seed: int) -> None:
     """Of few flights or many, that fail by chance, by wind, against it, by a draw or once; in one way or several."""
     random = np.random.default_rng(seed)

@@ -70,7 +70,7 @@ def fit_of(*betas: list[float], weight: float = 1.0, speed: float = 12.0) -> Fai
     for beta in betas:
         root = 0.3 * random.normal(size=(len(beta), len(beta)))
         mean = np.array(beta)
-        modes.append(FailureMode(PROBIT, mean, root @ root.T + 0.05 * np.eye(len(beta)), mean[None], 0.0))
+        modes.append(FailureMode(PROBIT, mean, root @ root.T + 0.05 * np.eye(len(beta)), mean[None].copy, 0.0))
         slopes.append(random.normal(size=len(beta)))
     return FailureFit(tuple(modes), weight, speed, slopes)
 
