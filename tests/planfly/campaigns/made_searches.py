@@ -13,6 +13,7 @@ from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open
 from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, AskedFlight, narrow_passes_of, row_of
 from planfly.campaigns.worker_pool import FlightRequest, Flown, FlyOne, Workers
 from tests.planfly.campaigns.made_campaigns import made_flight, table
+from tests.soak import SOAK
 
 GOAL = WindsGoal(0.9, 0.95, 4, 20.0, 400)
 
@@ -31,7 +32,7 @@ class HerePilots:
 
 @contextmanager
 def flying_here() -> Iterator[None]:
-    """Fly without workers."""
+    """Fly without workers; outside the soak, fewer points stand for all that may be drawn."""
 
     @contextmanager
     def hired(_workers: Workers, base: CampaignBase, fly: FlyOne) -> Iterator[HerePilots]:
@@ -39,6 +40,8 @@ def flying_here() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(find_winds_module, "worker_pool", hired)
+        if not SOAK:
+            patch.setattr(find_winds_module, "_POPULATION", 512)
         yield
 
 

@@ -41,7 +41,7 @@ from tests.soak import SOAK, note, scaled, some
 
 pytestmark = pytest.mark.filterwarnings("default")
 LEG = Place("leg", 3)
-FEWER = WindsGoal(0.9, 0.95, 4, 20.0, 200)
+FEWER = WindsGoal(0.9, 0.95, 4 if SOAK else 2, 20.0, scaled(200, 96))
 
 
 @pytest.fixture(scope="module")
@@ -65,14 +65,15 @@ def whole(wind_base: CampaignBase, tmp_path_factory: pytest.TempPathFactory) -> 
 
 @pytest.mark.usefixtures("here")
 def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_path: Path) -> None:
-    found = searched(wind_base, tmp_path)
+    goal = replace(GOAL, flights=scaled(400, 240))
+    found = searched(wind_base, tmp_path, goal)
     # A flight fails from W + luck - 0.5 on, luck even in 0..1: one in ten has failed at W - 0.4.
     truth = [7.6, 7.6, 7.6, 11.6]
     for direction, boundary in enumerate(found.boundaries):
         assert boundary.estimate == pytest.approx(truth[direction], abs=0.5)
         assert boundary.low <= boundary.estimate <= boundary.high
         assert not boundary.beyond
-    assert len(found.flights) <= 400
+    assert len(found.flights) <= goal.flights
     assert found.from_deg(3) == 270.0
     assert found.lost == ()
     # No draw is flown twice in a direction, and those of least index are among them.
@@ -93,7 +94,7 @@ def flight_that_states_its_margin(base: CampaignBase, index: int, wind: GivenWin
 @pytest.mark.usefixtures("here")
 def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: CampaignBase, tmp_path: Path) -> None:
     """As many flights; and what is told is still there when the search goes on."""
-    goal = replace(GOAL, flights=120)
+    goal = replace(GOAL, directions=4 if SOAK else 2, flights=scaled(120, 60))
     told = searched(wind_base, tmp_path / "told", goal, fly=flight_that_states_its_margin)
     bare = searched(wind_base, tmp_path / "bare", goal)
     for wise, bare_one in zip(told.boundaries, bare.boundaries, strict=True):
