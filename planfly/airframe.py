@@ -1,6 +1,7 @@
 """The aircraft of a scenario and the limits it flies within: what a plan needs of it, without simulation and logs."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from aircraft.catalog import Aircraft, find_aircraft, model_hash
@@ -46,11 +47,12 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
     return scenario.planner.seed if scenario.planner.seed is not None else 1
 
 
-def load_airframe(scenario: Scenario) -> Airframe:
+def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = None) -> Airframe:
     """The scenario's aircraft, its envelope, and the limits that both set.
 
+    parameters: of its autopilot, by the autopilot's names and in its units, in place of those that its file states.
     Raises ScenarioError for an unknown aircraft or autopilot, or a speed that the aircraft cannot fly, and
-    ParameterError for a bad file of an autopilot's parameters.
+    ParameterError for a bad file of an autopilot's parameters, or values that are not allowed.
 
     >>> from world.scenario import load_scenario
     >>> airframe = load_airframe(load_scenario("tight"))
@@ -60,6 +62,9 @@ def load_airframe(scenario: Scenario) -> Airframe:
     table = scenario.flight
     aircraft, battery = find_airframe(scenario)
     autopilot = load_autopilot(scenario, aircraft)
+    if parameters:
+        # What a log stores is checked as a file is.
+        autopilot = autopilot.restore(autopilot.with_parameters(**parameters).store())
     airspeed = _airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     limits = make_limits(scenario, envelope, airspeed, bank_limit(scenario, autopilot))

@@ -24,7 +24,7 @@ from planfly.targets import prepare_folder, refuse_folder
 from planner.plan import Objective, Violation
 from planner.search.algorithms import find_algorithm
 from world.files import hold, write_whole
-from world.interruption import children_ignore_sigint, end_children, end_with_parent
+from world.interruption import children_ignore_sigint, end_children, end_with_parent, uninterrupted
 from world.scenario import Scenario, load_scenario, with_planner
 
 Floats = NDArray[np.float64]
@@ -186,7 +186,7 @@ def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPl
     pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=end_with_parent)
     try:
         # All of them are started here.
-        with children_ignore_sigint():
+        with children_ignore_sigint(), uninterrupted():
             results = pool.map(_plan_task, tasks[1:])
         yield from results
     except BaseException:

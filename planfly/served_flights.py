@@ -4,25 +4,41 @@ import contextlib
 import math
 import signal
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.live.flight_process import (
+    HELD_ON,
+    LEFT_FOR,
+    DivertFlight,
     FlightJudged,
     JudgeMission,
     MissionJudged,
+    Place,
     PreparedFlight,
     ProcessReady,
     send_event,
     serve_flights,
 )
-from flight.live.telemetry import CRITICAL, INFO, NOTICE, WARNING, SnapshotMaker, StatusText
+from flight.live.telemetry import (
+    AUTO,
+    CRITICAL,
+    INFO,
+    MODE_NAMES,
+    NOTICE,
+    RTL,
+    WARNING,
+    SnapshotMaker,
+    StatusText,
+)
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight
 from flight.simulation.track import Track, as_track, join_tracks
@@ -39,7 +55,11 @@ from world.frames import to_geo
 from world.interruption import end_with_parent
 from world.scenario import Scenario, at_time, load_scenario, with_flight
 
+Floats = NDArray[np.float64]
+
 DEFAULT_SCENARIO = "jacksboro"
+# How long LOITER and GUIDED circle in one log, s: a circle's laps are laid out, and judged, one by one.
+HELD = 900.0
 # Most texts about one verdict; the log has the rest.
 _MAX_TEXTS = 4
 
@@ -93,6 +113,18 @@ def open_served(options: ServeOptions) -> ServedScenario:
     return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, None), None)
 
 
+def flown_parameters(scenario: Scenario, stated: Mapping[str, float]) -> dict[str, float]:
+    """What the law of a scenario's autopilot flies with, by name, where some of it is stated.
+
+    The cruise airspeed is the one that is flown.  Raises PlanflyError for values that are not allowed.
+    """
+    airframe = load_airframe(scenario, stated)
+    parameters = airframe.autopilot.parameters
+    values = {} if parameters is None else {one.name: one.value for one in parameters.values}
+    cruise = airframe.autopilot.cruise_parameter
+    return values | {cruise: airframe.airspeed} if cruise in values else values
+
+
 def fly_process(connection: Connection, options: ServeOptions) -> None:
     """Run the process that flies."""
     in_service = threading.Event()
@@ -115,7 +147,10 @@ class ServedFlights:
     def __init__(self, options: ServeOptions) -> None:
         self._served = open_served(options)
         self._logs = options.logs
-        self.aircraft = self._served.airframe.aircraft
+        # With the parameters that the mission was judged with last.
+        self._airframe = self._served.airframe
+        self._parameters: tuple[tuple[str, float], ...] = ()
+        self.aircraft = self._airframe.aircraft
         self.speed = options.speed
 
     def warm(self) -> None:
@@ -129,7 +164,7 @@ class ServedFlights:
             for k, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
         )
         with contextlib.suppress(PlanflyError):
-            setup = make_setup(scenario, self._served.airframe, Mission(None, items), self._served.seed)
+            setup = make_setup(scenario, self._airframe, Mission(None, items), self._served.seed)
             judge_geometry(setup)
             rows, _ = Flight(setup, self.aircraft).block(30)
             judge_flight(setup, as_track(rows), "warm")
@@ -138,7 +173,10 @@ class ServedFlights:
         """Judge a mission on its geometry, and see that it can be started."""
         served = self._served
         try:
-            setup = make_setup(served.scenario, served.airframe, request.mission, served.seed)
+            if request.parameters != self._parameters:
+                self._airframe = load_airframe(served.scenario, dict(request.parameters))
+                self._parameters = request.parameters
+            setup = make_setup(served.scenario, self._airframe, request.mission, served.seed)
             # Its first tick says whether it can start, and has the loop compiled.
             flight = Flight(setup, self.aircraft)
             flight.block(1)
@@ -155,7 +193,23 @@ class ServedFlights:
         judged = MissionJudged(request.number, True, verdict.flyable, texts, home, items, start)
         return PreparedFlight(setup, flight.map), judged
 
-    def open_log(self, setup: FlightSetup) -> "ServedLog":
+    def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
+        """The way that a station asks for, from where the aircraft is; it circles for `HELD`."""
+        served = self._served
+        lat, lon = (on_grid(float(value)) for value in to_geo(served.scenario.origin, here[0], here[1]))
+        none = (0.0, 0.0, 0.0, 0.0)
+        begin = MissionItem(-1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), none, lat, lon, float(here[2]))
+        if request.mode == AUTO:
+            items = request.mission.items
+        elif request.mode == RTL:
+            items = (MissionItem(0, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), none, 0.0, 0.0, 0.0),)
+        else:
+            items = (_circled(begin, request.place),)
+        mission = replace(request.mission, items=(begin, *items), source=MODE_NAMES[request.mode])
+        setup = make_setup(served.scenario, self._airframe, mission, served.seed)
+        return PreparedFlight(setup, LocalMap.around(setup))
+
+    def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":
         """Open the next free ``flight-NNN.mcap``."""
         self._logs.mkdir(parents=True, exist_ok=True)
         number = 1
@@ -166,14 +220,29 @@ class ServedFlights:
                 break
             except FileExistsError:
                 number += 1
-        return ServedLog(path, setup, self.aircraft)
+        return ServedLog(path, setup, self.aircraft, mode)
+
+
+def _circled(here: MissionItem, place: Place) -> MissionItem:
+    """A circle about a place, of which what is not named is that of here."""
+    located = math.isfinite(place.lat_deg) and math.isfinite(place.lon_deg)
+    height = replace(here, frame=place.frame, alt=place.alt) if math.isfinite(place.alt) else here
+    return replace(
+        height,
+        seq=0,
+        command=int(Command.NAV_LOITER_TIME),
+        params=(HELD, 0.0, place.radius, 0.0),
+        lat_deg=on_grid(place.lat_deg) if located else here.lat_deg,
+        lon_deg=on_grid(place.lon_deg) if located else here.lon_deg,
+    )
 
 
 class ServedLog:
     """The log of one served flight."""
 
-    def __init__(self, path: Path, setup: FlightSetup, aircraft: Aircraft) -> None:
+    def __init__(self, path: Path, setup: FlightSetup, aircraft: Aircraft, mode: int) -> None:
         self._path, self._setup, self._aircraft = path, setup, aircraft
+        self._level = "flown" if mode == AUTO else f"flown in {MODE_NAMES[mode]}"
         self._recorder = Recorder(path, setup)
         self._blocks: list[Track] = []
 
@@ -191,9 +260,11 @@ class ServedLog:
         else:
             verdict, reference = judge_flight(self._setup, track, ended), None
         end = float(track.time[-1]) if len(track) else 0.0
-        self._recorder.event(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
+        left = ended.startswith((LEFT_FOR, HELD_ON))
+        self._recorder.event(end, f"flight ended: {ended}", "info" if left or ended == "completed" else "error")
         self._recorder.finish(ended, verdict, reference)
-        return FlightJudged(verdict.flyable, (*verdict_texts("flown", verdict), StatusText(f"log {self._path}", INFO)))
+        texts = left_texts(self._level, ended, verdict) if left else verdict_texts(self._level, verdict)
+        return FlightJudged(verdict.flyable, (*texts, StatusText(f"log {self._path}", INFO)))
 
     def abandon(self) -> None:
         """Close the log as it is."""
@@ -209,6 +280,17 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
     return (size, *verdict_texts("geometry", verdict), *notes)
 
 
+# What fails of a way because the aircraft was sent on before its end.
+_UNFINISHED = ("completion", "waypoint", "turn", "survey")
+
+
+def left_texts(level: str, ended: str, verdict: Verdict) -> tuple[StatusText, ...]:
+    """The verdict on a way that the aircraft was sent on from, on what was flown of it."""
+    failed = [item for item in verdict.findings if item.ok is False and item.rule not in _UNFINISHED]
+    first = StatusText(f"verdict ({level}): {ended}; {len(failed) or 'no'} findings failed until then", INFO)
+    return (first, *_failed_texts(failed))
+
+
 def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
     """A verdict in a few lines, the worst first."""
     failed = [finding for finding in verdict.findings if finding.ok is False]
@@ -217,10 +299,14 @@ def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
     if verdict.undecided:
         return (StatusText(f"verdict ({level}): NOT JUDGED IN FULL: {verdict.unjudged}", WARNING),)
     deciding = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
+    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *deciding, *_failed_texts(failed))
+
+
+def _failed_texts(failed: list[Finding]) -> list[StatusText]:
     lines = [StatusText(f"{_heading(item)}: {item.reason}", WARNING) for item in failed[:_MAX_TEXTS]]
     if len(failed) > _MAX_TEXTS:
         lines.append(StatusText(f"and {len(failed) - _MAX_TEXTS} more findings", WARNING))
-    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *deciding, *lines)
+    return lines
 
 
 def _heading(item: Finding) -> str:

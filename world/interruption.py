@@ -130,7 +130,8 @@ def _remove(path: Path) -> bool:
 def children_ignore_sigint() -> Iterator[None]:
     """Processes that are started inside never hear Ctrl-C, which reaches all of a terminal's: their parent ends them.
 
-    A signal that comes meanwhile is not lost: this process hears it at the end.
+    A signal that comes meanwhile is not lost: this process hears it at the end.  A start that another signal cuts short
+    leaves a child that waits for its task and ends with a traceback: `uninterrupted` goes beside it.
 
     >>> from multiprocessing import Process
     >>> with children_ignore_sigint():

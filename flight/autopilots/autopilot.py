@@ -180,6 +180,7 @@ class Autopilot(ABC):
     parameters: None for an autopilot that has none.
     program: that flew it, None for a law and before the flight.
     own: type of the record that its law keeps beside `flight.guidance.inner_loops.GUIDANCE_MEMORY`; None for none.
+    cruise_parameter: that states its cruise airspeed; "" for none.
     equivalent_airspeeds: whether commanded airspeeds count as equivalent ones, which are less than true ones at height;
     it then takes over in level flight.
     refuses: whether it takes no mission that PX4's feasibility checks refuse.
@@ -192,6 +193,7 @@ class Autopilot(ABC):
     title: ClassVar[str]
     level: ClassVar[Level] = "autopilot"
     own: ClassVar[np.dtype[np.record] | None] = None
+    cruise_parameter: ClassVar[str] = ""
     equivalent_airspeeds: ClassVar[bool] = False
     refuses: ClassVar[bool] = False
     speeds_by_value: ClassVar[bool] = False
@@ -258,6 +260,14 @@ class Autopilot(ABC):
         """Set what its law needs to know before the first tick.
 
         memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.  own: of the type `own`, None where that is None.
+        """
+        return
+
+    def take_over(self, before: Record, own: Record, here: Floats) -> None:
+        """Begin another way where the aircraft is, and keep what the law has learnt of the aircraft.
+
+        before: the record that the law kept on the way it was on.  own: the one for this way, which `begin` has seen.
+        here: (3,) where it begins, m.
         """
         return
 
@@ -332,7 +342,8 @@ class Autopilot(ABC):
     @property
     def stated_airspeed(self) -> tuple[float, str] | None:
         """Cruise airspeed (m/s) that a person's file of parameters states, and the parameter; None for none."""
-        return None
+        stated = {} if self.parameters is None else self.parameters.by_origin("file")
+        return (stated[self.cruise_parameter], self.cruise_parameter) if self.cruise_parameter in stated else None
 
     @property
     def stated_bank(self) -> float | None:

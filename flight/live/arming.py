@@ -4,14 +4,25 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.flight_process import MissionJudged
-from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, LOITER, MANUAL, MODE_NAMES, NO_MISSION, NOT_STARTED
+from flight.live.flight_process import MissionJudged, Place
+from flight.live.telemetry import (
+    ACTIVE,
+    AUTO,
+    COMPLETE,
+    GUIDED,
+    LOITER,
+    MANUAL,
+    MODE_NAMES,
+    NO_MISSION,
+    NOT_STARTED,
+    PAUSED,
+    RTL,
+)
 
 # param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it: MAVLink's number, and the one that MAVProxy sends to arm.
 _FORCED = (21196, 2989)
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 IN_PROGRESS, UNSUPPORTED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_UNSUPPORTED
-REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +42,7 @@ class ArmingState:
     judged: the last verdict; None without a mission.
     force: PFLY_FORCE.
     end_requested: the flight is to be ended.
+    place: where the flight that goes on is to be diverted to by its new mode; None for no such wish.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
@@ -41,6 +53,7 @@ class ArmingState:
     judged: MissionJudged | None = None
     force: bool = False
     end_requested: bool = False
+    place: Place | None = None
     mission_state: int = NO_MISSION
 
     @property
@@ -81,11 +94,11 @@ class ArmingState:
         if mode not in MODE_NAMES:
             known = mavlink.enums["PLANE_MODE"].get(mode)
             name = known.name.removeprefix("PLANE_MODE_") if known else f"mode {mode}"
-            return CommandResult(DENIED, f"{name} denied: this vehicle has MANUAL, LOITER and AUTO")
-        if self.flying and mode != AUTO:
-            return CommandResult(
-                DENIED, f"{MODE_NAMES[mode]} denied: in flight only AUTO; a forced disarm ends the flight"
-            )
+            return CommandResult(DENIED, f"{name} denied: this vehicle has {', '.join(MODE_NAMES.values())}")
+        if self.flying:
+            return self._divert(mode)
+        if mode in (RTL, GUIDED):
+            return CommandResult(DENIED, f"{MODE_NAMES[mode]} denied: not in flight")
         if mode == AUTO and self.judged is None and not self.judging:
             return CommandResult(DENIED, "AUTO denied: no mission")
         self.mode = mode
@@ -98,10 +111,36 @@ class ArmingState:
         return self.set_mode(AUTO)
 
     def pause(self, goes_on: bool) -> CommandResult:
-        """MAV_CMD_DO_PAUSE_CONTINUE: a flight cannot be paused."""
-        if goes_on:
-            return CommandResult(ACCEPTED)
-        return CommandResult(DENIED, "pause denied: a flight is evidence only if it is flown through")
+        """MAV_CMD_DO_PAUSE_CONTINUE: circle where the aircraft is, or go on with the mission."""
+        if self.flying:
+            return self._divert(AUTO if goes_on else LOITER)
+        return CommandResult(ACCEPTED) if goes_on else CommandResult(DENIED, "pause denied: not in flight")
+
+    def go_to(self, place: Place) -> CommandResult:
+        """Fly to a place and circle there, in GUIDED."""
+        if not self.flying:
+            return CommandResult(DENIED, "go-to denied: not in flight")
+        self.mode, self.place = GUIDED, place
+        self.mission_state = PAUSED
+        return CommandResult(ACCEPTED)
+
+    def restart_mission(self) -> None:
+        """Fly the mission on from the item that was set in flight."""
+        self.place = Place()
+
+    def diverted(self, mode: int) -> None:
+        """The flight is in this mode now."""
+        self.mode = mode
+        self.mission_state = ACTIVE if mode == AUTO else PAUSED
+
+    def _divert(self, mode: int) -> CommandResult:
+        """Fly on in another mode; the one that is flown stays as it is."""
+        if mode == MANUAL:
+            return CommandResult(DENIED, "MANUAL denied: nobody has the sticks; a forced disarm ends the flight")
+        if mode != self.mode:
+            self.diverted(mode)
+            self.place = Place()
+        return CommandResult(ACCEPTED)
 
     def mission_uploaded(self) -> None:
         """A mission has come and is being judged."""
@@ -131,8 +170,8 @@ class ArmingState:
     def flight_ended(self, completed: bool) -> None:
         """The flight is over: disarmed, ready to be flown again."""
         self.flying = self.armed = self.end_requested = False
-        self.mode = MANUAL
-        self.mission_state = COMPLETE if completed else NOT_STARTED
+        self.mission_state = COMPLETE if completed and self.mode == AUTO else NOT_STARTED
+        self.mode, self.place = MANUAL, None
 
     def _why_not_armed(self, forced: bool) -> str:
         if self.judged is None:
@@ -144,4 +183,4 @@ class ArmingState:
         return ""
 
 
-__all__ = ["ACCEPTED", "DENIED", "IN_PROGRESS", "LOITER", "REJECTED", "UNSUPPORTED", "ArmingState", "CommandResult"]
+__all__ = ["ACCEPTED", "DENIED", "IN_PROGRESS", "LOITER", "UNSUPPORTED", "ArmingState", "CommandResult"]

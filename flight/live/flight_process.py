@@ -7,6 +7,7 @@ are ours; nothing that a station sends is ever unpickled.
 |---|---|
 | `JudgeMission` | a verdict on a mission, without a flight |
 | `StartFlight` | the flight of the mission that was judged last |
+| `DivertFlight` | another way from where the aircraft is, in the flight that goes on |
 | `EndFlight` | the end of the flight, or of the process |
 
 | event | when it is sent |
@@ -14,26 +15,35 @@ are ours; nothing that a station sends is ever unpickled.
 | `ProcessReady` | once, before the first request is read |
 | `MissionJudged` | for each `JudgeMission` |
 | `flight.live.telemetry.Snapshot` | in flight, `SNAPSHOT_RATE` times a second |
+| `FlightDiverted` | for each `DivertFlight` in flight |
 | `FlightEnded` | when the aircraft stops |
-| `FlightJudged` | when its log is closed |
+| `FlightJudged` | for each log that is closed: one, and one more for each diversion |
+
+A diversion ends one flight and begins the next in the air: each has its setup, its log and its verdict.
 """
 
+import math
 import pickle
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from aircraft.catalog import Aircraft
-from flight.live.telemetry import CRITICAL, Snapshot, SnapshotMaker, StatusText
-from flight.mission.items import Home, Mission
+from flight.live.telemetry import AUTO, CRITICAL, GUIDED, LOITER, MODE_NAMES, Snapshot, SnapshotMaker, StatusText
+from flight.mission.items import Frame, Home, Mission
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import TICK, Flight
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import PlanflyError
+
+Floats = NDArray[np.float64]
 
 # Snapshots a second that are sent; the log is handed to the operating system this often, s.
 SNAPSHOT_RATE = 60.0
@@ -43,19 +53,55 @@ _BEHIND = 0.5
 # First byte of what is sent: what follows is packed, or pickled.
 _PACKED, _PICKLED = b"S", b"E"
 STOPPED, SHUT_DOWN = "stopped by the ground station", "stopped: the vehicle was shut down"
+# How a way ends that the aircraft was sent on from; the mode follows.  How a circle ends that is flown on.
+LEFT_FOR, HELD_ON = "left, as a ground station asked, for ", "logged until here, and circling on"
+# Circles without end are logged in pieces, and end after so many.
+_MAX_PIECES = 16
 
 
 @dataclass(frozen=True, slots=True)
 class JudgeMission:
-    """Request: judge a mission in the vehicle's scenario.  number: comes back with the event."""
+    """Request: judge a mission in the vehicle's scenario.
+
+    number: comes back with the event.  parameters: of the law, by name, which stations have set.
+    """
 
     mission: Mission
     number: int
+    parameters: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class StartFlight:
     """Request: fly the mission that was judged last."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where to circle.
+
+    lat_deg, lon_deg: NaN for where the aircraft is.  alt: m in the frame, NaN for the height that it is at.
+    frame: MAV_FRAME.  radius: m, 0 for the autopilot's own.
+    """
+
+    lat_deg: float = math.nan
+    lon_deg: float = math.nan
+    alt: float = math.nan
+    frame: int = int(Frame.GLOBAL)
+    radius: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class DivertFlight:
+    """Request: leave the way that is flown for another, from where the aircraft is.
+
+    mode: ArduPlane's number: AUTO flies the mission's items, RTL returns, LOITER and GUIDED circle at the place.
+    mission: home, rally points and fence; in AUTO with the items that are left.
+    """
+
+    mode: int
+    mission: Mission
+    place: Place = Place()
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +139,19 @@ class MissionJudged:
 
 
 @dataclass(frozen=True, slots=True)
+class FlightDiverted:
+    """Event: the aircraft is on another way, or cannot be and flies on.
+
+    mode: that it is flown in now.  problem: why it cannot, "" if it is on its way.
+    items: seq of the item at each waypoint, -1 for none.
+    """
+
+    mode: int
+    problem: str
+    items: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class FlightEnded:
     """Event: the flight is over.  ended: "completed" or why not."""
 
@@ -107,8 +166,8 @@ class FlightJudged:
     texts: tuple[StatusText, ...]
 
 
-FlightRequest = JudgeMission | StartFlight | EndFlight
-Event = ProcessReady | MissionJudged | FlightEnded | FlightJudged
+FlightRequest = JudgeMission | StartFlight | DivertFlight | EndFlight
+Event = ProcessReady | MissionJudged | FlightDiverted | FlightEnded | FlightJudged
 
 
 class LogSink(Protocol):
@@ -141,8 +200,11 @@ class FlightFactory(Protocol):
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge a mission; None in place of the flight where it cannot be flown."""
 
-    def open_log(self, setup: FlightSetup) -> LogSink:
-        """Open the log of the next flight."""
+    def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
+        """The way that is asked for, from a position (3,) on the map.  Raises PlanflyError where there is none."""
+
+    def open_log(self, setup: FlightSetup, mode: int) -> LogSink:
+        """Open the log of the next flight.  mode: as of `DivertFlight`."""
 
 
 def serve_flights(connection: Connection, factory: FlightFactory) -> None:
@@ -228,62 +290,121 @@ def _fly(connection: Connection, requests: _Requests, prepared: PreparedFlight, 
     """Fly in step with the clock; False when the process is to end."""
     try:
         flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map)
-        log = factory.open_log(prepared.setup)
+        log = factory.open_log(prepared.setup, AUTO)
     except (PlanflyError, OSError) as error:
         send_event(connection, FlightEnded(f"not started: {error}"))
         send_event(connection, FlightJudged(False, (StatusText(f"flight not started: {error}", CRITICAL),)))
         return True
-    snapshots = SnapshotMaker(prepared.setup, prepared.local_map)
+    flown = _Flown(connection, requests, factory, flight, log)
     try:
-        ended, go_on = _in_step(connection, requests, flight, snapshots, log, factory.speed)
+        ended, go_on = flown.in_step()
         if go_on:
             send_event(connection, FlightEnded(ended))
-        judged = log.finish(ended, requests.ending)
+        judged = flown.finish(ended)
     except OSError as error:
-        log.abandon()
+        flown.abandon()
         # A pipe that broke ends the process; a full disk ends the flight.
         if isinstance(error, BrokenPipeError | ConnectionResetError):
             raise
         send_event(connection, FlightEnded(f"log: {error.strerror}"))
         text = f"flight ended: its log cannot be written: {error.strerror}"
-        judged = FlightJudged(False, (StatusText(text, CRITICAL),))
+        judged = [FlightJudged(False, (StatusText(text, CRITICAL),))]
         go_on = True
-    send_event(connection, judged)
+    for one in judged:
+        send_event(connection, one)
     return go_on
 
 
-def _in_step(
-    connection: Connection, requests: _Requests, flight: Flight, snapshots: SnapshotMaker, log: LogSink, speed: float
-) -> tuple[str, bool]:
-    """Step the flight by the clock: how it ended, and whether the process goes on."""
-    clock = time.monotonic
-    started = begun = clock()
-    pending: list[Rows] = []
-    ticks, flushed, beat = 0, started, 0
-    ended, go_on = "", True
-    while not ended:
-        now = clock()
-        due = int((now - started) * speed / TICK) - ticks
-        max_due = max(1, int(_BEHIND * speed / TICK))
-        if due > max_due:
-            started += (due - max_due) * TICK / speed
-            due = max_due
-        if due > 0:
-            rows, ended = flight.block(due)
-            ticks += due
-            if len(rows):
-                pending.append(rows)
-                connection.send_bytes(_PACKED + snapshots.snapshot(rows[-1]).pack())
-        request = requests.waiting()
-        if isinstance(request, EndFlight):
-            ended = ended or (SHUT_DOWN if request.quit else STOPPED)
-            go_on = not request.quit
-        if pending and (ended or now - flushed >= FLUSH_PERIOD):
-            log.write(as_track(join_rows(pending)))
-            pending.clear()
-            flushed = now
-        if not ended:
-            beat += 1
-            time.sleep(max(0.0, begun + beat / SNAPSHOT_RATE - clock()))
-            beat = max(beat, int((clock() - begun) * SNAPSHOT_RATE))
-    return ended, go_on
+class _Flown:
+    """An aircraft in the air, and the log of each way that it has been sent on."""
+
+    def __init__(
+        self, connection: Connection, requests: _Requests, factory: FlightFactory, flight: Flight, log: LogSink
+    ) -> None:
+        self._connection, self._requests, self._factory = connection, requests, factory
+        self._flight, self._mode = flight, AUTO
+        self._snapshots = SnapshotMaker(flight.setup, flight.map)
+        # The last is written; the others wait to be judged until nothing flies, and how each ended stands beside them.
+        self._logs, self._left = [log], list[str]()
+        self._pending: list[Rows] = []
+        # The circle that is flown, None for none, and how often it was begun.
+        self._circled: DivertFlight | None = None
+        self._pieces = 0
+
+    def in_step(self) -> tuple[str, bool]:
+        """Step the flight by the clock: how it ended, and whether the process goes on."""
+        clock, speed = time.monotonic, self._factory.speed
+        started = begun = clock()
+        ticks, flushed, beat = 0, started, 0
+        ended, go_on = "", True
+        while not ended:
+            now = clock()
+            due = int((now - started) * speed / TICK) - ticks
+            max_due = max(1, int(_BEHIND * speed / TICK))
+            if due > max_due:
+                started += (due - max_due) * TICK / speed
+                due = max_due
+            if due > 0:
+                rows, ended = self._flight.block(due)
+                ticks += due
+                if len(rows):
+                    self._pending.append(rows)
+                    self._connection.send_bytes(_PACKED + self._snapshots.snapshot(rows[-1]).pack())
+            if ended == "completed" and self._circled is not None and self._pieces < _MAX_PIECES:
+                self._pieces += 1
+                ended = "" if self._lay_out(self._circled, HELD_ON) else ended
+            request = self._requests.waiting()
+            if isinstance(request, EndFlight):
+                ended = ended or (SHUT_DOWN if request.quit else STOPPED)
+                go_on = not request.quit
+            elif isinstance(request, DivertFlight) and not ended:
+                self._divert(request)
+            if self._pending and (ended or now - flushed >= FLUSH_PERIOD):
+                self._write()
+                flushed = now
+            if not ended:
+                beat += 1
+                time.sleep(max(0.0, begun + beat / SNAPSHOT_RATE - clock()))
+                beat = max(beat, int((clock() - begun) * SNAPSHOT_RATE))
+        return ended, go_on
+
+    def finish(self, ended: str) -> list[FlightJudged]:
+        """Judge each way, and close its log."""
+        endings = (*self._left, ended)
+        return [log.finish(how, self._requests.ending) for log, how in zip(self._logs, endings, strict=True)]
+
+    def abandon(self) -> None:
+        """Close the logs as they are."""
+        for log in self._logs:
+            log.abandon()
+
+    def _write(self) -> None:
+        self._logs[-1].write(as_track(join_rows(self._pending)))
+        self._pending.clear()
+
+    def _divert(self, request: DivertFlight) -> None:
+        if not self._lay_out(request, LEFT_FOR + MODE_NAMES[request.mode]):
+            return
+        route = self._flight.setup.route
+        self._mode, self._circled, self._pieces = request.mode, None, 1
+        if request.mode in (LOITER, GUIDED):
+            item = self._flight.setup.mission.items[-1]
+            place = Place(item.lat_deg, item.lon_deg, item.alt, item.frame, item.params[2])
+            self._circled = replace(request, place=place)
+        send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
+
+    def _lay_out(self, request: DivertFlight, left: str) -> bool:
+        """Begin a way where the aircraft is, with a log of its own; left: how the present one ends."""
+        try:
+            prepared = self._factory.divert(request, self._flight.position)
+        except PlanflyError as error:
+            send_event(self._connection, FlightDiverted(self._mode, str(error)))
+            return False
+        log = self._factory.open_log(prepared.setup, request.mode)
+        if self._pending:
+            self._write()
+        self._flight.divert(prepared.setup, prepared.local_map)
+        self._snapshots = SnapshotMaker(prepared.setup, prepared.local_map)
+        self._logs.append(log)
+        self._left.append(left)
+        return True

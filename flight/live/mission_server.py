@@ -7,7 +7,7 @@ messages and a station's lists (`mavwp`), and nothing of the vehicle's side.
 """
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
@@ -179,8 +179,10 @@ def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
     )
 
 
-def start_problem(mission: Mission, first: int) -> str:
+def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> str:
     """Why a mission cannot be flown from the item of this seq on; "" if it can.
+
+    in_flight: whether the way there from where the aircraft is will be its first leg.
 
     >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
     >>> way = Mission(None, (place, replace(place, seq=2), replace(place, seq=3)))
@@ -190,7 +192,8 @@ def start_problem(mission: Mission, first: int) -> str:
     if not mission.items or not 0 <= first <= mission.items[-1].seq:
         return "the mission has no such item"
     places = [item for item in mission.items if item.seq >= first and item.has_position]
-    return "" if first <= mission.items[0].seq or len(places) > 1 else "from there on no leg is left to fly"
+    least = 1 if in_flight else 2
+    return "" if first <= mission.items[0].seq or len(places) >= least else "from there on no leg is left to fly"
 
 
 def flown_from(mission: Mission, first: int) -> Mission:
@@ -224,8 +227,8 @@ _OLD_REQUESTS = 4
 LOCK, UPLOAD_TIMEOUT = 1.0, 8.0
 
 # `current` of an item that is no mission's but a place to fly to now, or a height to take.
-_GUIDED = (2, 3)
-_NO_GUIDED = "go-to refused: this vehicle flies its mission alone; upload the way as a mission"
+_PLACE, _HEIGHT = 2, 3
+_GUIDED = (_PLACE, _HEIGHT)
 _FLOATS = "the upload came as MISSION_ITEM, whose positions are floats: up to 0.5 m off; MISSION_ITEM_INT is exact"
 _FENCE_RETURN = 5000
 _ALLOWED = {
@@ -289,17 +292,24 @@ class _Finished:
     left: int
 
 
+def _nowhere(_item: MissionItem) -> str:
+    return "go-to denied: not in flight"
+
+
 @dataclass(slots=True)
 class MissionServer:
     """Three lists of items and their transfers.
 
     lists: what the vehicle holds, seq from 0 on; item 0 of a mission may be home.  changed: the lists that an upload
     replaced since the caller last cleared it.  locked: a reason why the mission may not change now, "" if it may.
+    go_to: flies to an item's place, at its height, and circles there; latitude and longitude are NaN for where the
+    aircraft is.  Returns why it does not, "" if it does.
     """
 
     lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))
     changed: set[MissionType] = field(default_factory=set)
     locked: str = ""
+    go_to: Callable[[MissionItem], str] = _nowhere
     _uploads: dict[MissionType, _Upload] = field(default_factory=dict)
     # Who finished which list last: its final ACK is repeated if its last item comes again.
     _finished: dict[MissionType, _Finished] = field(default_factory=dict)
@@ -357,10 +367,21 @@ class MissionServer:
         self._finished.pop(kind, None)
         return [self._request(upload, kind, now)]
 
+    def _guided(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
+        try:
+            item = from_message(message, "go-to")
+        except MissionError as error:
+            return self._ack(station, mavlink.MAV_MISSION_INVALID, kind, str(error))
+        if message.current != _PLACE:
+            item = replace(item, lat_deg=math.nan, lon_deg=math.nan)
+        problem = self.go_to(item)
+        result = mavlink.MAV_MISSION_DENIED if problem else mavlink.MAV_MISSION_ACCEPTED
+        return self._ack(station, result, kind, problem)
+
     def _item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         upload = self._uploads.get(kind)
         if message.current in _GUIDED and (upload is None or upload.station != station):
-            return [self._ack(station, mavlink.MAV_MISSION_UNSUPPORTED, kind, _NO_GUIDED)]
+            return [self._guided(message, station, kind)]
         if upload is None or upload.station != station:
             done = self._finished.get(kind)
             known = done is not None and (done.station, done.count) == (station, message.seq + 1)

@@ -1,39 +1,72 @@
 """What a station may ask of the vehicle beside missions: commands, modes, parameters, messages and their rates."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
+import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.arming import ACCEPTED, DENIED, IN_PROGRESS, UNSUPPORTED, ArmingState, CommandResult
+from flight.live.flight_process import Place
 from flight.live.link import Peer
-from flight.live.telemetry import INFO, PERIODS, STREAMS, WARNING, Status, StatusText, telemetry_message
+from flight.live.telemetry import (
+    INFO,
+    LOITER,
+    PERIODS,
+    RTL,
+    STREAMS,
+    WARNING,
+    Status,
+    StatusText,
+    telemetry_message,
+)
+from flight.mission.items import Command, Frame, MissionItem, is_located, item_problem
+from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------
-# The vehicle's parameters: what a ground station reads, and the one that it may set.
+# The vehicle's parameters: what a ground station reads, and those that it may set.
 
 FORCE = "PFLY_FORCE"
 # Parameters sent a second to a station that asked for all.
 PARAMETERS_PER_SECOND = 200.0
+_FIXED = "is fixed by the aircraft or the scenario"
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter; values travel as float32.  high is None where a station may not set it."""
+    """One parameter; values travel as float32.
+
+    low, high: what a station may set; high is None where it may not.
+    fixed: why it may not.
+    flies: whether it belongs to the law that flies: it is set on the ground, and the mission is judged anew.
+    """
 
     name: str
     value: float
     low: float = 0.0
     high: float | None = None
+    fixed: str = _FIXED
+    flies: bool = False
+
+
+def _nothing_flies(_stated: Mapping[str, float]) -> Mapping[str, float]:
+    return {}
 
 
 @dataclass(slots=True)
 class Parameters:
-    """Parameters by number and by name; names as ArduPilot's, where it has one for the same thing."""
+    """Parameters by number and by name; names as the autopilot's, where it has one for the same thing.
+
+    flown: what the law flies with, by name, where a station has stated some of it.  Raises PlanflyError for values that
+    are not allowed.
+    stated: what stations have set of the law's.
+    """
 
     entries: list[Parameter]
+    flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _nothing_flies
+    stated: dict[str, float] = field(default_factory=dict)
     _numbers: dict[str, int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -47,8 +80,7 @@ class Parameters:
     def put(self, name: str, value: float) -> None:
         """Change a value from within.  Raises KeyError."""
         k = self._numbers[name]
-        old = self.entries[k]
-        self.entries[k] = Parameter(name, value, old.low, old.high)
+        self.entries[k] = replace(self.entries[k], value=value)
 
     def message(self, number: int) -> Any:
         """PARAM_VALUE of a parameter, by number."""
@@ -63,54 +95,94 @@ class Parameters:
             return number if number < len(self.entries) else None
         return self._numbers.get(_text(name))
 
-    def set(self, name: bytes, value: float) -> tuple[int | None, str]:
+    def set(self, name: bytes, value: float, *, in_flight: bool = False) -> tuple[int | None, str]:
         """Set a parameter as a station asks: its number (None: no such one), and why it was refused ("" if set)."""
         number = self._numbers.get(_text(name))
         if number is None:
             return None, f"{_text(name)}: no such parameter"
         entry = self.entries[number]
+        kept = f"{entry.value:g} kept"
+        if entry.flies:
+            if in_flight:
+                return number, f"{entry.name} {value:g} refused in flight, which is logged with one set; {kept}"
+            return number, self._state(entry, value)
         if entry.high is None:
-            return number, f"{entry.name} is fixed by the aircraft or the scenario: {entry.value:g} kept"
+            return number, f"{entry.name} {entry.fixed}: {kept}"
         if not (math.isfinite(value) and entry.low <= value <= entry.high):
-            return number, f"{entry.name} {value:g}: allowed {entry.low:g}..{entry.high:g}; {entry.value:g} kept"
+            return number, f"{entry.name} {value:g}: allowed {entry.low:g}..{entry.high:g}; {kept}"
         self.put(entry.name, value)
         return number, ""
 
+    def _state(self, entry: Parameter, value: float) -> str:
+        """Have the law fly with a value; why it does not, "" if it does."""
+        if not math.isfinite(value):
+            return f"{entry.name} {value:g}: a finite number is expected; {entry.value:g} kept"
+        # 0.7 travels as 0.699999988: the number that a person typed is the shortest of those that travel so.
+        stated = self.stated | {entry.name: float(str(np.float32(value)))}
+        try:
+            values = self.flown(stated)
+        except PlanflyError as error:
+            return f"{error}; {entry.value:g} kept"
+        if values[entry.name] != stated[entry.name]:
+            return f"{entry.name} {_FIXED}: {entry.value:g} kept"
+        self.stated = stated
+        for name, flown in values.items():
+            self.put(name, flown)
+        return ""
+
 
 def vehicle_parameters(
-    *, airspeed: float, slowest: float, fastest: float, max_bank_deg: float, system: int, speed: float
+    *,
+    airspeed: float,
+    slowest: float,
+    fastest: float,
+    max_bank_deg: float,
+    system: int,
+    speed: float,
+    flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _nothing_flies,
+    not_flown: Iterable[str] = (),
 ) -> Parameters:
-    """Parameters of a vehicle: ArduPilot's names, in the order of the alphabet.
+    """Parameters of a vehicle and of the law that flies it, by the autopilot's names, in the order of the alphabet.
 
     airspeed, slowest, fastest: m/s.
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
     speed: times real time.
+    flown: as of `Parameters`; what it has takes the place of the vehicle's own of the same name.
+    not_flown: of the law's parameters, those that no flight shows, which cannot be set.
 
     >>> parameters = vehicle_parameters(
-    ...     airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=1.0
+    ...     airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=1.0,
+    ...     flown=lambda stated: {"WP_RADIUS": 90.0, "TRIM_PITCH_CD": 2.0} | stated, not_flown=["TRIM_PITCH_CD"],
     ... )
     >>> parameters["AIRSPEED_CRUISE"]
     25.0
     >>> parameters.set(b"AIRSPEED_MAX", 99.0)
     (1, 'AIRSPEED_MAX is fixed by the aircraft or the scenario: 31 kept')
+    >>> parameters.set(b"WP_RADIUS", 70.0), parameters["WP_RADIUS"]
+    ((13, ''), 70.0)
+    >>> parameters.set(b"TRIM_PITCH_CD", 3.0)[1]
+    'TRIM_PITCH_CD is read, but no flight shows it: 2 kept'
     """
-    return Parameters(
-        [
-            Parameter("AIRSPEED_CRUISE", airspeed),
-            Parameter("AIRSPEED_MAX", fastest),
-            Parameter("AIRSPEED_MIN", slowest),
-            Parameter("ARMING_CHECK", 1.0),
-            Parameter("ARMING_REQUIRE", 1.0),
-            Parameter("FENCE_TOTAL", 0.0),
-            Parameter("MIS_TOTAL", 0.0),
-            Parameter(FORCE, 0.0, 0.0, 1.0),
-            Parameter("RALLY_TOTAL", 0.0),
-            Parameter("ROLL_LIMIT_DEG", max_bank_deg),
-            Parameter("SIM_SPEEDUP", speed),
-            Parameter("SYSID_THISMAV", float(system)),
-        ]
-    )
+    own = [
+        Parameter("AIRSPEED_CRUISE", airspeed),
+        Parameter("AIRSPEED_MAX", fastest),
+        Parameter("AIRSPEED_MIN", slowest),
+        Parameter("ARMING_CHECK", 1.0),
+        Parameter("ARMING_REQUIRE", 1.0),
+        Parameter("FENCE_TOTAL", 0.0),
+        Parameter("MIS_TOTAL", 0.0),
+        Parameter(FORCE, 0.0, 0.0, 1.0),
+        Parameter("RALLY_TOTAL", 0.0),
+        Parameter("ROLL_LIMIT_DEG", max_bank_deg),
+        Parameter("SIM_SPEEDUP", speed),
+        Parameter("SYSID_THISMAV", float(system)),
+    ]
+    entries = {entry.name: entry for entry in own}
+    unseen = set(not_flown)
+    for name, value in flown({}).items():
+        entries[name] = Parameter(name, value, fixed="is read, but no flight shows it", flies=name not in unseen)
+    return Parameters([entries[name] for name in sorted(entries)], flown)
 
 
 def _text(name: bytes | str) -> str:
@@ -118,6 +190,8 @@ def _text(name: bytes | str) -> str:
     return data.split(b"\0")[0].decode("ascii", "replace")[:16]
 
 
+# INT32_MAX in a latitude or longitude: not set.
+_UNSET = 2**31 - 1
 # No message is sent more often than this, s.
 _SHORTEST = 0.02
 _LONGEST = 3600.0
@@ -198,6 +272,11 @@ class Requests:
             return self.arming.start()
         if number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
             return self.arming.pause(message.param1 == 1)
+        if number in _MODES:
+            return self.arming.set_mode(_MODES[number])
+        if number == mavlink.MAV_CMD_DO_REPOSITION:
+            place = _place(message)
+            return CommandResult(DENIED, _NO_PLACE) if place is None else self.arming.go_to(place)
         if number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
             return self.start_at(_whole(message.param1))
         return CommandResult(UNSUPPORTED, _NOT_FLOWN.get(number, ""))
@@ -266,7 +345,9 @@ class Requests:
         return [] if number is None else [PeerMessage(peer, self.parameters.message(number))]
 
     def _write_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        number, problem = self.parameters.set(message.param_id, float(message.param_value))
+        number, problem = self.parameters.set(
+            message.param_id, float(message.param_value), in_flight=self.arming.flying
+        )
         self.arming.force = self.parameters[FORCE] != 0.0
         replies: list[Response] = [StatusText(problem, WARNING)] if problem else []
         if number is not None:
@@ -295,6 +376,23 @@ class Requests:
         return replies
 
 
+def _place(message: Any) -> Place | None:
+    """The place that MAV_CMD_DO_REPOSITION names; None for one that is no place."""
+    if message.get_type() == "COMMAND_INT":
+        lat, lon = (math.nan if value == _UNSET else value / 1e7 for value in (message.x, message.y))
+        alt, frame = float(message.z), int(message.frame)
+    else:
+        lat, lon, alt = float(message.param5), float(message.param6), float(message.param7)
+        frame = int(Frame.GLOBAL)
+    radius = float(message.param3) if math.isfinite(message.param3) else 0.0
+    # What is not a number stands for where the aircraft is.
+    north, east, up = (0.0 if math.isnan(value) else value for value in (lat, lon, alt))
+    item = MissionItem(0, int(Command.NAV_LOITER_TIME), frame, (0.0, 0.0, radius, 0.0), north, east, up)
+    if not is_located(item.command, frame) or item_problem(item) is not None:
+        return None
+    return Place(lat, lon, alt, frame, radius)
+
+
 def _whole(value: float) -> int:
     """Whole number that a command's float parameter stands for, -1 for none."""
     return int(value) if math.isfinite(value) and 0 <= value < 2**24 else -1
@@ -304,14 +402,15 @@ def _whole(value: float) -> int:
 _QUIET = 3.0
 # MAV_CMD_DO_ORBIT, a name that pymavlink 2.4.41 has not.
 _DO_ORBIT = 34
-_NO_GUIDED = "go-to refused: this vehicle flies its mission alone; upload the way as a mission"
-# Commands to an aircraft that this one, which flies a mission as it was judged, is not flown by; and what to do.
+_NO_GUIDED = "target refused: MAV_CMD_DO_REPOSITION, or a MISSION_ITEM_INT with current 2, sends it to a place"
+_NO_PLACE = "go-to denied: a latitude of -90..90, a longitude of -180..180 and a finite height are expected"
+# Commands that are modes by another name.
+_MODES = {mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: RTL, mavlink.MAV_CMD_NAV_LOITER_UNLIM: LOITER}
+# Commands that this aircraft is not flown by; and what to do.
 _NOT_FLOWN: dict[int, str] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "speed change refused: put DO_CHANGE_SPEED into the mission",
-    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL refused: a forced disarm ends the flight; a mission may end with RTL",
-    mavlink.MAV_CMD_DO_REPOSITION: _NO_GUIDED,
     _DO_ORBIT: "orbit refused: put a loiter into the mission",
-    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "height change refused: put the height into the mission",
+    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "height change refused: a go-to has a height",
     mavlink.MAV_CMD_NAV_TAKEOFF: "take-off refused: put NAV_TAKEOFF into the mission and start it",
     mavlink.MAV_CMD_NAV_LAND: "landing refused: put NAV_LAND into the mission and start it",
     mavlink.MAV_CMD_DO_SET_HOME: "home refused: it is item 0 of the mission",

@@ -186,11 +186,11 @@ def status_texts(text: str, severity: int, number: int) -> list[Any]:
 
 
 # ArduPlane's numbers for its modes (custom_mode of HEARTBEAT).
-MANUAL, AUTO, LOITER = 0, 10, 12
-MODE_NAMES = {MANUAL: "MANUAL", AUTO: "AUTO", LOITER: "LOITER"}
+MANUAL, AUTO, RTL, LOITER, GUIDED = 0, 10, 11, 12, 15
+MODE_NAMES = {MANUAL: "MANUAL", AUTO: "AUTO", RTL: "RTL", LOITER: "LOITER", GUIDED: "GUIDED"}
 
 # MISSION_STATE of MISSION_CURRENT.
-NO_MISSION, NOT_STARTED, ACTIVE, COMPLETE = 1, 2, 3, 5
+NO_MISSION, NOT_STARTED, ACTIVE, PAUSED, COMPLETE = 1, 2, 3, 4, 5
 
 _SENSORS = (
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
@@ -286,6 +286,8 @@ def heartbeat(status: Status) -> Any:
             | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
             | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
         )
+    elif status.flying:
+        base |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     if status.armed:
         base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     state = mavlink.MAV_STATE_ACTIVE if status.flying else mavlink.MAV_STATE_STANDBY

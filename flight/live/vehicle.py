@@ -4,20 +4,24 @@ import contextlib
 import errno
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from multiprocessing.connection import Connection, wait
 from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.arming import ACCEPTED, DENIED, REJECTED, ArmingState, CommandResult
+from flight.live.arming import ACCEPTED, DENIED, ArmingState, CommandResult
 from flight.live.flight_process import (
+    DivertFlight,
     EndFlight,
     Event,
+    FlightDiverted,
     FlightEnded,
     FlightJudged,
     FlightRequest,
     JudgeMission,
     MissionJudged,
+    Place,
     ProcessReady,
     StartFlight,
     read_event,
@@ -27,9 +31,12 @@ from flight.live.mission_server import MissionServer, MissionType, Station, flow
 from flight.live.station_requests import PARAMETERS_PER_SECOND, Parameters, Requests, Response
 from flight.live.telemetry import (
     ACTIVE,
+    AUTO,
     COMPLETE,
     CRITICAL,
     INFO,
+    MODE_NAMES,
+    PAUSED,
     WARNING,
     Snapshot,
     Status,
@@ -142,12 +149,18 @@ class MissionProgress:
         self._status = status
         self._down = down
         self._leg = -1
+        # Of the way that is flown where it is not the judged mission's, seq of the item at each waypoint.
+        self._way: tuple[int, ...] | None = None
         self.shift = 0
         self.first = 0
 
     def started(self) -> None:
         """A flight begins."""
-        self._leg = -1
+        self._leg, self._way = -1, None
+
+    def diverted(self, items: tuple[int, ...]) -> None:
+        """Another way begins.  items: seq of the mission's item at each waypoint, none beside the mission."""
+        self._leg, self._way = -1, items
 
     def at_start(self) -> None:
         """The item that a mission that is not being flown starts with."""
@@ -157,12 +170,12 @@ class MissionProgress:
         """Bring what the status says of the mission up to date."""
         items = self._server.lists[MissionType.MISSION]
         self._status.total = max(0, len(items) - 1) if items else 0
-        if self._arming.mission_state not in (ACTIVE, COMPLETE):
+        if self._arming.mission_state not in (ACTIVE, PAUSED, COMPLETE):
             self.at_start()
 
     def on_leg(self, leg: int) -> None:
         """Send the waypoints that were reached since the last snapshot."""
-        if leg == self._leg or leg < 0:
+        if leg == self._leg or leg < 0 or not self._items():
             return
         for waypoint in range(max(0, self._leg + 1), leg + 1):
             self._reached(waypoint)
@@ -185,7 +198,9 @@ class MissionProgress:
             self._down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._item(waypoint)))
 
     def _items(self) -> tuple[int, ...]:
-        """Seq of the item at each waypoint of the judged mission, -1 for none."""
+        """Seq of the item at each waypoint of the mission as it is flown, -1 for none."""
+        if self._way is not None:
+            return self._way
         return () if self._arming.judged is None else self._arming.judged.items
 
     def _item(self, waypoint: int) -> int:
@@ -233,8 +248,8 @@ class Vehicle:
         show: gets what a person at the terminal should read.
         """
         self.link = link
-        self.server = MissionServer()
         self.arming = ArmingState()
+        self.server = MissionServer(go_to=self._go_to)
         self.status = Status(standby.snapshot, standby.home, battery=battery)
         self.down = Downlink(link, self.status, parameters, show, _NAP)
         self.requests = Requests(self.arming, parameters, self.status, self._start_at)
@@ -253,6 +268,8 @@ class Vehicle:
         self._outstanding = self._brief = False
         # The upload in which the item that the next flight starts at was chosen.
         self._chosen_in: tuple[MissionItem, ...] = ()
+        # Parameters of the law that the mission is judged and flown with.
+        self._flown_with: tuple[tuple[str, float], ...] = ()
         self._last_text, self._last_text_at = "", 0.0
         self._progress = MissionProgress(self.server, self.arming, self.status, self.down)
 
@@ -311,6 +328,9 @@ class Vehicle:
             self._send_reply(reply.station, reply.message, reply.text)
         self._changes()
         self._pass_on(self.requests.handle(message, peer, now))
+        if self._flown_with != tuple(self._parameters.stated.items()) and self.server.lists[MissionType.MISSION]:
+            self.server.changed.add(MissionType.MISSION)
+            self._changes()
         self._after_command()
 
     def _pass_on(self, responses: list[Response]) -> None:
@@ -339,6 +359,9 @@ class Vehicle:
         if self.arming.end_requested:
             self.arming.end_requested = False
             self._ask(EndFlight())
+        if self.arming.place is not None:
+            self._divert(self.arming.place)
+            self.arming.place = None
         if self.arming.starts:
             self.arming.flight_started()
             self._progress.started()
@@ -371,15 +394,44 @@ class Vehicle:
         self._brief = MissionType.MISSION not in changed and (self._brief or not self.arming.judging)
         self.arming.mission_uploaded()
         self._outstanding = True
-        self._ask(JudgeMission(mission, self._number))
+        self._flown_with = tuple(self._parameters.stated.items())
+        self._ask(JudgeMission(mission, self._number, self._flown_with))
+        self._refresh()
+
+    def _divert(self, place: Place) -> None:
+        """Send the aircraft another way: on with the mission at the present item, home, or to circle at a place."""
+        mission, shift = uploaded(self.server.lists, self._standby.home)
+        mission = replace(mission, home=self.status.home)
+        if self.arming.mode == AUTO:
+            mission = flown_from(mission, self.status.current - shift)
+        self._ask(DivertFlight(self.arming.mode, mission, place))
+
+    def _go_to(self, item: MissionItem) -> str:
+        """Fly to an item's place; why not, "" if it does."""
+        return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
+
+    def _diverted(self, event: FlightDiverted) -> None:
+        if event.problem:
+            wanted, self.arming.mode = self.arming.mode, event.mode
+            self.arming.diverted(event.mode)
+            self.down.send_text(f"{MODE_NAMES[wanted]} refused: {event.problem}", WARNING)
+        else:
+            self._progress.diverted(event.items if event.mode == AUTO else ())
+            self.down.send_text(f"flying in {MODE_NAMES[event.mode]}")
         self._refresh()
 
     def _start_at(self, seq: int) -> CommandResult:
-        """Have the next flight start at an item, by the station's number: it is judged as what is flown."""
-        if self.arming.flying:
-            return CommandResult(REJECTED, f"item {seq} refused: in flight the mission is flown as it stands")
+        """Have the next flight start at an item, by the station's number, or the present one go on there.
+
+        What starts there is judged as what is flown.
+        """
         mission, shift = uploaded(self.server.lists, self._standby.home)
-        problem = start_problem(mission, seq - shift)
+        problem = start_problem(mission, seq - shift, in_flight=self.arming.flying)
+        if self.arming.flying and not problem:
+            self.status.current = seq
+            if self.arming.mode == AUTO:
+                self.arming.restart_mission()
+            return CommandResult(ACCEPTED)
         if problem:
             return CommandResult(DENIED, f"item {seq} refused: {problem}")
         first = 0 if seq - shift <= mission.items[0].seq else seq
@@ -423,6 +475,8 @@ class Vehicle:
                 self._progress.on_leg(int(event.leg))
         elif isinstance(event, MissionJudged):
             self._judged(event)
+        elif isinstance(event, FlightDiverted):
+            self._diverted(event)
         elif isinstance(event, FlightEnded):
             self._ended(event.ended)
         elif isinstance(event, ProcessReady):
@@ -454,7 +508,7 @@ class Vehicle:
 
     def _ended(self, ended: str) -> None:
         completed = ended == "completed"
-        if completed:
+        if completed and self.arming.mode == AUTO:
             self._progress.completed()
         self.arming.flight_ended(completed)
         self._refresh()

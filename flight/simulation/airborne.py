@@ -62,23 +62,26 @@ class Airborne(ABC):
 
         start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
         """
-        self.setup = setup
-        self.path = setup.path
         self._start_offset = start_offset
         self._ground = Ground(setup.scenario.terrain)
-        self.map = local_map or LocalMap.around(setup)
         self._steps = setup.fdm_hz // setup.guidance_hz
         self.dt = self._steps / setup.fdm_hz
+        self._gains = gains
+        self._lay_out(setup, aircraft, local_map or LocalMap.around(setup))
+        braking = setup.scenario.flight.motor_braking
+        self.fdm = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=braking, variation=variation)
+
+    def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
+        """Make the workspace for a route, and say how long it may take."""
+        self.setup, self.path, self.map = setup, setup.path, local_map
         waypoints = waypoint_records(setup.route, setup.mission)
         self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
-        self._workspace = Workspace(gains, self.path, waypoints, setup.autopilot.own)
+        self._workspace = Workspace(self._gains, self.path, waypoints, setup.autopilot.own)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
         self.memory = self._work.memory
-        braking = setup.scenario.flight.motor_braking
-        self.fdm = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=braking, variation=variation)
         self._work.timing.dt = self.dt
         self._work.settings.slowest = 0.94 * aircraft.stall_speed
         self._work.settings.middle = self.map.middle
@@ -93,6 +96,12 @@ class Airborne(ABC):
             wider = true_by_equivalent(setup.route.return_to.up) ** 2
             patience += longest_circling(wider * setup.route.return_to.radius)
         self.max_ticks = int(patience / self.dt)
+
+    @property
+    def position(self) -> Floats:
+        """Where the aircraft was a tick ago: (3,) east, north and up, m."""
+        true = self._work.true
+        return np.array([true.east, true.north, true.up])
 
     @abstractmethod
     def _fly(self, count: int) -> int:
@@ -171,7 +180,10 @@ def _wider_circles(setup: FlightSetup, waypoints: Records) -> float:
     if not setup.autopilot.loiter_rules.at_middle:
         return 0.0
     longer = dict[int, float]()
-    for waypoint in waypoints[waypoints["circle"] != 0.0]:
+    circles = waypoints[waypoints["circle"] != 0.0]
+    # A circle's waypoints are alike in all that counts here.
+    alike = np.unique(circles[["item", "circle", "airspeed", "up"]], return_index=True)[1]
+    for waypoint in circles[alike]:
         drawn, speed, up = abs(float(waypoint["circle"])), float(waypoint["airspeed"]), float(waypoint["up"])
         held = max(setup.limits.turn_radius(course, course + math.pi, up, speed) for course in (0.0, math.pi))
         # Autopilots keep an equivalent airspeed: what they fly is faster, as the air is thinner.
@@ -186,8 +198,9 @@ def _slowest_leg(setup: FlightSetup, airspeeds: Floats) -> float:
     """Least ground speed on any leg in the mean wind at its heights, m/s, at least 3."""
     limits: Limits = setup.limits
     points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
+    tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}
     speeds = []
-    for leg, airspeed in enumerate(airspeeds):
-        table = limits.performance(float(airspeed))
+    for leg, airspeed in enumerate(airspeeds.tolist()):
+        table = tables[airspeed]
         speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
     return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0

@@ -171,6 +171,16 @@ def fly_to_end(
     return SimulatedFlight(as_track(join_rows(blocks)), ended, flight.path)
 
 
+# What of `flight.guidance.inner_loops.GUIDANCE_MEMORY` belongs to the path that is flown, and not to the aircraft.
+_OF_THE_WAY = (
+    *("piece", "leg", "distance", "cross_track", "height_error", "done", "returning", "circled", "turned", "bearing"),
+    *("cross_track_sum", "path_bank", "path_bank_rate", "aside", "aside_rate", "arc_speed"),
+    *("l1_leg", "l1_sum", "course_sum", "height_sum", "bend_acceleration"),
+)
+# What a flight keeps that leaves its route for another.
+_CARRIED = ("state", "true", "estimated", "commands", "air", "place", "wind", "gusts", "navigation", "memory")
+
+
 class Flight(Airborne):
     """A flight by the law of an autopilot: `simulate` flies it in one go, the live vehicle in step with a clock."""
 
@@ -195,6 +205,23 @@ class Flight(Airborne):
         law = setup.autopilot.law
         law.begin(self.memory, self._workspace.own)
         self._disturb(setup)
+        self._loop = self._make_loop(self.fdm.loop_access(), law.tick)
+
+    def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
+        """Leave the route for another setup's, which begins where the aircraft is; its time begins at 0.
+
+        The aircraft, its wind and what guidance has learnt of them stay; what it kept of the way it was on is gone.
+        setup: of the same aircraft, autopilot, wind and rates.  local_map: the setup's.
+        """
+        before, own = self._work, self._workspace.own
+        self._lay_out(setup, self.fdm.aircraft, local_map)
+        for name in _CARRIED:
+            setattr(self._work, name, getattr(before, name))
+        for name in _OF_THE_WAY:
+            setattr(self.memory, name, 0)
+        law = setup.autopilot.law
+        law.begin(self.memory, self._workspace.own)
+        law.take_over(own, self._workspace.own, setup.route.waypoints[0])
         self._loop = self._make_loop(self.fdm.loop_access(), law.tick)
 
     def _begin(self, setup: FlightSetup, model: Fdm, reference: float) -> None:

@@ -7,6 +7,7 @@ import multiprocessing
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -20,10 +21,10 @@ from planfly.api.planning import flight_entries
 from planfly.arguments import check_arguments
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.served_flights import ServedScenario, ServeOptions, fly_process, open_served
+from planfly.served_flights import ServedScenario, ServeOptions, flown_parameters, fly_process, open_served
 from world.errors import FlightError, PlanflyError
 from world.frames import to_geo
-from world.interruption import children_ignore_sigint, end_children
+from world.interruption import children_ignore_sigint, end_children, uninterrupted
 from world.scenario import Scenario
 from world.scenario_tables import Guidance, Navigation
 
@@ -117,7 +118,10 @@ def _vehicle(
     link: Link, pool: "_FlightPool", served: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
     airframe = served.airframe
+    law = airframe.autopilot.parameters
     parameters = vehicle_parameters(
+        flown=partial(flown_parameters, served.scenario),
+        not_flown=() if law is None else law.not_flown,
         airspeed=airframe.airspeed,
         slowest=airframe.aircraft.airspeed_min,
         fastest=airframe.aircraft.airspeed_max,
@@ -147,7 +151,7 @@ class _FlightPool:
         self._children = [child for child in self._children if child.is_alive()]
         ours, theirs = self._context.Pipe()
         child = self._context.Process(target=fly_process, args=(theirs, self._options), daemon=True)
-        with children_ignore_sigint():
+        with children_ignore_sigint(), uninterrupted():
             child.start()
         theirs.close()
         self._children.append(child)

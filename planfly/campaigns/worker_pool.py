@@ -41,7 +41,7 @@ from planfly.pipeline import Advance
 from planfly.process_setup import PARENT
 from world.errors import PlanflyError
 from world.files import temporary_folder
-from world.interruption import Interrupted, children_ignore_sigint, end_children, end_with_parent
+from world.interruption import Interrupted, children_ignore_sigint, end_children, end_with_parent, uninterrupted
 
 if TYPE_CHECKING:
     from multiprocessing.context import ForkServerContext, SpawnContext
@@ -332,7 +332,7 @@ def in_own_process(work: Callable[..., Made], *args: Any, advance: Advance | Non
     context = child_processes()
     here, there = context.Pipe(duplex=False)
     child = context.Process(target=_work, args=(there, work, args, options), daemon=True)
-    with children_ignore_sigint():
+    with children_ignore_sigint(), uninterrupted():
         child.start()
     there.close()
     try:

@@ -7,7 +7,6 @@ Run as a subprocess, because the library is native and starts threads.  ITEMS.js
 import json
 import os
 import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,10 +16,8 @@ from mavsdk.plugins.action import Action
 from mavsdk.plugins.mission import Mission, MissionPlan
 from mavsdk.plugins.mission import MissionItem as PlanItem
 from mavsdk.plugins.mission_raw import MissionItem, MissionRaw, MissionRawError
+from mavsdk.plugins.param import Param
 from mavsdk.plugins.telemetry import Telemetry
-
-# Seconds that a request may take, and what stands for the answer of one that takes longer.
-LIMIT, TRAPPED = 30.0, "NO END"
 
 
 def main() -> None:
@@ -82,29 +79,31 @@ def by_asking(system: System, rows: list[list[float]]) -> dict[str, object]:
     mission.upload_mission(MissionPlan([PlanItem(y, x, z, 25.0, True) for y, x, z in rows]))
     wait(telemetry.health_all_ok)
     ground = {"item": asked(lambda: mission.set_current_mission_item(1))}
+    ground |= by_parameters(Param(system))
     action.arm()
     mission.start_mission()
     wait(telemetry.in_air)
     flight = {
         "pause": asked(mission.pause_mission),
+        "resume": asked(mission.start_mission),
         "hold": asked(action.hold),
-        "return": asked(action.return_to_launch),
         "go": asked(lambda: action.goto_location(46.0, 8.01, 150.0, 0.0)),
+        "item": asked(lambda: mission.set_current_mission_item(2)),
+        "return": asked(action.return_to_launch),
         "speed": asked(lambda: action.set_current_speed(22.0)),
         "orbit": asked(lambda: action.do_orbit(100.0, 20.0, 0, 46.0, 8.0, 150.0)),
     }
-    # A MISSION_CURRENT that crosses this request ends MAVSDK's own time limit, and MAVSDK waits for ever.  The vehicle
-    # sends one every 0.5 s, at once with the news that it is in the air: what comes half-way between is least likely
-    # to be crossed.
-    time.sleep(0.25)
-    found = [TRAPPED]
-    request = threading.Thread(
-        target=lambda: found.append(asked(lambda: mission.set_current_mission_item(0))), daemon=True
-    )
-    request.start()
-    request.join(LIMIT)
-    flight["item"] = found[-1]
     return {"ground": ground, "flight": flight}
+
+
+def by_parameters(param: Param) -> dict[str, object]:
+    """Read, list and set parameters by name."""
+    before = param.get_param_float("WP_RADIUS")
+    return {
+        "set": asked(lambda: param.set_param_float("WP_RADIUS", before - 20.0)),
+        "lowered": before - param.get_param_float("WP_RADIUS"),
+        "listed": {one.name: one.value for one in param.get_all_params().float_params}["WP_RADIUS"] - before,
+    }
 
 
 def asked(request: Callable[[], object]) -> str:

@@ -1,13 +1,19 @@
 """Seeded plans of the paper's problems: what is planned, and the table and probabilities that they come to."""
 
+import contextlib
 import csv
 import json
+import multiprocessing.util
+import os
+import signal
 from dataclasses import replace
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from planfly import paper
 from planfly.paper import (
     PROBLEMS,
     STRIP,
@@ -23,6 +29,7 @@ from planfly.paper import (
 )
 from tests.planfly.made_plans import made_plan
 from tests.setups import small_scenario
+from world.interruption import Interrupted, interrupt
 from world.scenario import load_scenario
 
 
@@ -121,3 +128,27 @@ def test_tables_hold_the_plans_and_only_times_csv_their_time(tmp_path: Path) -> 
         write_tables(tmp_path / folder, table(plans), plans)
         kept[folder] = [(tmp_path / folder / name).read_bytes() for name in ("table.csv", "runs.csv", "runs.json")]
     assert kept["x"] == kept["y"]
+
+
+def test_a_signal_while_processes_start_leaves_none_half_started(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A process that is started and gets no task ends with a traceback."""
+    results = paper._results([(7, "umda", seed) for seed in (1, 2, 3)], 2)
+    next(results)
+    resource_tracker.ensure_running()
+    spawn, started = multiprocessing.util.spawnv_passfds, list[int]()
+
+    def interrupted_spawn(*arguments: object) -> int:
+        started.append(spawn(*arguments))
+        interrupt(signal.SIGTERM)
+        return started[-1]
+
+    monkeypatch.setattr(multiprocessing.util, "spawnv_passfds", interrupted_spawn)
+    with pytest.raises(Interrupted):
+        next(results)
+    for process in started:
+        with contextlib.suppress(ChildProcessError):
+            os.waitpid(process, 0)
+    assert started
+    assert capfd.readouterr().err == ""

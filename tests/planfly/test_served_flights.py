@@ -1,18 +1,21 @@
 """Missions judged for a served vehicle, and logs that never overwrite one another."""
 
 from dataclasses import replace
+from multiprocessing import Pipe
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
 
 from flight.live.arming import ACCEPTED, ArmingState
-from flight.live.flight_process import JudgeMission
-from flight.live.telemetry import CRITICAL, INFO, WARNING
-from flight.mission.items import Command, Frame, Mission, MissionItem
+from flight.live.flight_process import HELD_ON, DivertFlight, EndFlight, JudgeMission, StartFlight, serve_flights
+from flight.live.telemetry import AUTO, CRITICAL, INFO, LOITER, WARNING
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from logs.recording.reader import read_log
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import DecidingParameter, Place
+from planfly import served_flights
 from planfly.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
 from tests.logs.made_flight import make_track
 from tests.planfly.conftest import FIELD
@@ -108,7 +111,7 @@ def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOpt
     assert prepared is not None
     options.logs.mkdir()
     (options.logs / "flight-001.mcap").write_bytes(b"another's")
-    log = flights.open_log(prepared.setup)
+    log = flights.open_log(prepared.setup, AUTO)
     made = make_track(seconds=1.0)
     track = replace(made, leg=np.zeros_like(made.leg))
     log.write(track.rows(0, 30))
@@ -121,7 +124,34 @@ def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOpt
     assert read.recorded_verdict is not None
     assert read.recorded_verdict["flyable"] is judged.flyable is False
     assert (options.logs / "flight-001.mcap").read_bytes() == b"another's"
-    cut = flights.open_log(prepared.setup)
+    cut = flights.open_log(prepared.setup, AUTO)
     cut.write(track)
     cut.abandon()
     assert not read_log(options.logs / "flight-003.mcap").complete
+
+
+def test_a_circle_without_end_is_logged_in_pieces_about_one_place(
+    options: ServeOptions, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(served_flights, "HELD", 30.0)
+    level = mission(options, (0.0, 0.0, 150.0), (2500.0, 0.0, 150.0))
+    ours, theirs = Pipe()
+    thread = Thread(target=serve_flights, args=(theirs, ServedFlights(replace(options, speed=100.0))))
+    thread.start()
+    home = Home(46.0, 8.0, 0.0)
+    for request in (JudgeMission(level, 1), StartFlight(), DivertFlight(LOITER, replace(level, home=home))):
+        ours.send(request)
+    pieces = 0
+    while pieces < 3:
+        pieces = len(list(options.logs.glob("flight-*.mcap"))) if options.logs.exists() else 0
+        ours.poll(0.05) and ours.recv_bytes()
+    ours.send(EndFlight(quit=True))
+    while thread.is_alive():
+        ours.poll(0.05) and ours.recv_bytes()
+    ours.close()
+    theirs.close()
+    one, two = (read_log(options.logs / f"flight-00{number}.mcap") for number in (2, 3))
+    assert one.ended == HELD_ON
+    assert one.track.time[-1] == pytest.approx(30.0, abs=6.0), "from where the circle is joined on"
+    middles = [(log.setup.mission.items[-1].lat_deg, log.setup.mission.items[-1].lon_deg) for log in (one, two)]
+    assert middles[0] == middles[1]

@@ -31,6 +31,12 @@ from world.kernels import Record
 from world.scenario_tables import FlightTable, Navigation
 from world.wind import Turbulence
 
+# What of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` belongs to the way that is flown, and not to the aircraft.
+_OF_THE_WAY = (
+    *("leg", "cross_track_sum", "on_circle", "loitering", "stayed", "circled", "bearing", "at_height", "next_look"),
+    *("up_before", "over", "waited", "left_for", "returning", "climbed"),
+)
+
 
 @dataclass(frozen=True)
 class ArduPlane(Autopilot):
@@ -44,6 +50,7 @@ class ArduPlane(Autopilot):
     name: ClassVar = "ardupilot"
     title: ClassVar = "ArduPlane"
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE
+    cruise_parameter: ClassVar = "AIRSPEED_CRUISE"
     equivalent_airspeeds: ClassVar = True
     height_candidates: ClassVar = HEIGHT_CANDIDATES
     side_candidates: ClassVar = SIDE_CANDIDATES
@@ -89,6 +96,13 @@ class ArduPlane(Autopilot):
     def begin(self, memory: Record, own: Record) -> None:
         """Hand over the parameters."""
         own.parameters = self.parameters.record()
+
+    def take_over(self, before: Record, own: Record, here: Floats) -> None:
+        """As a change of mode: energies and airspeed are kept, and the leg begins here."""
+        own.memory = before.memory
+        for name in _OF_THE_WAY:
+            setattr(own.memory, name, 0)
+        own.memory.from_east, own.memory.from_north, own.memory.from_up = here
 
     def described(self, aircraft: str) -> str:
         """The law with the parameters that decide most of a flight."""
@@ -165,12 +179,6 @@ class ArduPlane(Autopilot):
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
         """The last speed that it took."""
         return speeds_flown(commanded, cruise, self.parameters)
-
-    @property
-    def stated_airspeed(self) -> tuple[float, str] | None:
-        """AIRSPEED_CRUISE of a person's file."""
-        stated = self.parameters.by_origin("file")
-        return (stated["AIRSPEED_CRUISE"], "AIRSPEED_CRUISE") if "AIRSPEED_CRUISE" in stated else None
 
     @property
     def stated_bank(self) -> float | None:

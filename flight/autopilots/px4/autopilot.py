@@ -42,6 +42,9 @@ _OTHER_RETURNS = {
     4: "RTL_TYPE 4, along the mission to its landing or back: flown as 1, to the nearest rally point or home",
 }
 
+# What of `flight.autopilots.px4.law.PX4_MEMORY` belongs to the way that is flown, and not to the aircraft.
+_OF_THE_WAY = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "waited")
+
 
 @dataclass(frozen=True)
 class Px4(Autopilot):
@@ -55,6 +58,7 @@ class Px4(Autopilot):
     name: ClassVar = "px4"
     title: ClassVar = "PX4"
     own: ClassVar[np.dtype[np.record] | None] = PX4
+    cruise_parameter: ClassVar = "FW_AIRSPD_TRIM"
     equivalent_airspeeds: ClassVar = True
     refuses: ClassVar = True
     speeds_by_value: ClassVar = True
@@ -95,6 +99,14 @@ class Px4(Autopilot):
     def begin(self, memory: Record, own: Record) -> None:
         """Hand over the parameters."""
         own.parameters = self.parameters.record()
+
+    def take_over(self, before: Record, own: Record, here: Floats) -> None:
+        """As a change of mode: energies and airspeed are kept, and the leg begins here."""
+        own.memory = before.memory
+        for name in _OF_THE_WAY:
+            setattr(own.memory, name, 0)
+        own.memory.from_east, own.memory.from_north, own.memory.from_up = here
+        own.memory.nearest, own.memory.begun_up = math.inf, here[2]
 
     def described(self, aircraft: str) -> str:
         """The law with the parameters that decide most of a flight."""
@@ -198,12 +210,6 @@ class Px4(Autopilot):
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
         """The commanded speeds within its limits."""
         return np.clip(commanded, self.parameters["FW_AIRSPD_MIN"], self.parameters["FW_AIRSPD_MAX"])
-
-    @property
-    def stated_airspeed(self) -> tuple[float, str] | None:
-        """FW_AIRSPD_TRIM of a person's file."""
-        stated = self.parameters.by_origin("file")
-        return (stated["FW_AIRSPD_TRIM"], "FW_AIRSPD_TRIM") if "FW_AIRSPD_TRIM" in stated else None
 
     @property
     def stated_bank(self) -> float | None:

@@ -3,8 +3,19 @@
 import pytest
 
 from flight.live.arming import ACCEPTED, DENIED, IN_PROGRESS, ArmingState
-from flight.live.flight_process import MissionJudged
-from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, LOITER, MANUAL, NO_MISSION, NOT_STARTED
+from flight.live.flight_process import MissionJudged, Place
+from flight.live.telemetry import (
+    ACTIVE,
+    AUTO,
+    COMPLETE,
+    GUIDED,
+    LOITER,
+    MANUAL,
+    NO_MISSION,
+    NOT_STARTED,
+    PAUSED,
+    RTL,
+)
 
 FORCED = 21196.0
 
@@ -64,18 +75,46 @@ def test_a_verdict_against_an_armed_vehicle_disarms_it() -> None:
     assert not state.armed
 
 
-def test_in_flight_only_a_forced_disarm_ends_it() -> None:
+def flying() -> ArmingState:
+    """A vehicle on its mission."""
     state = judged()
     state.arm(True, 0.0)
     state.set_mode(AUTO)
     state.flight_started()
+    return state
+
+
+def test_in_flight_only_a_forced_disarm_ends_it() -> None:
+    state = flying()
     assert state.arm(False, 0.0).result == DENIED
-    assert state.set_mode(LOITER).result == DENIED
-    assert state.pause(False).result == DENIED
-    assert state.pause(True).result == ACCEPTED
-    assert not state.end_requested
+    assert state.set_mode(MANUAL).result == DENIED
+    assert (state.mode, state.end_requested) == (AUTO, False)
     assert state.arm(False, FORCED).result == ACCEPTED
     assert state.end_requested
+
+
+@pytest.mark.parametrize("mode", [LOITER, RTL, GUIDED])
+def test_in_flight_a_mode_sends_it_another_way_once(mode: int) -> None:
+    state = flying()
+    assert state.set_mode(mode).result == ACCEPTED
+    assert (state.mode, state.place, state.mission_state) == (mode, Place(), PAUSED)
+    state.place = None
+    assert state.set_mode(mode).result == ACCEPTED
+    assert state.place is None, "it is on that way already"
+    assert state.set_mode(AUTO).result == ACCEPTED
+    assert (state.place, state.mission_state) == (Place(), ACTIVE)
+    assert judged().set_mode(RTL).result == judged().set_mode(GUIDED).result == DENIED, "on the ground"
+
+
+def test_a_pause_circles_and_a_go_to_needs_a_flight() -> None:
+    state, there = flying(), Place(46.0, 8.0, 150.0)
+    assert (state.pause(False).result, state.mode) == (ACCEPTED, LOITER)
+    assert (state.pause(True).result, state.mode) == (ACCEPTED, AUTO)
+    assert (state.go_to(there).result, state.mode, state.place) == (ACCEPTED, GUIDED, there)
+    assert judged().go_to(there).result == judged().pause(False).result == DENIED
+    # What ends beside the mission completes nothing of it.
+    state.flight_ended(True)
+    assert (state.mode, state.place, state.mission_state) == (MANUAL, None, NOT_STARTED)
 
 
 def test_auto_needs_a_mission_and_goes_with_it() -> None:

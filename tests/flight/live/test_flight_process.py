@@ -11,7 +11,9 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.live.flight_process import (
     STOPPED,
+    DivertFlight,
     EndFlight,
+    FlightDiverted,
     FlightEnded,
     FlightJudged,
     JudgeMission,
@@ -21,12 +23,13 @@ from flight.live.flight_process import (
     read_event,
     serve_flights,
 )
-from flight.live.telemetry import Snapshot
+from flight.live.telemetry import AUTO, RTL, Snapshot
 from flight.mission.items import Mission
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.mission_lines import setup_of, wp
+from world.errors import FlightError
 
 
 @dataclass
@@ -72,12 +75,15 @@ class OneSetup:
     def prepare(self, order: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         return PreparedFlight(self.setup, LocalMap.around(self.setup)), MissionJudged(order.number, True, True, ())
 
-    def open_log(self, setup: FlightSetup) -> MemoryLog:
+    def divert(self, request: DivertFlight, here: object) -> PreparedFlight:
+        raise FlightError("no way there")
+
+    def open_log(self, setup: FlightSetup, mode: int) -> MemoryLog:
         return self.log
 
 
-def events_of(log: MemoryLog, *, stop_after: int | None = None) -> list[object]:
-    """Events of one mission judged and flown, stopped after so many snapshots."""
+def events_of(log: MemoryLog, *, after: int | None = None, then: object = EndFlight()) -> list[object]:
+    """Events of one mission judged and flown, with a request after so many snapshots."""
     ours, theirs = Pipe()
     factory = OneSetup(setup_of(wp(0, 0), wp(0, 1500)), log)
     thread = Thread(target=serve_flights, args=(theirs, factory))
@@ -87,9 +93,9 @@ def events_of(log: MemoryLog, *, stop_after: int | None = None) -> list[object]:
     found: list[object] = []
     while not (found and isinstance(found[-1], FlightJudged)):
         found.append(read_event(ours.recv_bytes()))
-        if sum(isinstance(event, Snapshot) for event in found) == stop_after:
-            ours.send(EndFlight())
-            stop_after = None
+        if sum(isinstance(event, Snapshot) for event in found) == after:
+            ours.send(then)
+            after = None
     ours.send(EndFlight(quit=True))
     thread.join(20.0)
     assert not thread.is_alive()
@@ -111,7 +117,7 @@ def test_a_flight_is_judged_flown_and_judged() -> None:
 
 def test_a_station_ends_the_flight() -> None:
     log = MemoryLog()
-    assert events_of(log, stop_after=3)[-2:] == [FlightEnded(STOPPED), FlightJudged(False, ())]
+    assert events_of(log, after=3)[-2:] == [FlightEnded(STOPPED), FlightJudged(False, ())]
     assert log.closed == [STOPPED]
 
 
@@ -122,6 +128,14 @@ def test_a_full_disk_ends_the_flight_and_not_the_process() -> None:
     assert isinstance(judged, FlightJudged)
     assert "cannot be written" in judged.texts[0].text
     assert log.closed == ["abandoned"]
+
+
+def test_a_way_that_there_is_not_leaves_the_flight_as_it_is() -> None:
+    """`OneSetup` has no other way; the ways themselves are flown in tests/planfly/commands/test_serve_modes.py."""
+    log = MemoryLog()
+    events = events_of(log, after=1, then=DivertFlight(RTL, Mission(None, ())))
+    assert FlightDiverted(AUTO, "no way there") in events
+    assert events[-2:] == [FlightEnded("completed"), FlightJudged(True, ())]
 
 
 @pytest.mark.parametrize("gone", [False, True])

@@ -385,10 +385,17 @@ def test_a_station_that_knows_only_mission_request_is_asked_by_it() -> None:
     assert send(server, many_items(1)[0], ONE, now)[0].message.type == mavlink.MAV_MISSION_ACCEPTED
 
 
-@pytest.mark.parametrize("current", [2, 3])
-def test_a_guided_item_is_refused_at_once(current: int) -> None:
-    """Mission Planner's "fly to here" and its change of height are items of no mission."""
-    server = MissionServer()
+@pytest.mark.parametrize(("current", "located"), [(2, True), (3, False)])
+def test_a_guided_item_is_flown_to_and_is_no_item_of_the_mission(current: int, located: bool) -> None:
+    """Mission Planner's "fly to here" and its change of height."""
+    asked_for: list[MissionItem] = []
+    server = MissionServer(go_to=lambda one: asked_for.append(one) or "")
     (reply,) = send(server, float_item(0, 46.25, current), ONE, 0.0)
-    assert (reply.message.type, reply.text[:13]) == (mavlink.MAV_MISSION_UNSUPPORTED, "go-to refused")
+    assert (reply.message.type, reply.text) == (mavlink.MAV_MISSION_ACCEPTED, "")
+    (place,) = asked_for
+    assert (place.lat_deg == 46.25, math.isnan(place.lat_deg)) == (located, not located)
     assert server.lists[MissionType.MISSION] == ()
+    (reply,) = send(MissionServer(), float_item(0, 46.25, current), ONE, 0.0)
+    assert (reply.message.type, reply.text) == (mavlink.MAV_MISSION_DENIED, "go-to denied: not in flight")
+    (reply,) = send(server, float_item(0, 146.25, current), ONE, 0.0)
+    assert (reply.message.type, len(asked_for)) == (mavlink.MAV_MISSION_INVALID, 1)

@@ -1,15 +1,27 @@
-"""Parameters: read by number or name, and only PFLY_FORCE can be set, within its range."""
+"""Parameters: read by number or name; PFLY_FORCE and those of the law that flies can be set, within their ranges."""
 
 import math
+from collections.abc import Mapping
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.flight_process import FlightEnded, JudgeMission, StartFlight, send_event
+from flight.live.arming import ACCEPTED, DENIED
+from flight.live.flight_process import (
+    DivertFlight,
+    FlightDiverted,
+    FlightEnded,
+    JudgeMission,
+    Place,
+    StartFlight,
+    send_event,
+)
 from flight.live.mission_server import MissionType
 from flight.live.station_requests import FORCE, Parameters, vehicle_parameters
+from flight.live.telemetry import AUTO, GUIDED, LOITER, PAUSED, RTL
 from tests.flight.live.fake_vehicle import HEARTBEAT, FakeVehicle, command
 from tests.stations import item
+from world.errors import ParameterError
 
 
 @pytest.fixture
@@ -75,8 +87,6 @@ def results(out: list[object], number: int) -> list[int]:
     ("number", "word"),
     [
         (178, "speed change"),
-        (20, "RTL"),
-        (192, "go-to"),
         (34, "orbit"),
         (186, "height"),
         (22, "take-off"),
@@ -101,8 +111,8 @@ def test_a_guided_target_is_refused_in_words(fake: FakeVehicle) -> None:
     for _ in range(20):
         fake.send(target)
     texts = [m.text for m in out if m.get_type() == "STATUSTEXT"]
-    assert texts[0].startswith("go-to refused")
-    assert sum(text.startswith("go-to") for text in texts) == 1, "a stream of targets is answered once"
+    assert texts[0].startswith("target refused")
+    assert sum(text.startswith("target") for text in texts) == 1, "a stream of targets is answered once"
 
 
 ITEMS = [item(k, 460_000_000, 80_000_000 + 50_000 * k, 100.0) for k in range(5)]
@@ -148,13 +158,124 @@ def test_after_a_flight_from_an_item_the_whole_mission_is_flown_again(fake: Fake
 def test_a_refused_item_is_met_with_silence_by_message_and_with_a_result_by_command(fake: FakeVehicle) -> None:
     """MAVSDK sends MISSION_SET_CURRENT again, without end, at each MISSION_CURRENT of another item."""
     fake.upload(ITEMS)
-    fake.vehicle.arming.flying = True
     (peer,) = fake.link.peers.values()
     out = sent(fake)
     before = fake.vehicle._clock()
-    fake.send(mavlink.MAVLink_mission_set_current_message(1, 1, 3))
+    fake.send(mavlink.MAVLink_mission_set_current_message(1, 1, 9))
     assert not [m for m in out if m.get_type() == "MISSION_CURRENT"]
     assert 2.9 < peer.due["MISSION_CURRENT"] - before < 4.0
-    assert any(m.get_type() == "STATUSTEXT" and m.text.startswith("item 3 refused: in flight") for m in out)
-    fake.send(command(224, 3.0))
-    assert results(out, 224) == [mavlink.MAV_RESULT_TEMPORARILY_REJECTED]
+    assert any(m.get_type() == "STATUSTEXT" and m.text.startswith("item 9 refused: the mission has no") for m in out)
+    fake.send(command(224, 9.0))
+    assert results(out, 224) == [mavlink.MAV_RESULT_DENIED]
+
+
+# ----------------------------------------------------------------------
+# In flight: other ways are flown, and what the law flies with stays as it is.
+
+
+@pytest.fixture
+def in_flight(fake: FakeVehicle) -> FakeVehicle:
+    fake.upload(ITEMS)
+    fake.send(command(400, 1.0), command(176, 1.0, 10.0))
+    assert isinstance(fake.orders[-1], StartFlight)
+    return fake
+
+
+def diverted(fake: FakeVehicle) -> DivertFlight:
+    fake.turn()
+    assert isinstance(fake.orders[-1], DivertFlight)
+    return fake.orders[-1]
+
+
+@pytest.mark.parametrize(("asked", "mode"), [(command(20), RTL), (command(17), LOITER), (command(193, 0.0), LOITER)])
+def test_a_command_is_a_mode_by_another_name(in_flight: FakeVehicle, asked: object, mode: int) -> None:
+    in_flight.send(asked)
+    found = diverted(in_flight)
+    assert (found.mode, math.isnan(found.place.lat_deg)) == (mode, True)
+    send_event(in_flight.flight, FlightDiverted(mode, ""))
+    in_flight.turn()
+    assert in_flight.vehicle.status.mission_state == PAUSED
+
+
+def test_a_reposition_names_a_place_and_what_it_leaves_out_is_that_of_here(in_flight: FakeVehicle) -> None:
+    out = sent(in_flight)
+    nan = math.nan
+    # Frame 3 is a height over home; 2147483647 stands for no longitude.
+    in_flight.send(
+        mavlink.MAVLink_command_int_message(1, 1, 3, 192, 0, 0, -1, 1, 120, nan, 460_050_000, 80_100_000, 90.0)
+    )
+    assert diverted(in_flight).place == Place(46.005, 8.01, 90.0, 3, 120.0)
+    assert diverted(in_flight).mode == GUIDED
+    in_flight.send(command(192, -1.0, 1.0, nan, nan, nan, nan, 640.0))
+    place = diverted(in_flight).place
+    assert (math.isnan(place.lat_deg), math.isnan(place.lon_deg), place.alt, place.radius) == (True, True, 640.0, 0.0)
+    before = len(in_flight.orders)
+    in_flight.send(command(192, -1.0, 1.0, 0.0, nan, 95.0, 8.0, 640.0))
+    assert results(out, 192) == [ACCEPTED, ACCEPTED, DENIED]
+    assert len(in_flight.orders) == before
+
+
+def test_the_mission_goes_on_at_the_item_that_it_was_on_or_that_a_station_sets(in_flight: FakeVehicle) -> None:
+    out = sent(in_flight)
+    in_flight.vehicle.status.current = 2
+    in_flight.send(command(20))
+    in_flight.send(command(176, 1.0, AUTO))
+    assert [one.seq for one in diverted(in_flight).mission.items] == [2, 3, 4]
+    # Beside the mission an item is chosen for later; on it, it is flown to at once, the last one too.
+    in_flight.send(command(176, 1.0, LOITER), command(224, 3.0))
+    assert diverted(in_flight).mode == LOITER
+    in_flight.send(command(176, 1.0, AUTO))
+    assert [one.seq for one in diverted(in_flight).mission.items] == [3, 4]
+    in_flight.send(mavlink.MAVLink_mission_set_current_message(1, 1, 4))
+    assert [one.seq for one in diverted(in_flight).mission.items] == [4]
+    assert results(out, 224) == [ACCEPTED]
+
+
+def test_a_way_that_cannot_be_flown_leaves_it_in_its_mode(in_flight: FakeVehicle) -> None:
+    out = sent(in_flight)
+    in_flight.send(command(20))
+    send_event(in_flight.flight, FlightDiverted(AUTO, "no way there"))
+    in_flight.turn()
+    assert in_flight.vehicle.arming.mode == AUTO
+    assert "RTL refused: no way there" in [m.text for m in out if m.get_type() == "STATUSTEXT"]
+
+
+def flown(stated: Mapping[str, float]) -> dict[str, float]:
+    """A law that flies with two parameters, of which one is stated elsewhere."""
+    if stated.get("WP_RADIUS", 90.0) < 1.0:
+        raise ParameterError("WP_RADIUS: 0.5: allowed 1..32767")
+    return {"WP_RADIUS": 90.0, "THR_MIN": 0.0} | stated | {"AIRSPEED_CRUISE": 25.0}
+
+
+def test_parameters_that_fly_are_set_on_the_ground_and_the_mission_is_judged_anew(fake: FakeVehicle) -> None:
+    fake.vehicle.requests.parameters = fake.vehicle._parameters = parameters_of_a_law()
+    fake.upload(ITEMS)
+    out = sent(fake)
+
+    def setting(name: bytes, value: float) -> tuple[float, str]:
+        fake.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
+        fake.turn()
+        values = [m.param_value for m in out if m.get_type() == "PARAM_VALUE"]
+        # A text travels in pieces of 50 characters.
+        texts = [m.text for m in out if m.get_type() == "STATUSTEXT"]
+        out.clear()
+        return values[-1], "".join(texts)
+
+    # 70.3 as it travels: the number that was typed is flown with.
+    assert setting(b"WP_RADIUS", 70.3)[0] == pytest.approx(70.3)
+    assert isinstance(fake.orders[-1], JudgeMission)
+    assert fake.orders[-1].parameters == (("WP_RADIUS", 70.3),)
+    judged = len(fake.orders)
+    assert setting(b"WP_RADIUS", 0.5) == (pytest.approx(70.3), "WP_RADIUS: 0.5: allowed 1..32767; 70.3 kept")
+    assert setting(b"WP_RADIUS", math.nan)[1] == "WP_RADIUS nan: a finite number is expected; 70.3 kept"
+    assert setting(b"AIRSPEED_CRUISE", 22.0)[1].startswith("AIRSPEED_CRUISE is fixed by the aircraft or")
+    assert len(fake.orders) == judged
+    fake.send(command(400, 1.0), command(176, 1.0, 10.0))
+    value, text = setting(b"THR_MIN", 5.0)
+    assert (value, "THR_MIN 5 refused in flight" in text) == (0.0, True)
+
+
+def parameters_of_a_law() -> Parameters:
+    return vehicle_parameters(
+        airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=2.0, flown=flown
+    )

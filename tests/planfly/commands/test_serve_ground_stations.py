@@ -104,34 +104,23 @@ def test_mavsdks_mission_plugin_sends_no_home(serve: Callable[..., Served], tmp_
     assert log.setup.route.waypoints[:, 2] == pytest.approx([100.0, 100.0, 110.0])
 
 
-def test_mavsdk_is_answered_at_once_whatever_it_asks(serve: Callable[..., Served], tmp_path: Path) -> None:
-    """A start at another item is flown; in flight all is refused, MISSION_SET_CURRENT by the only way it has.
-
-    A MISSION_CURRENT that crosses that request has MAVSDK wait without end, whatever the vehicle then does: one session
-    in thirty on a machine at load 16.  So three sessions may be needed; without the vehicle's silence all are trapped.
-    """
+def test_mavsdk_has_it_hold_go_elsewhere_go_on_and_return(serve: Callable[..., Served], tmp_path: Path) -> None:
+    """What a person asks MAVSDK for is flown, a log each, with the parameter that was set; the rest is refused."""
     need("mavsdk")
     rows = [[46.0, 8.0, 100.0], [46.0, 8.0033, 100.0], [46.0, 8.0165, 100.0], [46.0, 8.03, 100.0]]
-    for session in range(3):
-        port = free_port()
-        vehicle = serve("--scenario", "field.toml", "--log", f"logs-{session}", to=port)
-        found = mavsdk(tmp_path, port, rows, "ask")
-        if found["flight"]["item"] != "NO END":
-            break
-        vehicle.kill()
-    assert found["ground"]["item"] == "SUCCESS"
-    # An answer is no time limit of MAVSDK's, which asks five times, half a second apart.
-    denied = dict.fromkeys(("hold", "return", "go"), "COMMAND_DENIED")
-    assert found["flight"] == {
-        "item": "TIMEOUT",
-        "pause": "DENIED",
-        **denied,
-        "speed": "UNSUPPORTED",
-        "orbit": "UNSUPPORTED",
-    }
+    port = free_port()
+    vehicle = serve("--scenario", "field.toml", "--speed", "5", to=port)
+    found = mavsdk(tmp_path, port, rows, "ask")
+    assert found["ground"] == {"item": "SUCCESS", "set": "SUCCESS", "lowered": 20.0, "listed": -20.0}
+    done = dict.fromkeys(("pause", "resume", "hold", "go", "item", "return"), "SUCCESS")
+    assert found["flight"] == {**done, "speed": "UNSUPPORTED", "orbit": "UNSUPPORTED"}
+    vehicle.wait(lambda line: "flying in RTL" in line)
     assert vehicle.stop() == 0
-    log = read_log(tmp_path / f"logs-{session}" / "flight-001.mcap")
-    assert len(log.setup.route.waypoints) == 3, "from the second place on"
+    logs = [read_log(tmp_path / "logs" / f"flight-{number:03d}.mcap") for number in range(1, 7)]
+    modes = ("LOITER", "AUTO", "LOITER", "GUIDED", "RTL")
+    assert [log.ended for log in logs[:-1]] == [f"left, as a ground station asked, for {mode}" for mode in modes]
+    assert len(logs[0].setup.route.waypoints) == 3, "from the second place on"
+    assert {log.setup.autopilot.parameters.wp_radius for log in logs} == {70.0}
 
 
 @pytest.mark.skipif(not SOAK, reason="a bad link is tried with a station of ours, too: in make soak")
@@ -210,7 +199,7 @@ def mavproxy(tmp_path: Path) -> Iterator[Callable[[int], MavProxy]]:
         one.close()
 
 
-def test_mavproxy_loads_arms_flies_and_saves(
+def test_mavproxy_loads_arms_flies_elsewhere_and_saves(
     serve: Callable[..., Served], mavproxy: Callable[[int], MavProxy], tmp_path: Path
 ) -> None:
     for name, text in (("m.waypoints", WPL), ("f.txt", FENCE), ("r.txt", RALLY)):
@@ -229,16 +218,27 @@ def test_mavproxy_loads_arms_flies_and_saves(
     user.expect("Saved 4 waypoints")
     user.type("arm throttle")
     user.expect("COMPONENT_ARM_DISARM: ACCEPTED")
+    user.type("param set WP_RADIUS 70")
+    user.type("param show WP_RADIUS")
+    user.expect(r"WP_RADIUS\s+70\.0")
     user.type("mode AUTO")
     user.expect("mission started")
+    user.type("mode LOITER")
+    user.expect("flying in LOITER")
+    user.type("guided 46.001 8.002 130")
+    user.expect("flying in GUIDED")
+    user.type("mode RTL")
+    user.expect("flying in RTL")
+    user.type("mode AUTO")
+    user.expect("flying in AUTO")
     user.expect("flight completed")
     user.expect(r"(?s)(?=.*DISARMED)(?=.*verdict \(flown\): FLYABLE)")
     user.type("link")
     user.expect(r"link 1 OK .* 0\.0% loss")
     assert "fence breach" not in user.text
     assert vehicle.stop() == 0
-    log = read_log(tmp_path / "logs" / "flight-001.mcap")
-    assert log.ended == "completed"
+    log, last = (read_log(tmp_path / "logs" / f"flight-00{number}.mcap") for number in (1, 5))
+    assert (log.setup.autopilot.parameters.wp_radius, last.ended) == (70.0, "completed")
     sent, kept = (
         [[float(value) for value in line.split()[8:11]] for line in text.splitlines()[1:]]
         for text in (WPL, (tmp_path / "back.txt").read_text(encoding="ascii"))

@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane_sitl import flight as autopilot_flight
 from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.simulation.setup import FlightSetup
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
 from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
-from tests.soak import some
+from tests.soak import SOAK, some
 from world.errors import FlightError
 
 AEROSONDE = load_aircraft("aerosonde")
@@ -36,6 +37,14 @@ WAY = np.array(
 def own_folder_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+
+
+@pytest.fixture
+def short_run_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fake flies steadily at once, where ArduPlane needs the run-in to settle."""
+    if not SOAK:
+        monkeypatch.setattr(autopilot_flight, "RUN_IN", 100.0)
+        monkeypatch.setattr(autopilot_flight, "RUN_IN_SECONDS", 4.0)
 
 
 def left_behind() -> list[Path]:
@@ -101,6 +110,7 @@ def test_an_autopilot_flies_the_mission_to_its_end(fake_autopilot: MakeFake, tmp
         2,
     ),
 )
+@pytest.mark.usefixtures("short_run_in")
 def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
     fake_autopilot: MakeFake, monkeypatch: pytest.MonkeyPatch, fault: str, said: str
 ) -> None:
@@ -115,6 +125,7 @@ def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
     assert (children(), left_behind()) == (before, folders)
 
 
+@pytest.mark.usefixtures("short_run_in")
 def test_a_loiter_without_end_is_flown_with_its_own_radius_for_a_minute(fake_autopilot: MakeFake) -> None:
     """The program circles on; the flight's clock counts from the circle on, and ends it there."""
     setup = setup_of(wp(0, 0), wp(0, 1000, command=17, p="0 0 -250 0"))
@@ -129,6 +140,7 @@ def test_a_loiter_without_end_is_flown_with_its_own_radius_for_a_minute(fake_aut
     assert around[-1] - around[0] == pytest.approx(-6.0, abs=1.0)
 
 
+@pytest.mark.usefixtures("short_run_in")
 def test_a_dive_into_the_ground_is_a_flight_that_ended_so(fake_autopilot: MakeFake) -> None:
     way = WAY * [1.0, 3.0, 1.0]
     flown, _ = fly_autopilot(MAKE(way - [0.0, 0.0, 300.0]), AEROSONDE, fake_autopilot("dive"), {})
@@ -154,6 +166,7 @@ def test_a_file_that_is_no_program_is_one_line(tmp_path: Path) -> None:
     assert left_behind() == before
 
 
+@pytest.mark.usefixtures("short_run_in")
 def test_an_exception_ends_the_program_and_removes_its_folder(fake_autopilot: MakeFake) -> None:
     before, folders = children(), left_behind()
 
@@ -192,6 +205,7 @@ with AutopilotFlight(make_setup(), AEROSONDE, Path({str(fake_autopilot())!r}), {
     assert tmp_path.exists()
 
 
+@pytest.mark.usefixtures("short_run_in")
 def test_satellites_mistake_the_place_as_the_setup_says(fake_autopilot: MakeFake) -> None:
     def mistakes(nav: str) -> list[tuple[float, ...]]:
         found = []
