@@ -253,15 +253,26 @@ class ServedLog:
         self._recorder.flush()
 
     def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
-        """Judge the flight and close the log; hurry: as of `planfly.reference_flights.judge_with_reference_flights`."""
+        """Judge the flight and close the log; hurry: as of `planfly.reference_flights.judge_with_reference_flights`.
+
+        In a hurry, a way that was left before is not judged: `planfly check` does it.  One that was left within a
+        second leaves no log.
+        """
         track = join_tracks(self._blocks)
+        left = ended.startswith((LEFT_FOR, HELD_ON))
+        end = float(track.time[-1]) if len(track) else 0.0
+        if left and end < 1.0:
+            self._recorder.abandon()
+            self._path.unlink()
+            return FlightJudged(False, ())
+        self._recorder.event(end, f"flight ended: {ended}", "info" if left or ended == "completed" else "error")
+        if left and hurry():
+            self._recorder.finish(ended)
+            return FlightJudged(False, (StatusText(f"log {self._path}, not judged yet", INFO),))
         if ended == "completed":
             verdict, reference = judge_with_reference_flights(self._setup, self._aircraft, track, ended, hurry)
         else:
             verdict, reference = judge_flight(self._setup, track, ended), None
-        end = float(track.time[-1]) if len(track) else 0.0
-        left = ended.startswith((LEFT_FOR, HELD_ON))
-        self._recorder.event(end, f"flight ended: {ended}", "info" if left or ended == "completed" else "error")
         self._recorder.finish(ended, verdict, reference)
         texts = left_texts(self._level, ended, verdict) if left else verdict_texts(self._level, verdict)
         return FlightJudged(verdict.flyable, (*texts, StatusText(f"log {self._path}", INFO)))
@@ -281,13 +292,14 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
 
 
 # What fails of a way because the aircraft was sent on before its end.
-_UNFINISHED = ("completion", "waypoint", "turn", "survey")
+_UNFINISHED = ("completion", "loiter", "waypoint", "turn", "survey")
 
 
 def left_texts(level: str, ended: str, verdict: Verdict) -> tuple[StatusText, ...]:
     """The verdict on a way that the aircraft was sent on from, on what was flown of it."""
     failed = [item for item in verdict.findings if item.ok is False and item.rule not in _UNFINISHED]
-    first = StatusText(f"verdict ({level}): {ended}; {len(failed) or 'no'} findings failed until then", INFO)
+    found = "1 finding" if len(failed) == 1 else f"{len(failed) or 'no'} findings"
+    first = StatusText(f"verdict ({level}): {ended}; {found} failed until then", INFO)
     return (first, *_failed_texts(failed))
 
 

@@ -172,7 +172,7 @@ class UdpStation:
         self.log += found
         return list(found)
 
-    def until(self, condition: Callable[[Any], bool], limit: float = 25.0) -> Any:
+    def until(self, condition: Callable[[Any], bool], limit: float = 120.0) -> Any:
         """The first message that meets a condition; fails after ``limit`` s."""
         end = time.monotonic() + limit
         while time.monotonic() < end:

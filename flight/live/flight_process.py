@@ -300,7 +300,7 @@ def _fly(connection: Connection, requests: _Requests, prepared: PreparedFlight, 
         ended, go_on = flown.in_step()
         if go_on:
             send_event(connection, FlightEnded(ended))
-        judged = flown.finish(ended)
+        judged = flown.finish(ended, requests.ending if go_on else lambda: True)
     except OSError as error:
         flown.abandon()
         # A pipe that broke ends the process; a full disk ends the flight.
@@ -368,10 +368,10 @@ class _Flown:
                 beat = max(beat, int((clock() - begun) * SNAPSHOT_RATE))
         return ended, go_on
 
-    def finish(self, ended: str) -> list[FlightJudged]:
-        """Judge each way, and close its log."""
+    def finish(self, ended: str, hurry: Callable[[], bool]) -> list[FlightJudged]:
+        """Judge each way, and close its log; hurry: as of `LogSink.finish`."""
         endings = (*self._left, ended)
-        return [log.finish(how, self._requests.ending) for log, how in zip(self._logs, endings, strict=True)]
+        return [log.finish(how, hurry) for log, how in zip(self._logs, endings, strict=True)]
 
     def abandon(self) -> None:
         """Close the logs as they are."""

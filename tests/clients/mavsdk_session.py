@@ -83,6 +83,8 @@ def by_asking(system: System, rows: list[list[float]]) -> dict[str, object]:
     action.arm()
     mission.start_mission()
     wait(telemetry.in_air)
+    # A log holds a second at the least.
+    time.sleep(1.5)
     flight = {
         "pause": asked(mission.pause_mission),
         "resume": asked(mission.start_mission),

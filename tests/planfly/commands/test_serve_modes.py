@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from logs.recording.reader import read_log
 from planfly.cli import main
 from tests.planfly.conftest import Served
+from tests.soak import some
 from tests.stations import UdpStation, item
 
 LAT, LON = 460_000_000, 80_000_000
@@ -45,7 +46,7 @@ def set_mode(station: UdpStation, mode: int) -> None:
     in_mode(station, mode)
 
 
-@pytest.mark.parametrize("law", ["ideal", "ardupilot", "px4"])
+@pytest.mark.parametrize("law", some(["ardupilot", "px4", "ideal"], 3))
 def test_it_holds_goes_elsewhere_goes_on_and_returns(serve: Callable[..., Served], law: str) -> None:
     vehicle = serve("--scenario", "field.toml", "--speed", "20", "--autopilot-law", law)
     with UdpStation(vehicle.port) as station:
