@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from logs.recording.reader import read_log
+from logs.recording.reader import FlightLog, read_log
 from planfly.cli import main
 from tests.planfly.conftest import Served
 from tests.soak import some
@@ -95,7 +95,12 @@ def test_it_holds_goes_elsewhere_goes_on_and_returns(serve: Callable[..., Served
     assert vehicle.stop() == 0
     for mode in ("LOITER", "GUIDED", "AUTO", "RTL"):
         assert f"flying in {mode}" in texts
-    logs = [read_log(vehicle.folder / "logs" / f"flight-00{k}.mcap") for k in range(1, 6)]
+    follow_each_other([read_log(vehicle.folder / "logs" / f"flight-00{k}.mcap") for k in range(1, 6)])
+    assert main(["check", str(vehicle.folder / "logs" / "flight-005.mcap")]) == 0
+
+
+def follow_each_other(logs: list[FlightLog]) -> None:
+    """The logs of the flight above: what is flown in each, and that the aircraft flies on from one to the next."""
     modes = ["LOITER", "GUIDED", "AUTO", "RTL"]
     left = [f"left, as a ground station asked, for {mode}" for mode in modes]
     assert [log.ended for log in logs] == [*left, "completed"]
@@ -107,4 +112,3 @@ def test_it_holds_goes_elsewhere_goes_on_and_returns(serve: Callable[..., Served
         assert after.track.velocity[0] == pytest.approx(before.track.velocity[-1], abs=1.5)
         assert after.track.attitude[0] == pytest.approx(before.track.attitude[-1], abs=0.1)
         assert after.track.energy[0] >= before.track.energy[-1], "nor is its battery full again"
-    assert main(["check", str(vehicle.folder / "logs" / "flight-005.mcap")]) == 0
