@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import default_parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -27,15 +29,15 @@ def loiter(radius: float = 200.0, turns: int = 2) -> FlightSetup:
 
 
 def laid(
-    setup: FlightSetup, wider: float = 0.0, stop: float | None = None
+    setup: FlightSetup, wider: float = 0.0, stop: float | None = None, begins: float = WIDER_FROM
 ) -> tuple[RouteRequirements, AlignedTrack, Circle]:
-    """The setup's route and its flight, this much to the outside (m) from the first turn around it on."""
+    """The setup's route and its flight, this much to the outside (m) from a distance along the path on (m)."""
     requirements = route_requirements(setup)
     side = math.copysign(1.0, requirements.turns[1])
     track = fly_path(
         setup,
         radius=[float(radius) for radius in requirements.radius[1:-1]],
-        across=lambda s: -side * wider * (s > WIDER_FROM),
+        across=lambda s: -side * wider * (s > begins),
         stop=stop,
         rate=20.0,
     )
@@ -81,6 +83,16 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
     assert high == pytest.approx(200.0 + max(wider, 0.0), abs=0.06)
     assert f"{circle.turns:.2f} turns with 200 m" in item.reason
     assert item.margin == pytest.approx(200.0 - float(requirements.tightest[circle.first : circle.last + 1].max()))
+
+
+@pytest.mark.parametrize(("mean", "told"), [(259.0, False), (261.0, True)])
+def test_a_circle_flown_more_than_a_quarter_and_10_m_wider_is_told(mean: float, told: bool) -> None:
+    """Of ArduPlane, which is on its circle once it flies around: 200 m may be flown with 260."""
+    setup = replace(loiter(), autopilot=ArduPlane(default_parameters()))
+    _, aligned, _ = laid(setup, mean - 200.0, begins=1000.0)
+    item = of(judge(setup, aligned.track), "loiter")
+    assert item.flown == pytest.approx(mean, abs=0.9)
+    assert (f"flown with {mean:.0f} m where 200 m is asked for" in item.reason) is told
 
 
 def finding(rule: str, place: Place, ok: bool | None, margin: float | None) -> Finding:
