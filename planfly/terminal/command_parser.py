@@ -15,7 +15,8 @@ from world.files import did_you_mean
 # Colour where a terminal wants it: a terminal that is none, NO_COLOR and TERM=dumb want none, FORCE_COLOR wants it.
 
 Style = Literal["good", "bad", "warning", "hint"]
-_STYLES: dict[Style, str] = {"good": "green", "bad": "red", "warning": "yellow", "hint": "cyan"}
+# Colours of ECMA-48, "select graphic rendition": green, red, yellow and cyan.
+_STYLES: dict[Style, int] = {"good": 32, "bad": 31, "warning": 33, "hint": 36}
 
 
 def wants_colour(stream: TextIO) -> bool:
@@ -40,23 +41,22 @@ def coloured(text: str, style: Style, stream: TextIO | None = None) -> str:
     """
     if not wants_colour(stream if stream is not None else sys.stdout):
         return text
-    # Imported here: most output is read by no terminal.
-    from rich.color import ColorSystem
-    from rich.style import Style as RichStyle
-
-    return RichStyle.parse(_STYLES[style]).render(text, color_system=ColorSystem.STANDARD)
+    return f"\x1b[{_STYLES[style]}m{text}\x1b[0m"
 
 
-def help_formatter(prog: str) -> argparse.HelpFormatter:
-    """What lays a command's help out: in colour for a terminal that wants it."""
-    if not wants_colour(sys.stdout):
-        return argparse.RawDescriptionHelpFormatter(prog)
-    # Imported here: it takes as long as all else of the help together.
-    from rich_argparse import RawDescriptionRichHelpFormatter
+# In a help: what stands above a paragraph, and options, wherever they stand.
+_HEADING, _NAMED = re.compile(r"^(\S[^\n]*:)(?=$| planfly)", re.MULTILINE), re.compile(r"(?<![\w/-])--?[a-z][a-z-]*")
 
-    formatter = RawDescriptionRichHelpFormatter
-    formatter.group_name_formatter = str
-    return formatter(prog)
+
+def coloured_help(text: str) -> str:
+    r"""A help as a terminal that wants colour gets it; the text is the same.
+
+    >>> coloured_help("usage: planfly fly [--at TIME]").split("\x1b")
+    ['', '[33musage:', '[0m planfly fly [', '[36m--at', '[0m TIME]']
+    """
+    for pattern, code in ((_NAMED, _STYLES["hint"]), (_HEADING, _STYLES["warning"])):
+        text = pattern.sub(f"\x1b[{code}m\\g<0>\x1b[0m", text)
+    return text
 
 
 _OPTION = re.compile(r"--[a-z][a-z-]*")
@@ -73,7 +73,7 @@ class CommandParser(argparse.ArgumentParser):
     """A parser of one command, or of the whole line."""
 
     def __init__(self, **settings: Any) -> None:
-        super().__init__(formatter_class=help_formatter, **settings)
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
         self._aliases: dict[str, str] = {}
         # What the help says between the examples and the exit codes; made when it is printed.
         self.more: Callable[[], str] = str
@@ -90,7 +90,7 @@ class CommandParser(argparse.ArgumentParser):
             self.epilog = (epilog or "").replace(EXIT_CODES, f"{more}\n\n{EXIT_CODES}")
         text = super().format_help()
         self.epilog = epilog
-        return text
+        return coloured_help(text) if wants_colour(sys.stdout) else text
 
     def group(self, title: str, description: str | None = None) -> OptionTaker:
         """Options that stand together in the help, under a title."""
@@ -134,13 +134,17 @@ class LineParser(CommandParser):
         """Have the commands that follow listed below a title."""
         self._section = title
 
-    def command(self, name: str, summary: str, *examples: str) -> CommandParser:
-        """Make the parser of a command.  summary: what it does; examples: lines of its help."""
+    def command(self, name: str, summary: str, *examples: str, extra: str = "") -> CommandParser:
+        """Make the parser of a command.
+
+        summary: what it does.  examples: lines of its help.  extra: of planfly, which it needs; "" for none.
+        """
+        needs = f"  It needs the extra planfly[{extra}]." if extra else ""
         shown = f"\n{' ' * len('example: ')}".join(examples)
         made: CommandParser = self._parsers.add_parser(
             name,
             help=summary,
-            description=summary[0].upper() + summary[1:] + ".",
+            description=f"{summary[0].upper()}{summary[1:]}.{needs}",
             epilog=f"example: {shown}\n\n{EXIT_CODES}",
         )
         self.commands[name] = made
