@@ -12,22 +12,25 @@ test low newest: export OPENBLAS_NUM_THREADS := 1
 # A file's tests run in one of three processes, so that what they share is made once; files in their own order.  Three,
 # since a tenth of the tests' time is waiting: for a port, a timeout, a process that ends.
 SPREAD := -n 3 --dist loadfile --no-loadscope-reorder
-# Rooms that need nothing but planfly itself; the others test with clients, which have their own lower bounds.
+# Rooms that need nothing but planfly itself, and some of its extras; the others test with clients, which have their own
+# lower bounds.
 LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/flight/mission_files tests/flight/dynamics \
 	tests/flight/live tests/logs/recording tests/logs/verdict tests/planfly/campaigns/statistics \
 	tests/planfly/campaigns/test_dispersions.py tests/planfly/campaigns/test_dispersions_draws.py
 # What pyproject.toml names.
-DIRECT := ^(cryptography|dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
-	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
+DIRECT := ^(cryptography|dask|distributed|foxglove-schemas-protobuf|foxglove-sdk|gpxpy|imageio-ffmpeg|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pandas|pillow|$\
+	platformdirs|protobuf|pyarrow|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
 # uv installs some five times as fast as pip; pip does it where uv cannot (a registry that pip alone is told of).
 # Python compiles what is imported, and keeps it: nothing compiles the rest.
 define INSTALL
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt uv
-	$(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.$(EXTRAS)' || \
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --build-constraints constraints.txt \
+		--editable '.$(EXTRAS)' || \
 		$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.$(EXTRAS)'
 endef
 EXTRAS :=
-# What is installed: an environment that is made; planfly; what the pages take, too; what the tests take, too.
+# What is installed: an environment that is made; planfly's base, which the demo takes; what the pages take, too; all
+# extras and what the tests take, too.
 MADE := $(VENV)/.made
 READY := $(VENV)/.ready
 PAGES := $(VENV)/.ready-docs
@@ -82,7 +85,7 @@ newest: SET := --upgrade
 low newest: export CI :=
 low newest:
 	$(PYTHON) -m venv build/$@
-	build/$@/bin/python -m pip install --quiet $(SET) --editable . hypothesis pytest pytest-xdist trimesh
+	build/$@/bin/python -m pip install --quiet $(SET) --editable '.[campaigns,gdal,live,tables]' hypothesis pytest pytest-xdist trimesh
 	@echo "tested with the $(if $(filter low,$@),lowest,newest) versions:"
 	@build/$@/bin/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
 	NUMBA_CACHE_DIR=$(CURDIR)/build/$@/kernels build/$@/bin/python -m pytest $(SPREAD) $(LOW)

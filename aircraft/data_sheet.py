@@ -11,11 +11,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from aircraft.model_writer import AeroCoefficients, Layout, ModelNumbers
 from aircraft.propulsion import BOOK_PROPELLER, ElectricMotor, FuelEngine, Propeller
 from world.errors import FlightError
+
+Floats = NDArray[np.float64]
 
 # Air at sea level: density, kg/m^3, and kinematic viscosity, m^2/s.  Sheets are read as at 500 m, where most fly.
 SEA_LEVEL, VISCOSITY = 1.225, 1.46e-5
@@ -502,16 +505,36 @@ def _meet(amiss: Callable[[Sequence[float]], list[float]], count: int, sheet: Da
     """Positive numbers near 1 at which nothing is amiss.  Raises FlightError where there are none."""
     if not count:
         return []
-    # scipy loads for new aircraft alone.
-    from scipy.optimize import least_squares
-
     for size in (1.0, 0.6, 1.7):
-        start = np.log([size, 1.0 / size][:count])
-        found = least_squares(lambda x: amiss(np.exp(x).tolist()), start, bounds=(-2.5, 2.5), xtol=1e-13, ftol=1e-13)
-        if found.cost < 1e-14:
-            free: list[float] = np.exp(found.x).tolist()
+        x = _newton(lambda x: np.array(amiss(np.exp(x).tolist())), np.log([size, 1.0 / size][:count]))
+        if x is not None:
+            free: list[float] = np.exp(x).tolist()
             return free
     raise _no_propeller(sheet)
+
+
+# A step of the search, and where it ends, as logarithms of factors; amiss of what counts as met.
+_STEP, _BOUND, _MET = 1e-6, 2.5, 1e-7
+
+
+def _newton(amiss: Callable[[Floats], Floats], x: Floats) -> Floats | None:
+    """Numbers within the bound at which nothing is amiss, by Newton's method; None where it finds none.
+
+    A step that does not help is halved.
+    """
+    off = amiss(x)
+    for _ in range(100):
+        slopes = np.array([(amiss(x + step) - amiss(x - step)) / (2.0 * _STEP) for step in _STEP * np.eye(x.size)]).T
+        whole, size = np.linalg.lstsq(slopes, -off, rcond=None)[0], 1.0
+        while size > 1e-6:
+            there = np.clip(x + size * whole, -_BOUND, _BOUND)
+            if np.linalg.norm(left := amiss(there)) < np.linalg.norm(off):
+                break
+            size *= 0.5
+        else:
+            break
+        x, off = there, left
+    return x if np.abs(off).max() < _MET else None
 
 
 def _no_propeller(sheet: DataSheet) -> FlightError:

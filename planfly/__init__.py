@@ -116,6 +116,7 @@ if TYPE_CHECKING:
     from world.errors import ArgumentError as ArgumentError
     from world.errors import FlightError as FlightError
     from world.errors import LogError as LogError
+    from world.errors import MissingExtraError as MissingExtraError
     from world.errors import MissionError as MissionError
     from world.errors import ParameterError as ParameterError
     from world.errors import PlanflyError as PlanflyError
@@ -229,6 +230,7 @@ _HOMES = {
             "ArgumentError",
             "FlightError",
             "LogError",
+            "MissingExtraError",
             "MissionError",
             "ParameterError",
             "PlanflyError",

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -129,6 +129,31 @@ def joined(tiles: Sequence["RasterFile"], name: str) -> "RasterFile":
         read=read,
         grid=moved_grid(first.grid, top, left),
     )
+
+
+class Affine(NamedTuple):
+    """From columns and rows to coordinates: x = a col + b row + c, y = d col + e row + f."""
+
+    a: float
+    b: float
+    c: float
+    d: float
+    e: float
+    f: float
+
+    @property
+    def determinant(self) -> float:
+        """Area of a pixel, with the sign of its turn; 0 where it is none."""
+        return self.a * self.e - self.b * self.d
+
+    def inverse(self) -> "Affine":
+        """From coordinates to columns and rows."""
+        a, b, d, e = (value / self.determinant for value in (self.e, -self.b, -self.d, self.a))
+        return Affine(a, b, -a * self.c - b * self.f, d, e, -d * self.c - e * self.f)
+
+    def applied(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Apply it to numbers or arrays."""
+        return self.a * x + self.b * y + self.c, self.d * x + self.e * y + self.f
 
 
 def moved_grid(grid: tuple[float, ...], rows: int, cols: int) -> tuple[float, ...]:

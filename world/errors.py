@@ -9,7 +9,8 @@
     │   └── CrashError  a program that steered and failed in flight: the command line ends with 1
     ├── ParameterError  a file of an autopilot's parameters
     ├── LogError        a flight log
-    └── ArgumentError   an argument of a call that is out of its range: a ValueError, too
+    ├── ArgumentError   an argument of a call that is out of its range: a ValueError, too
+    └── MissingExtraError  what a feature needs is not installed: an ImportError, too
 
 Each message is one line: the file, the line or field, the value, and the allowed range.  The command
 line prints it and ends with exit code 2.  "Not flyable" and "no feasible path" are results, not errors.
@@ -142,3 +143,10 @@ class LogError(PlanflyError):
 
 class ArgumentError(PlanflyError, ValueError):
     """An argument of a call is out of its range."""
+
+
+class MissingExtraError(PlanflyError, ImportError):
+    """A feature needs an extra of planfly that is not installed.
+
+    value: the extra's name.  allowed: the command that installs it.  name: the module that is missing.
+    """

@@ -125,6 +125,24 @@ def height_unit(crs: str) -> tuple[str, float]:
     )
 
 
+def wkt_of(crs: str) -> str:
+    """A CRS that PROJ knows, such as "EPSG:4326", as well-known text."""
+    from pyproj import CRS
+
+    return str(CRS.from_user_input(crs).to_wkt())
+
+
+def is_geographic(crs: str) -> bool:
+    """Whether a CRS counts in degrees of longitude and latitude.
+
+    >>> is_geographic("EPSG:4326+5773"), is_geographic("EPSG:32632")
+    (True, False)
+    """
+    from pyproj import CRS
+
+    return bool(CRS.from_user_input(crs).is_geographic)
+
+
 @dataclass(frozen=True, slots=True)
 class PolyMap:
     """A smooth map of the plane, as a polynomial fitted to it over a rectangle.

@@ -13,20 +13,31 @@ import re
 import warnings
 import zipfile
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from world.address_space import AddressSpaceError
 from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
-from world.elevation_tiles import is_ground, joined, tile_files
+from world.elevation_tiles import Affine, is_ground, joined, tile_files
 from world.errors import TerrainError
+from world.extras import need_extra
 from world.files import did_you_mean
-from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, to_geo, to_map, transform_points
+from world.frames import (
+    GeoOrigin,
+    crs_transformer,
+    fit_polymap,
+    height_unit,
+    is_geographic,
+    to_geo,
+    to_map,
+    transform_points,
+    wkt_of,
+)
 from world.height_datum import UNSTATED, HeightDatum, StatedDatum, height_datum
 from world.terrain import Terrain
 
@@ -213,20 +224,145 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
 
 
 # ----------------------------------------------------------------------
-# What rasterio reads.
+# Files with a place on Earth and a reference system: GeoTIFF, and the tiles of SRTM.
 
 METRES = ("m", "metre", "metres", "meter", "meters")
 # Words of a unit that are feet; what a tag of a unit across the ground has in its name.
 _FEET, _ACROSS = {"ft", "feet", "foot", "ftus", "usft"}, re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
+# Codes of EPSG.
+_METRE, _UNITS = 9001, {9002: "foot", 9003: "US survey foot"}
 # A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
 MAX_BLOCK = 32 * 2**20
+
+
+class _Placed(NamedTuple):
+    """What a file states of its heights.
+
+    shape: (rows, cols).  kind: numpy's letter of the numbers.  block: pixels of one.  unit: of the heights.
+    """
+
+    shape: tuple[int, int]
+    bands: int
+    kind: str
+    block: int
+    unit: str
+    transform: Affine | None
+    crs: str | None
+
+
+def _placed_file(file: Path, placed: _Placed, read: Callable[[int, int, int, int], NDArray[np.float32]]) -> RasterFile:
+    """A file of heights in metres on a grid of its reference system.  Raises TerrainError."""
+    if placed.bands != 1 or placed.kind not in "iuf":
+        allowed = "an elevation file has 1 band of numbers"
+        raise TerrainError.at(file, "bands", placed.bands, allowed, shown=f"{placed.bands} of kind {placed.kind!r}")
+    forward = placed.transform
+    if placed.crs is None or forward is None or forward.determinant == 0.0:
+        raise TerrainError(f"{file}: no coordinate reference system and position are stated", file=file)
+    try:
+        transformer, (stated, metres) = crs_transformer(placed.crs), height_unit(placed.crs)
+    except ValueError as error:
+        raise TerrainError(f"{file}: its reference system cannot be read: {one_line(error)}", file=file) from error
+    if (placed.unit or "m").lower() not in METRES or metres != 1.0:
+        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else placed.unit, "metres are expected")
+    if placed.block > MAX_BLOCK:
+        allowed = f"at most {MAX_BLOCK:,} are; tile the file"
+        raise TerrainError.at(file, "pixels of a block, read whole", placed.block, allowed, shown=f"{placed.block:,}")
+    _refuse_few(file, placed.shape)
+    rows, cols = placed.shape
+    inverse = forward.inverse()
+    middle = forward.applied(cols / 2, rows / 2)[0] if is_geographic(placed.crs) else math.nan
+
+    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+        x, y = transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
+        if not math.isnan(middle):
+            x = longitude_near(np.asarray(x), middle)
+        col, row = inverse.applied(np.asarray(x), np.asarray(y))
+        return np.asarray(col) - 0.5, np.asarray(row) - 0.5
+
+    def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
+        x, y = forward.applied(col + 0.5, row + 0.5)
+        lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
+        return np.asarray(lon), np.asarray(lat)
+
+    corners = np.stack(to_place(*outline(cols, rows)), axis=1)
+    return RasterFile(
+        str(file), placed.shape, to_source, to_place, corners, file_sha256(file), read, tuple(forward), placed.crs
+    )
+
+
+def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
+    """The unit of a file's heights: its band's, or feet that a tag of file or band names; "" for none.
+
+    GDAL takes what other programs write as a tag for a remark, and gives the heights in metres, which they are not.
+    """
+    for key, value in tags:
+        if "unit" in key.lower() and not _ACROSS.search(key) and _FEET & set(re.split("[^a-z]+", value.lower())):
+            return f"{value} (tag {key})"
+    return unit
+
+
+def open_geotiff(file: Path, _name: str) -> RasterFile:
+    """Open a GeoTIFF in any reference system, with heights in metres.  Raises TerrainError and MissingExtraError."""
+    # Imported here: a tile that we ship needs none of it.
+    from world.geotiff import BadTiffError, UnreadTiffError, read_geotiff
+
+    try:
+        found = read_geotiff(file)
+        crs = None if found.crs is None else wkt_of(found.crs)
+    except UnreadTiffError as why:
+        need_extra("gdal", f"{file}: {why}: reading it needs")
+        return _open_by_gdal(file)
+    except (BadTiffError, OSError) as error:
+        raise TerrainError(f"{file}: not a readable GeoTIFF file: {one_line(error)}", file=file) from error
+
+    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
+        try:
+            return found.read(top, bottom, left, right)
+        except (BadTiffError, OSError) as error:
+            raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
+
+    unit = _unit_of(found.unit, found.tags)
+    if found.vertical_unit not in (0, _METRE):
+        unit = _UNITS.get(found.vertical_unit, f"EPSG's unit {found.vertical_unit}")
+    block = found.blocks.rows * found.blocks.cols
+    return _placed_file(
+        file, _Placed(found.shape, found.bands, found.dtype.kind, block, unit, found.transform, crs), read
+    )
+
+
+# The name of a tile is its south-west corner's; its outer pixels lie on whole degrees.  Rows and columns by bytes.
+_TILE_NAME = re.compile(r"([NS])(\d\d)([EW])(\d\d\d)", re.IGNORECASE)
+_TILE_SHAPES = {
+    2 * rows * cols: (rows, cols) for rows, cols in ((1201, 1201), (3601, 1801), (3601, 3601), (7201, 7201))
+}
+
+
+def open_hgt(file: Path, _name: str) -> RasterFile:
+    """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
+    named, shape = _TILE_NAME.match(file.name), _TILE_SHAPES.get(file.stat().st_size)
+    if named is None or shape is None:
+        allowed = "a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights are expected"
+        raise TerrainError(f"{file}: not a readable SRTM tile: {allowed}", file=file, allowed=allowed)
+    rows, cols = shape
+    south = int(named[2]) * (1 if named[1].upper() == "N" else -1)
+    west = int(named[4]) * (1 if named[3].upper() == "E" else -1)
+    dx, dy = 1.0 / (cols - 1), 1.0 / (rows - 1)
+
+    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
+        try:
+            return np.memmap(file, ">i2", "r", shape=shape)[top:bottom, left:right].astype(np.float32)
+        except (OSError, ValueError) as error:
+            raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
+
+    transform = Affine(dx, 0.0, west - dx / 2, 0.0, -dy, south + 1.0 + dy / 2)
+    return _placed_file(file, _Placed(shape, 1, "i", cols, "m", transform, wkt_of("EPSG:4326")), read)
+
+
+# ----------------------------------------------------------------------
+# What GDAL reads, where the extra is installed.
+
 # Pixels of a window that are read before the next ones: numbers and masks take several times the heights' own memory.
 _PIXELS_AT_ONCE = 2**22
-
-
-def _applied(transform: Any, x: Any, y: Any) -> tuple[Any, Any]:
-    """Apply an affine transform to numbers or arrays; its own operator for that is `*` or `@`, by its version."""
-    return transform.a * x + transform.b * y + transform.c, transform.d * x + transform.e * y + transform.f
 
 
 def _read_strips(opened: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
@@ -255,81 +391,34 @@ GUARD: dict[str, Any] = {
 }
 
 
-def _unit_of(source: Any) -> str:
-    """The unit of an open file's heights: its band's, or feet that a tag of file or band names; "" for none.
-
-    GDAL takes what other programs write as a tag for a remark, and gives the heights in metres, which they are not.
-    """
-    for key, value in {**source.tags(), **source.tags(1)}.items():
-        if "unit" in key.lower() and not _ACROSS.search(key) and _FEET & set(re.split("[^a-z]+", value.lower())):
-            return f"{value} (tag {key})"
-    return source.units[0] or ""
-
-
-def _open_rasterio(file: Path, driver: str) -> RasterFile:
+def _open_by_gdal(file: Path) -> RasterFile:
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
 
+    failures = (RasterioError, RasterioIOError, ValueError, TypeError, OSError)
     try:
         with warnings.catch_warnings(), rasterio.Env(**GUARD):
             # Without georeferencing there is no reference system either, and that is refused in one line.
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(os.fspath(file.resolve()), driver=driver) as source:
-                crs, forward, kind = source.crs, source.transform, np.dtype(source.dtypes[0]).kind
-                rows, cols, bands = source.height, source.width, source.count
+            with rasterio.open(os.fspath(file.resolve()), driver="GTiff") as source:
                 scale, offset = float(source.scales[0]), float(source.offsets[0])
-                block, unit = math.prod(source.block_shapes[0]), _unit_of(source)
-        transformer = None if crs is None else crs_transformer(crs.to_wkt())
-        stated, metres = height_unit(crs.to_wkt()) if crs is not None else ("metre", 1.0)
-    except (RasterioError, RasterioIOError, ValueError, TypeError, OSError) as error:
-        raise TerrainError(f"{file}: not a readable {driver} file: {one_line(error)}", file=file) from error
-    if bands != 1 or kind not in "iuf":
-        allowed = "an elevation file has 1 band of numbers"
-        raise TerrainError.at(file, "bands", bands, allowed, shown=f"{bands} of kind {kind!r}")
-    if transformer is None or forward.determinant == 0.0:
-        raise TerrainError(f"{file}: no coordinate reference system and position are stated", file=file)
-    if (unit or "m").lower() not in METRES or metres != 1.0:
-        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "metres are expected")
-    if block > MAX_BLOCK:
-        allowed = f"at most {MAX_BLOCK:,} are; tile the file"
-        raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
-    _refuse_few(file, (rows, cols))
-
-    inverse = ~forward
-    middle = _applied(forward, cols / 2, rows / 2)[0] if crs.is_geographic else math.nan
-
-    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
-        x, y = transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
-        if not math.isnan(middle):
-            x = longitude_near(np.asarray(x), middle)
-        col, row = _applied(inverse, np.asarray(x), np.asarray(y))
-        return np.asarray(col) - 0.5, np.asarray(row) - 0.5
+                placed = _Placed(
+                    (source.height, source.width), source.count, np.dtype(source.dtypes[0]).kind,
+                    math.prod(source.block_shapes[0]),
+                    _unit_of(source.units[0] or "", {**source.tags(), **source.tags(1)}.items()),
+                    Affine(*tuple(source.transform)[:6]), None if source.crs is None else source.crs.to_wkt(),
+                )  # fmt: skip
+    except failures as error:
+        raise TerrainError(f"{file}: not a readable GeoTIFF file: {one_line(error)}", file=file) from error
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         try:
-            with rasterio.Env(**GUARD), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
+            with rasterio.Env(**GUARD), rasterio.open(os.fspath(file.resolve()), driver="GTiff") as opened:
                 return _read_strips(opened, (top, bottom, left, right), scale, offset)
         except (RasterioError, RasterioIOError, OSError) as error:
             raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
 
-    def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
-        x, y = _applied(forward, col + 0.5, row + 0.5)
-        lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
-        return np.asarray(lon), np.asarray(lat)
-
-    corners = np.stack(to_place(*outline(cols, rows)), axis=1)
-    place, grid = (rows, cols), tuple(forward)[:6]
-    return RasterFile(str(file), place, to_source, to_place, corners, file_sha256(file), read, grid, crs.to_wkt())
-
-
-def open_geotiff(file: Path, _name: str) -> RasterFile:
-    """Open a GeoTIFF in any reference system, with heights in metres.  Raises TerrainError."""
-    return _open_rasterio(file, "GTiff")
-
-
-def open_hgt(file: Path, _name: str) -> RasterFile:
-    """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
-    return _open_rasterio(file, "SRTMHGT")
+    return _placed_file(file, placed, read)
 
 
 # ----------------------------------------------------------------------
@@ -491,8 +580,6 @@ def _count_from_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
     """
     if raster.datum.sea_level is None:
         return
-    from scipy.interpolate import RectBivariateSpline
-
     rows, cols = (begin + np.arange(size) for begin, size in zip((top, left), heights.shape, strict=True))
     row, col = (np.linspace(every[0], every[-1], min(len(every), _SEA_LEVELS)) for every in (rows, cols))
     across, down = np.meshgrid(col, row)
@@ -502,11 +589,15 @@ def _count_from_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
         bad = int(np.argmin(np.isfinite(level)))
         where = f"longitude {lon[bad]:.4f}, latitude {lat[bad]:.4f}"
         raise TerrainError(f"{raster.name}: {where}: the geoid's height is not known there", file=raster.name)
-    surface = RectBivariateSpline(row, col, level.reshape(across.shape), kx=1, ky=1)
+    lines = np.stack([np.interp(cols, col, line) for line in level.reshape(across.shape)])
+    at = np.interp(rows, row, np.arange(row.size))
+    above = np.minimum(at.astype(np.intp), row.size - 2)
+    share = (at - above)[:, None]
     at_once = max(1, _PIXELS_AT_ONCE // cols.size)
     for first in range(0, rows.size, at_once):
         part = slice(first, first + at_once)
-        heights[part] -= surface(rows[part], cols).astype(np.float32)
+        upper, lower = lines[above[part]], lines[above[part] + 1]
+        heights[part] -= (upper + (lower - upper) * share[part]).astype(np.float32)
 
 
 def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from world.elevation_tiles import is_ground, moved_grid
 from world.errors import TerrainError
+from world.extras import need_extra
 from world.files import write_whole
-from world.raster import GUARD, MAX_PIXELS, RasterFile, open_geotiff, open_raster
+from world.geotiff import BadTiffError, UnreadTiffError, geotiff_bytes, read_geotiff
+from world.raster import MAX_PIXELS, RasterFile, open_geotiff, open_raster
 from world.remote_files import RemoteFile, find_remote
 
 Heights = NDArray[np.float32]
@@ -107,16 +109,25 @@ def _empty(heights: Heights) -> int:
 
 def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
     """Write a GeoTIFF, whole or not at all.  grid: affine coefficients, from columns and rows to the system."""
-    import rasterio
-    from rasterio.io import MemoryFile
-
     if heights.size > MAX_PIXELS:
         allowed = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
         raise TerrainError(f"{out}: {allowed}", file=out, value=heights.size, allowed=allowed)
     if _empty(heights) == heights.size:
         raise TerrainError(f"{out}: no data in the area: the tiles have none there", file=out)
     stored = np.where(is_ground(heights), heights, np.float32(_NODATA))
-    rows, cols = heights.shape
+    try:
+        data = geotiff_bytes(stored, grid, crs, _NODATA)
+    except UnreadTiffError as why:
+        need_extra("gdal", f"{out}: {why}: writing it needs")
+        data = _by_gdal(stored, grid, crs)
+    write_whole(out, data)
+
+
+def _by_gdal(stored: Heights, grid: Sequence[float], crs: str) -> bytes:
+    import rasterio
+    from rasterio.io import MemoryFile
+
+    rows, cols = stored.shape
     profile: dict[str, Any] = {
         "driver": "GTiff", "height": rows, "width": cols, "count": 1, "dtype": "float32", "crs": crs,
         "transform": rasterio.Affine(*grid), "nodata": _NODATA, "compress": "deflate", "predictor": 3,
@@ -125,7 +136,7 @@ def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None
         with memory.open(**profile) as file:
             file.write(stored, 1)
             file.units = ("m",)
-        write_whole(out, bytes(memory.getbuffer()))
+        return bytes(memory.getbuffer())
 
 
 # ----------------------------------------------------------------------
@@ -257,21 +268,19 @@ def _touched(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
 
 def _blocks(copy: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int, int]]:
     """Bytes [begin, end) of the blocks of a window.  Raises TerrainError for a file that does not state them."""
-    import rasterio
-
     top, bottom, left, right = window
     if top >= bottom or left >= right:
         return
-    with rasterio.Env(**GUARD), rasterio.open(copy, driver="GTiff") as file:
-        high, wide = file.block_shapes[0]
-        for down in range(top // high, (bottom - 1) // high + 1):
-            for across in range(left // wide, (right - 1) // wide + 1):
-                at, size = (
-                    file.get_tag_item(f"BLOCK_{what}_{across}_{down}", "TIFF", bidx=1) for what in ("OFFSET", "SIZE")
-                )
-                # A block without data is not there.
-                if at is not None and size is not None:
-                    yield int(at), int(at) + int(size)
+    try:
+        file = read_geotiff(copy)
+    except (BadTiffError, UnreadTiffError) as why:
+        raise TerrainError(f"{copy}: its blocks are not known: {why}", file=copy) from why
+    high, wide = file.blocks.rows, file.blocks.cols
+    for down in range(top // high, (bottom - 1) // high + 1):
+        for across in range(left // wide, (right - 1) // wide + 1):
+            # A block without data is not there.
+            if (span := file.span(down, across)) is not None:
+                yield span
 
 
 # Degrees by which a tile may lie off its own; pixels that are none.

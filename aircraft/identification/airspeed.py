@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.flight_record import low_pass
@@ -40,6 +39,8 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
 
     The flow counts for the direction of the airspeed alone, to which the scale is indifferent to the first order.
     """
+    from scipy.signal import lfilter
+
     ahead, right = _through_air(signals, flow)
     thin = signals.thinned(_THINNING, {"ahead": ahead, "right": right})
     ahead, right = thin.extra["ahead"], thin.extra["right"]

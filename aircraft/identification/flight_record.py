@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -67,6 +66,9 @@ class FlightRecord:
 
 @cache
 def _sections(cutoff: float, hertz: float) -> Floats:
+    # Imported here, and in its neighbours: scipy is in an extra, without which `planfly` still has this module's names.
+    from scipy.signal import butter
+
     return np.asarray(butter(2, cutoff, fs=hertz, output="sos"))
 
 
@@ -79,6 +81,8 @@ def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
     >>> bool(np.allclose(steady, 3.0))
     True
     """
+    from scipy.signal import sosfiltfilt
+
     sections = _sections(cutoff, hertz)
     # The ends are mirrored over one period of the cutoff, or what there is.
     length = min(len(values) - 1, round(hertz / cutoff))

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -32,6 +31,8 @@ def correlation_samples(residual: Floats, most: int = 500) -> float:
     >>> round(correlation_samples(np.random.default_rng(1).normal(size=4000)))
     1
     """
+    from scipy.fft import next_fast_len
+
     n = len(residual)
     centred = residual - residual.mean()
     size = next_fast_len(n + most, real=True)

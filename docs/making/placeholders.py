@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable
 
 from making.commands import command_pages
+from making.extras import extras_table
 from making.public_names import public_names
 from making.schemas import answer_table, schema_tables
 from making.state_fields import state_fields
@@ -13,6 +14,7 @@ _PLACE = re.compile(r"^<!-- made: (\w+)((?: [\w./-]+)*) -->$", re.MULTILINE)
 MAKERS: dict[str, Callable[..., str]] = {
     "answers": answer_table,
     "commands": command_pages,
+    "extras": extras_table,
     "names": public_names,
     "schema": schema_tables,
     "state": state_fields,

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from flight.mission.items import Command, Mission, MissionItem, is_navigation, on_grid, renumbered
 from flight.mission.route import Route
@@ -195,9 +194,8 @@ def _turned(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOr
     if len({(item.frame, item.alt) for item in ends}) != 1:
         return None
     corners = np.concatenate([line.ends for line in lines])
-    try:
-        hull = corners[ConvexHull(corners).vertices]
-    except QhullError:
+    hull = convex_hull(corners)
+    if hull is None:
         return None
     unit = np.array([math.sin(course), math.cos(course)])
     right = np.array([unit[1], -unit[0]])
@@ -220,6 +218,27 @@ def _turned(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOr
     if math.dist(out[0][1], start) < math.dist(out[0][0], start):
         out = [places[::-1] for places in out]
     return [_Line(places, _moved(pattern.items, places, origin)) for places in out]
+
+
+def convex_hull(points: Floats) -> Floats | None:
+    """Corners of the convex hull of (n, 2) points, counter-clockwise (Andrew 1979); None where all lie on a line.
+
+    >>> convex_hull(np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [2.0, 2.0], [1.0, 0.0]])).tolist()
+    [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]
+    """
+    ordered = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
+    hull: list[list[float]] = []
+    for way in (ordered, ordered[::-1]):
+        chain: list[list[float]] = []
+        for x, y in way:
+            while len(chain) > 1:
+                (x0, y0), (x1, y1) = chain[-2:]
+                if (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) > 0.0:
+                    break
+                chain.pop()
+            chain.append([x, y])
+        hull += chain[:-1]
+    return np.array(hull) if len(hull) > 2 else None
 
 
 def _crossed(aside: Floats, along: Floats, at: float) -> tuple[float, float] | None:

@@ -5,7 +5,6 @@ import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from world.errors import FlightError
+from world.extras import need_extra
 from world.files import write_whole
 from world.html_table import html_table
 from world.kernels import compiled, field_names, record_dtype
@@ -107,7 +107,7 @@ class Track:
     def to_pandas(self) -> Any:
         """A `pandas.DataFrame`: a row a tick, columns with units in their names.
 
-        Raises ImportError where pandas is not installed.
+        Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
         return track_frame(self)
 
@@ -116,7 +116,7 @@ class Track:
         write_track_csv(self, Path(path))
 
     def to_parquet(self, path: Path | str) -> None:
-        """Write it as Parquet.  Raises ImportError where pyarrow is not installed, and OSError."""
+        """Write it as Parquet.  Raises MissingExtraError without the extra ``planfly[tables]``, and OSError."""
         write_track_parquet(self, Path(path))
 
     def __repr__(self) -> str:
@@ -290,9 +290,8 @@ def track_columns(track: Track) -> dict[str, NDArray[Any]]:
 
 
 def track_frame(track: Track) -> Any:
-    """The track as a `pandas.DataFrame`.  Raises ImportError where pandas is not installed."""
-    if find_spec("pandas") is None:
-        raise ImportError("pandas is not installed (pip install pandas); to_csv() needs none", name="pandas")
+    """The track as a `pandas.DataFrame`.  Raises MissingExtraError without the extra ``tables``."""
+    need_extra("tables", "to_pandas() needs")
     import pandas as pd
 
     return pd.DataFrame(track_columns(track))
@@ -314,9 +313,8 @@ def write_track_csv(track: Track, path: Path) -> None:
 
 
 def write_track_parquet(track: Track, path: Path) -> None:
-    """Write a track as Parquet.  Raises ImportError where pyarrow is not installed, and OSError."""
-    if find_spec("pyarrow") is None:
-        raise ImportError("pyarrow is not installed (pip install pyarrow); to_csv() needs none", name="pyarrow")
+    """Write a track as Parquet.  Raises MissingExtraError without the extra ``tables``, and OSError."""
+    need_extra("tables", "to_parquet() needs")
     import pyarrow as pa
     from pyarrow import parquet
 

@@ -2,12 +2,10 @@
 
 A message is 0xA3, 0x95, its type, and a body whose length and fields the log itself states in messages named FMT
 (ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message counts where the next one, or the
-file's end, begins right behind it.  pymavlink's `DFFormat` says what the letters of a format stand for; its `DFReader`
-counts no damage, stopped at message 471 of 4,737 in a log with 400 wrong bytes, and takes 6 to 14 times as long.
+file's end, begins right behind it.  pymavlink's `DFReader` counts no damage, stopped at message 471 of 4,737 in a log
+with 400 wrong bytes, and takes 6 to 14 times as long.
 """
 
-import contextlib
-import io
 import mmap
 import struct
 from collections.abc import Callable, Collection, Iterator
@@ -17,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pymavlink.DFReader import DFFormat, null_term
 
 from flight.simulation.setup import Damage
 from world.kernels import compiled
@@ -80,7 +77,43 @@ FMT = 128
 _FMT_LENGTH = 89
 # Block-wise storage fills its last page with what was there before: so many bytes at the end are no damage.
 TRAILING = 528
-_STRINGS = frozenset("anNZ")
+# What the letters of a format stand for: numpy's type, and by how much numbers are multiplied (ArduPilot,
+# libraries/AP_Logger/LogStructure.h, "Format characters in the format string").
+FIELDS: dict[str, tuple[str, int]] = {
+    "a": ("S64", 1), "b": ("i1", 1), "B": ("u1", 1), "h": ("<i2", 1), "H": ("<u2", 1), "i": ("<i4", 1), "I": ("<u4", 1),
+    "f": ("<f4", 1), "d": ("<f8", 1), "g": ("<f2", 1), "n": ("S4", 1), "N": ("S16", 1), "Z": ("S64", 1),
+    "c": ("<i2", 100), "C": ("<u2", 100), "e": ("<i4", 100), "E": ("<u4", 100), "L": ("<i4", 10_000_000),
+    "M": ("u1", 1), "q": ("<i8", 1), "Q": ("<u8", 1),
+}  # fmt: skip
+
+
+class MessageFormat(NamedTuple):
+    """What a FMT message states of messages.
+
+    number: of the type.  length: of a message, bytes.  columns: names of the fields.  letters: their types.
+    """
+
+    number: int
+    name: str
+    length: int
+    columns: tuple[str, ...]
+    letters: str
+
+    @property
+    def dtype(self) -> np.dtype[np.void]:
+        """A message's body."""
+        return np.dtype([(name, FIELDS[one][0]) for name, one in zip(self.columns, self.letters, strict=True)])
+
+    @property
+    def scales(self) -> dict[str, int]:
+        """By how much fields are multiplied, of those that are."""
+        named = zip(self.columns, self.letters, strict=True)
+        return {name: FIELDS[one][1] for name, one in named if FIELDS[one][1] != 1}
+
+
+def _text(value: bytes) -> str:
+    """Text up to its first zero; what is no UTF-8 is written as escapes."""
+    return value.partition(b"\0")[0].decode(errors="backslashreplace")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +122,12 @@ class Messages:
 
     at: (n,) where each begins.
     rows: (n,) of the format's fields, as stored.
-    scales: factor of each field that has one.
+    scales: by how much the fields are multiplied that are.
     """
 
     at: Ints
     rows: NDArray[np.void]
-    scales: dict[str, float]
+    scales: dict[str, int]
 
     def __len__(self) -> int:
         """How many there are."""
@@ -107,13 +140,12 @@ class Messages:
     def column(self, name: str) -> Floats:
         """A field of numbers, in the format's unit."""
         values = self.rows[name].astype(np.float64)
-        # Divided where the factor is a power of ten, so that a number is the nearest to its decimal digits.
-        factor = self.scales.get(name)
-        return values if factor is None else np.asarray(values / round(1.0 / factor))
+        # Divided, so that a number is the nearest to its decimal digits.
+        return np.asarray(values / self.scales.get(name, 1))
 
     def texts(self, name: str) -> list[str]:
         """A field of text."""
-        return [str(null_term(value)) for value in self.rows[name].tolist()]
+        return [_text(value) for value in self.rows[name].tolist()]
 
     def only(self, keep: NDArray[np.bool_]) -> "Messages":
         """Some of them."""
@@ -133,7 +165,7 @@ class Dataflash:
 
     data: Bytes
     starts: dict[int, Ints]
-    formats: dict[int, DFFormat]
+    formats: dict[int, MessageFormat]
     names: tuple[str, ...]
     damage: Damage
     let_go: Callable[[], None] = lambda: None
@@ -157,14 +189,14 @@ def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], No
     only_formats = np.zeros(256, np.bool_)
     only_formats[FMT] = True
     first = _find_messages(data, only_formats, let_go)
-    formats: dict[int, DFFormat] = {}
+    formats: dict[int, MessageFormat] = {}
     unreadable = 0
     for start in first.at.tolist():
         found = _format(bytes(data[start + HEADER : start + _FMT_LENGTH]))
         if found is None:
             unreadable += 1
         else:
-            formats.setdefault(found.type, found)
+            formats.setdefault(found.number, found)
     wanted = np.zeros(256, np.bool_)
     wanted[[number for number, known in formats.items() if known.name in names]] = True
     second = _find_messages(data, wanted, let_go)
@@ -206,27 +238,23 @@ def _find_messages(data: Bytes, wanted: NDArray[np.bool_], let_go: Callable[[], 
     return _Found(np.concatenate(at), np.concatenate(kinds), counts, places, size, bool(state[_CUT]))
 
 
-def _format(body: bytes) -> DFFormat | None:
+def _format(body: bytes) -> MessageFormat | None:
     """The format that a FMT message states; None for one that cannot be one."""
     if len(body) < _FMT_LENGTH - HEADER:
         return None
-    number, length, name, letters, columns = struct.unpack("<BB4s16s64s", body)
-    try:
-        # It complains on the terminal.
-        with contextlib.redirect_stdout(io.StringIO()):
-            made = DFFormat(number, null_term(name), length, null_term(letters), null_term(columns))
-    except Exception:  # of whatever kind: the library raises the plain class
+    number, length, *texts = struct.unpack("<BB4s16s64s", body)
+    name, letters, columns = (_text(one) for one in texts)
+    names = tuple(columns.split(",")) if columns else ()
+    known = set(letters) <= FIELDS.keys() and len(names) == len(letters)
+    if not known or len(set(names)) < len(names) or "" in names:
         return None
-    fits = struct.calcsize(made.msg_struct) + HEADER == length and len(made.columns) == len(made.msg_fmts)
-    return made if fits and len(set(made.columns)) == len(made.columns) else None
+    made = MessageFormat(number, name, length, names, letters)
+    return made if made.dtype.itemsize + HEADER == length else None
 
 
-def _columns(data: Bytes, starts: Ints, known: DFFormat, let_go: Callable[[], None]) -> Messages:
-    starts = starts[starts + known.len <= len(data)]
-    kinds = []
-    for letter, one in zip(known.msg_fmts, _struct_codes(known), strict=True):
-        kinds.append(one if letter not in _STRINGS else f"S{int(one[:-1])}")
-    dtype = np.dtype([(name, f"<{kind}") for name, kind in zip(known.columns, kinds, strict=True)])
+def _columns(data: Bytes, starts: Ints, known: MessageFormat, let_go: Callable[[], None]) -> Messages:
+    starts = starts[starts + known.length <= len(data)]
+    dtype = known.dtype
     rows = np.zeros(0, dtype)
     if len(starts) and dtype.itemsize:
         windows = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)
@@ -236,24 +264,7 @@ def _columns(data: Bytes, starts: Ints, known: DFFormat, let_go: Callable[[], No
             last = int(np.searchsorted(starts, until))
             rows[first:last] = windows[starts[first:last] + HEADER].view(dtype)[:, 0]
             first = last
-    scales = {name: one for name, one in zip(known.columns, known.msg_mults, strict=True) if one is not None}
-    return Messages(starts, rows, scales)
-
-
-_CODES = {"b": "i1", "B": "u1", "h": "i2", "H": "u2", "i": "i4", "I": "u4", "f": "f4", "d": "f8", "q": "i8", "Q": "u8"}
-_CODES |= {"e": "f2"}
-
-
-def _struct_codes(known: DFFormat) -> list[str]:
-    """Each field's code in the `struct` string, texts with their length: "i4", "16s"."""
-    codes, digits = [], ""
-    for letter in known.msg_struct[1:]:
-        if letter.isdigit():
-            digits += letter
-        else:
-            codes.append(digits + letter if digits else _CODES[letter])
-            digits = ""
-    return codes
+    return Messages(starts, rows, known.scales)
 
 
 # Of a walk: the next byte, places where no message begins, their bytes, the end of the last message, whether it was

@@ -4,8 +4,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from pymavlink import mavutil
-
 from flight.mission.items import Command, Home, Mission, MissionItem, item_problem, shifted
 from flight.simulation.setup import MissingItems
 from logs.importers.raw_log import LoggedMission
@@ -194,14 +192,23 @@ def _before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
 # Flight modes by their numbers, and which of them follow a mission.
 
 _PLANE_AUTO = 10
+# ArduPilot, ArduPlane/mode.h, "enum Number"; names as ground stations show them.
+_PLANE_MODES = {
+    0: "MANUAL", 1: "CIRCLE", 2: "STABILIZE", 3: "TRAINING", 4: "ACRO", 5: "FBWA", 6: "FBWB", 7: "CRUISE",
+    8: "AUTOTUNE", 10: "AUTO", 11: "RTL", 12: "LOITER", 13: "TAKEOFF", 14: "AVOID_ADSB", 15: "GUIDED",
+    16: "INITIALISING", 17: "QSTABILIZE", 18: "QHOVER", 19: "QLOITER", 20: "QLAND", 21: "QRTL", 22: "QAUTOTUNE",
+    23: "QACRO", 24: "THERMAL", 25: "LOITERALTQLAND", 26: "AUTOLAND",
+}  # fmt: skip
 # PX4's vehicle_status.nav_state (PX4, msg/VehicleStatus.msg).
 _PX4_MISSION = 3
 _PX4_STATES = {
     0: "MANUAL", 1: "ALTCTL", 2: "POSCTL", 3: "MISSION", 4: "LOITER", 5: "RTL", 8: "FREE", 10: "ACRO",
     12: "DESCEND", 13: "TERMINATION", 14: "OFFBOARD", 15: "STAB", 17: "TAKEOFF", 18: "LAND", 21: "ORBIT",
 }  # fmt: skip
-# Main mode and sub-mode of PX4's custom_mode: AUTO, MISSION.
+# Main modes of PX4's custom_mode, and the sub-modes of AUTO (PX4, src/modules/commander/px4_custom_mode.h).
 _PX4_AUTO, _PX4_AUTO_MISSION = 4, 4
+_PX4_MAIN = {1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED", 8: "RATTITUDE"}
+_PX4_SUB = {2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND", 7: "RTGS", 8: "FOLLOWME"}
 
 
 def plane_mode(number: int) -> tuple[str, bool]:
@@ -210,7 +217,7 @@ def plane_mode(number: int) -> tuple[str, bool]:
     >>> plane_mode(10), plane_mode(5)
     (('AUTO', True), ('FBWA', False))
     """
-    return mavutil.mode_mapping_apm.get(number, f"mode {number}"), number == _PLANE_AUTO
+    return _PLANE_MODES.get(number, f"mode {number}"), number == _PLANE_AUTO
 
 
 def px4_state(number: int) -> tuple[str, bool]:
@@ -229,5 +236,5 @@ def px4_mode(custom_mode: int) -> tuple[str, bool]:
     ('MISSION', True)
     """
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
-    mission = (main, sub) == (_PX4_AUTO, _PX4_AUTO_MISSION)
-    return ("MISSION" if mission else str(mavutil.interpret_px4_mode(0, custom_mode)), mission)
+    name = _PX4_SUB.get(sub) if main == _PX4_AUTO else _PX4_MAIN.get(main)
+    return name or "UNKNOWN", (main, sub) == (_PX4_AUTO, _PX4_AUTO_MISSION)

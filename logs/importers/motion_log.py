@@ -18,6 +18,7 @@ from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, ind
 from logs.importers.dataflash_log import logged_home, program_and_vehicle
 from logs.importers.raw_log import VehicleKind
 from world.errors import LogError
+from world.extras import need_extra
 
 Floats = NDArray[np.float64]
 
@@ -106,6 +107,7 @@ def read_motion(path: Path) -> MotionLog:
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     if head == b"ULog\x01\x12\x35":
+        need_extra("px4-logs", f"{path}: reading .ulg needs")
         from logs.importers.px4_motion import read_px4_motion
 
         return read_px4_motion(path, digest)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from world.address_space import AddressSpaceError
 from world.errors import LogError
+from world.extras import need_extra
 
 if TYPE_CHECKING:
     from logs.importers.raw_log import RawLog
@@ -23,20 +24,22 @@ class LogFormat(NamedTuple):
     content: what the first bytes of such a file hold, a regular expression.
     reader: module and function, which takes a path, gives a `RawLog` and raises LogError; imported where it is needed,
     for each brings its own library along.
+    extra: that the library is in; "" for none.
     """
 
     name: str
     suffixes: tuple[str, ...]
     content: bytes
     reader: str
+    extra: str = ""
 
 
 # Every format that is read; where a file's first bytes fit several, its suffix decides, and then the order here.
 FORMATS = (
-    LogFormat("PX4 .ulg", (".ulg",), rb"\AULog\x01\x12\x35", "px4_log.read_px4"),
+    LogFormat("PX4 .ulg", (".ulg",), rb"\AULog\x01\x12\x35", "px4_log.read_px4", "px4-logs"),
     LogFormat("ArduPilot .BIN", (".bin",), rb"\xa3\x95", "dataflash_log.read_dataflash"),
     # Eight bytes of time, big-endian us since 1970 (2000 to 2111), and the first byte of a MAVLink packet.
-    LogFormat("MAVLink .tlog", (".tlog",), rb"\x00[\x03-\x0f].{6}[\xfd\xfe]", "telemetry_log.read_telemetry"),
+    LogFormat("MAVLink .tlog", (".tlog",), rb"\x00[\x03-\x0f].{6}[\xfd\xfe]", "telemetry_log.read_telemetry", "live"),
     LogFormat(".gpx", (".gpx",), rb"<gpx", "track_files.read_gpx"),
     LogFormat(".igc", (".igc",), rb"(\A|[\r\n])HFDTE", "track_files.read_igc"),
     LogFormat(".kml or .kmz", (".kml", ".kmz"), rb"<kml|\APK\x03\x04", "track_files.read_kml"),
@@ -77,7 +80,10 @@ def open_log(path: Path) -> "RawLog":
             head = file.read(_HEAD)
         if not head:
             raise LogError(f"{path}: empty: a log is expected", file=path)
-        module, function = log_format(path, head).reader.split(".")
+        known = log_format(path, head)
+        if known.extra:
+            need_extra(known.extra, f"{path}: reading {known.suffixes[0]} needs")
+        module, function = known.reader.split(".")
         read: Reader = getattr(import_module(f"logs.importers.{module}"), function)
         # What is no number in a damaged log is left out later, and reported.
         with np.errstate(all="ignore"):

@@ -4,12 +4,12 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
-from importlib.util import find_spec
 from typing import Any
 
 from flight.autopilots.autopilot import AutopilotProgram, Parameters
 from logs.verdict.places import DecidingParameter, LevelAnswer, Place, Suggestion
 from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
+from world.extras import need_extra
 
 SCHEMA = "planfly.verdict/3"
 # The check of a finding that is not judged because the aircraft is not known well enough.
@@ -166,10 +166,9 @@ class Verdict:
 
         Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
         tolerance, margin, unit, limit_source, method, ok (None where it was not judged) and reason.
-        Raises ImportError where pandas is not installed.
+        Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
-        if find_spec("pandas") is None:
-            raise ImportError("pandas is not installed (pip install pandas)", name="pandas")
+        need_extra("tables", "to_pandas() needs")
         # An extra: nobody else needs it.
         import pandas as pd
 

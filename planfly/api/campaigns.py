@@ -32,6 +32,7 @@ from planfly.kernel_units.unit_kernels import BOTH
 from planfly.stages import stage
 from planner.plan import Plan
 from world.errors import PlanflyError
+from world.extras import needs_extra
 from world.scenario_tables import Guidance, Navigation
 
 
@@ -116,6 +117,7 @@ def continued_goal(
     return resumed_goal(None if (flights, prove, at_least) == (None, None, None) else asked, folder, confidence)
 
 
+@needs_extra("campaigns")
 @with_warm_up(*BOTH)
 def campaign(
     target: Plan | str | Path,
@@ -194,6 +196,7 @@ def _flown(
     return CampaignResult(summary, read_table(table), table)
 
 
+@needs_extra("campaigns")
 @with_warm_up(*BOTH)
 def campaign_flight(
     target: Plan | str | Path,
@@ -251,6 +254,7 @@ def _row_of(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightR
 # The largest wind from each direction in which a mission flies.
 
 
+@needs_extra("campaigns")
 @with_warm_up(*BOTH)
 def winds(
     target: Plan | str | Path,

@@ -17,6 +17,7 @@ from planfly.open_mission import NamedFences, fence_of_plan, is_log, loss_text, 
 from planfly.targets import refuse_existing
 from planner.plan import Plan, plan_json
 from world.errors import MissionError, PlanflyError
+from world.extras import need_extra
 from world.files import temporary_folder, write_whole
 from world.scenario import Scenario, at_time
 
@@ -199,7 +200,8 @@ def _flown_text(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
     """A flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
     content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
-        from logs.views.exports.log_files import telemetry_bytes
+        need_extra("live", ".tlog needs")
+        from logs.views.exports.telemetry_file import telemetry_bytes
 
         return telemetry_bytes(log), content
     if suffix == ".ulg":

@@ -37,6 +37,7 @@ from planfly.stages import say_replaced, stage
 from planfly.targets import file_target, refuse_existing
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
+from world.extras import need_extra
 from world.scenario import Scenario, over_terrain
 from world.scenario_tables import Guidance, Navigation
 
@@ -207,9 +208,7 @@ def fly(
     ('completed', True, 4.0)
     """
     check_arguments(seed=seed, log_hz=log_hz, max_hours=max_hours, max_log=max_log)
-    program = None if autopilot is None else Path(autopilot)
-    if program is not None:
-        check_binary(program)
+    program = named_program(autopilot)
     change = partial(
         changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
         guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,
@@ -435,6 +434,15 @@ def opened_mission(
     if isinstance(mission, Plan):
         return open_planned(mission, world, ground, seed=seed, change=change, fences=fences)
     return open_mission(Path(mission), world, ground, seed=seed, change=change, fences=fences)
+
+
+def named_program(autopilot: str | Path | None) -> Path | None:
+    """The program that is to fly; None for none.  Raises FlightError for what cannot be run, and MissingExtraError."""
+    if autopilot is None:
+        return None
+    need_extra("live", "--autopilot needs")
+    check_binary(Path(autopilot))
+    return Path(autopilot)
 
 
 def named_fences(files: FencePaths) -> NamedFences:

@@ -32,6 +32,7 @@ from planfly.identification.servos import ServoOutput, read_servos
 from planfly.identification.wide_numbers import WideNumber, wide_numbers
 from planfly.stages import stage
 from world.errors import FlightError, LogError, PlanflyError
+from world.extras import needs_extra
 from world.files import whole_path, write_folder
 from world.scenario_tables import names_folder
 
@@ -80,6 +81,7 @@ class IdentifiedAircraft:
     wide: tuple[WideNumber, ...] = ()
 
 
+@needs_extra("identification")
 @with_warm_up()
 def identify_aircraft(
     logs: str | Path | Sequence[str | Path],

@@ -14,6 +14,8 @@ from planfly.api.serving import link_access
 from planfly.arguments import check_arguments
 from planfly.first_start import with_warm_up
 from world.errors import LogError
+from world.extras import needs_extra
+from world.running_clock import RunningClock
 
 # Numbers that may be meant as ports that ground stations listen at.
 _PORTS = range(1024, 65536)
@@ -106,9 +108,6 @@ def replay(
 def _played(
     shown: Instruments, first: float, last: float, speed: float, width: int | Callable[[], int]
 ) -> Iterator[tuple[float, list[str]]]:
-    # Imported here: it brings MAVLink with it.
-    from flight.live.link import RunningClock
-
     played, now = RunningClock(), first
     while True:
         yield now, shown.frame(now, width=width() if callable(width) else width)
@@ -152,6 +151,7 @@ def _ignore(_text: str) -> None:
     pass
 
 
+@needs_extra("foxglove", "--foxglove needs")
 @with_warm_up()
 def play_to_foxglove(
     log: FlightLog | str | Path,
@@ -174,15 +174,15 @@ def play_to_foxglove(
     stop: asked all the time; once it is true the call returns.  on_message: called with the address.
     Raises a `planfly.PlanflyError` for bad input, and where nobody subscribes in time.
     """
-    # Nobody else needs foxglove-sdk and MAVLink.
-    from planfly.replays import live
+    # Nobody else needs foxglove-sdk.
+    from planfly.replays import foxglove_server
 
     check_arguments(speed=speed, port=port, wait=wait)
     given = allow_origin.split(",") if isinstance(allow_origin, str) else allow_origin
     allowed = [_origin(one.strip()) for one in given if one.strip()]
     found = _opened(log)
     first, last = replayed_part(found, start, end)
-    live.play_to_foxglove(
+    foxglove_server.play_to_foxglove(
         found, first, last, speed=speed or 1.0, port=port, allowed=allowed, wait=wait, stopped=stop,
         on_message=on_message,
     )  # fmt: skip
@@ -196,6 +196,7 @@ def _origin(text: str) -> str:
     return text
 
 
+@needs_extra("live", "playing to ground stations needs")
 @with_warm_up()
 def play_to_stations(
     log: FlightLog | str | Path,
@@ -209,18 +210,19 @@ def play_to_stations(
     stop: Callable[[], bool] = _never,
     on_message: Callable[[str], None] = _ignore,
 ) -> None:
-    """Play a flight into MAVLink ground stations, as if it were flown now.
+    """Play a flight into MAVLink ground stations, as if it were flown now; needs the extra ``planfly[live]``.
 
     to: where they listen, IP:PORT, one or several.  bind, allow, sign_key: as of `planfly.serve`.
     speed: times real time, 1 if None.  wait: for the first station, s; 10 if None.
     stop: asked all the time; once it is true the call returns.  on_message: called with what happens, a line each.
     Raises a `planfly.PlanflyError` for bad input, and where no station answers in time.
     """
-    from planfly.replays import live
+    # Nobody else needs MAVLink.
+    from planfly.replays import stations
 
     check_arguments(speed=speed, wait=wait)
     access = link_access(to, bind, allow, sign_key)
-    live.play_to_stations(
+    stations.play_to_stations(
         _opened(log), access, speed=speed or 1.0, wait=_STATION_PATIENCE if wait is None else wait, stopped=stop,
         on_message=on_message,
     )  # fmt: skip

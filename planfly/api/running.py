@@ -9,13 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from flight.autopilots.arduplane_sitl.process import check_binary
 from flight.mission.from_plan import plan_mission
 from flight.mission_files.formats import mission_kind, mission_text
 from logs.recording.setup_attachments import package_versions
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.judge_flight import judge_plan_only
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
+from planfly.api.flying import named_program
 from planfly.api.planning import Wind, changed_scenario, opened_scenario
 from planfly.arguments import check_arguments
 from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_text
@@ -148,9 +148,7 @@ def run(
     (False, 1, ['plan.json', 'mission.waypoints', 'mission.plan'])
     """
     check_arguments(seed=seed, refine=refine, log_hz=log_hz, max_hours=max_hours, max_log=max_log)
-    program = None if autopilot is None else Path(autopilot)
-    if program is not None:
-        check_binary(program)
+    program = named_program(autopilot)
     change = partial(
         changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
         guidance=guidance, autopilot_law=autopilot_law, nav=nav, autopilot=autopilot,

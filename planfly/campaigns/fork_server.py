@@ -78,7 +78,12 @@ def ending_with(parent: int) -> Iterator[None]:
 if "multiprocessing.forkserver" in " ".join(sys.orig_argv):
     with ending_with(int(os.environ.get(PARENT, os.getppid()))):
         prepare_child()
-        for needed in ("planfly.campaigns.report", "planfly.pipeline", "scipy.stats"):
+        for needed in (
+            "planfly.campaigns.report",
+            "planfly.campaigns.campaign_worker",
+            "planfly.pipeline",
+            "scipy.stats",
+        ):
             import_module(needed)
         load_kernels()
     # The processes that are forked from this one forget it.

@@ -12,9 +12,7 @@ import itertools
 import logging
 import multiprocessing
 import os
-import pickle
 import platform
-import signal
 import sys
 import tempfile
 import threading
@@ -22,15 +20,13 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib import metadata, resources
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 from urllib.parse import urlsplit
-
-from distributed import WorkerPlugin, get_worker
 
 from aircraft.catalog import find_aircraft, model_hash
 from planfly import __version__
@@ -271,7 +267,7 @@ def _local_cluster(cluster_types: Any, number: int, folder: Path) -> Any:
             silence_logs=logging.CRITICAL,
             local_directory=str(folder),
             # Imported before the scheduler knows the worker: a flight that waited for it would die with the worker.
-            preload=["planfly.campaigns.worker_pool", "scipy.stats", _PRIVATE],
+            preload=["planfly.campaigns.campaign_worker", "scipy.stats", _PRIVATE],
             # What a worker leaves that is killed goes with it, too.
             env={"TMPDIR": str(folder)},
         )
@@ -446,51 +442,10 @@ class FlightRate:
 
 
 # ----------------------------------------------------------------------
-# What a worker holds of a campaign, and how it flies one of its flights.
+# Flights sent to the workers, and what comes of them.
 
 # Flies flight k of a base, in this wind; `fly_one` in all campaigns.
 FlyOne = Callable[[CampaignBase, int, GivenWind | None], FlightRow]
-
-
-class CampaignPlugin(WorkerPlugin):
-    """A campaign on a worker: on each, also on one that comes late or takes a dead one's place.
-
-    name: of the campaign on its scheduler.
-    """
-
-    def __init__(self, name: str, base: CampaignBase, mine: dict[str, str], fly: FlyOne = fly_one) -> None:
-        self.name = name
-        self._packed = pickle.dumps((base, fly))
-        self._aircraft = base.scenario.flight.aircraft
-        self._mine = mine
-        self._ready: tuple[CampaignBase, FlyOne] | None = None
-
-    def setup(self, worker: Any) -> None:
-        """Leave Ctrl-C on a terminal to the client, which ends its workers."""
-        if threading.current_thread() is threading.main_thread():
-            with contextlib.suppress(ValueError):
-                signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def ready(self, worker: str) -> tuple[CampaignBase, FlyOne]:
-        """The campaign, unpacked once.  Raises WorkerError for a worker that flies otherwise than the client would."""
-        if self._ready is None:
-            refuse_different(self._mine, fingerprint(self._aircraft), worker)
-            base, fly = pickle.loads(self._packed)
-            # The same model, wherever this machine has it.
-            airframe = replace(base.airframe, aircraft=find_aircraft(self._aircraft))
-            self._ready = replace(base, airframe=airframe), fly
-        return self._ready
-
-
-def fly_task(campaign: str, index: int, wind: GivenWind | None) -> FlightRow:
-    """Fly a flight on the worker that this runs on."""
-    worker = get_worker()
-    plugin = worker.plugins[campaign]
-    if not isinstance(plugin, CampaignPlugin):
-        raise TypeError(f"{campaign} is no campaign of this worker")
-    base, fly = plugin.ready(worker.address)
-    return replace(fly(base, index, wind), worker=worker.address)
-
 
 # How a flight ended that could not be flown.
 LOST = "lost: its workers died"
@@ -523,6 +478,9 @@ class WorkerPool:
         self._name = f"planfly-{uuid.uuid4().hex[:12]}"
         self._numbers = itertools.cycle(range(_NAMES))
         mine = fingerprint(base.scenario.flight.aircraft)
+        # Imported here and below: without the extra there is no dask.
+        from planfly.campaigns.campaign_worker import CampaignPlugin
+
         client.register_plugin(CampaignPlugin(self._name, base, mine, fly))
 
     def close(self) -> None:
@@ -542,6 +500,8 @@ class WorkerPool:
         Raises what a flight raised of `world.errors.PlanflyError`, and OSError where the scheduler is lost.
         """
         from distributed import as_completed
+
+        from planfly.campaigns.campaign_worker import fly_task
 
         flying: dict[tuple[str, int], FlightRequest] = {}
         given_up: Counter[FlightRequest] = Counter()

@@ -58,7 +58,13 @@ def aircraft_options(line: LineParser) -> None:
     _sheet_options(parser)
     logs = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
     completed(
-        logs.add_argument("--identify", dest="logs", metavar="LOG", nargs="+", help=".BIN of ArduPlane or .ulg of PX4"),
+        logs.add_argument(
+            "--identify",
+            dest="logs",
+            metavar="LOG",
+            nargs="+",
+            help=".BIN of ArduPlane or .ulg of PX4; needs the extra planfly[identification]",
+        ),
         files(".bin", ".BIN", ".ulg"),
     )
     completed(

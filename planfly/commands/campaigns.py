@@ -26,6 +26,7 @@ def campaign_options(line: LineParser) -> None:
         "campaign",
         "fly a mission many times in varied weather and with varied aircraft: how likely is it to fly",
         "planfly campaign jacksboro --prove 0.99",
+        extra="campaigns",
     )
     parser.alias("index", "--refly")
     _shared_options(parser)
@@ -53,6 +54,7 @@ def winds_options(line: LineParser) -> None:
         "winds",
         "find the largest wind from each direction in which a mission flies",
         "planfly winds jacksboro --prove 0.99 --directions 16",
+        extra="campaigns",
     )
     _shared_options(parser)
     parser.add_argument(

@@ -30,7 +30,7 @@ def export_options(line: LineParser) -> None:
         metavar="FILE",
         nargs="+",
         help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx;"
-        " of a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink), .ulg (PX4)",
+        " of a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink; extra planfly[live]), .ulg (PX4)",
     )
     fence_option(parser)
     time_option(parser)

@@ -22,6 +22,7 @@ from planfly.terminal.options import (
 from planfly.terminal.output import give_answer
 from planfly.terminal.results import warn_of_loss
 from world.errors import PlanflyError
+from world.running_clock import RunningClock
 
 if TYPE_CHECKING:
     from planfly import FlightLog
@@ -48,7 +49,8 @@ def replay_options(line: LineParser) -> None:
         "--to",
         metavar="S|IP:PORT,...",
         type=time_or_stations,
-        help="to this time of the flight, s; or play the log to the ground stations that listen there",
+        help="to this time of the flight, s; or play the log to the ground stations that listen there (extra"
+        " planfly[live])",
     )
     part.add_argument(
         "--speed",
@@ -59,7 +61,9 @@ def replay_options(line: LineParser) -> None:
     part.add_argument("--at-once", action="store_true", help="the timeline at once, on a terminal too")
     other = parser.group("other ways to see it")
     other.add_argument(
-        "--movie", metavar="FILE|DIR", help="draw it: FILE.gif, FILE.mp4 (needs ffmpeg), or DIR for PNG frames"
+        "--movie",
+        metavar="FILE|DIR",
+        help="draw it: FILE.gif, FILE.mp4 (by ffmpeg, or the extra planfly[films]), or DIR for PNG frames",
     )
     other.add_argument(
         "--foxglove",
@@ -119,7 +123,6 @@ def _answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
 
 def _print_timeline(log: "FlightLog", args: argparse.Namespace) -> None:
     """Print the timeline, at ``--speed`` times real time or at once."""
-    from flight.live.link import RunningClock
     from logs.views.replay.timeline import entry_lines
 
     speed = args.speed

@@ -23,6 +23,7 @@ def serve_options(line: LineParser) -> None:
         "serve",
         "simulate a MAVLink vehicle that a ground station uploads to, arms, starts and watches",
         "planfly serve mission.waypoints --terrain jacksboro",
+        extra="live",
     )
     completed(
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="a mission file to begin with"),

@@ -19,6 +19,7 @@ from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.stages import stage
 from planfly.targets import refuse_existing, refuse_folder
 from world.errors import PlanflyError
+from world.extras import need_extra
 from world.files import temporary_folder, write_whole
 
 # A film lasts this long unless a speed is given, s.
@@ -37,7 +38,7 @@ def write_movie(
     """Write a .gif or .mp4 file, or a folder for frame-0000.png and on.
 
     start, end: of the flight, s.  speed: times real time; None for a film of 20 s.
-    Raises PlanflyError for a target that exists, too many frames, and an .mp4 without ffmpeg.
+    Raises PlanflyError for a target that exists, too many frames, and an .mp4 without ffmpeg and the extra ``films``.
     """
     kind = target.suffix.lower()
     if kind in SUFFIXES:
@@ -47,16 +48,14 @@ def write_movie(
         raise PlanflyError.of_argument("movie", kind, allowed, shown="", file=target)
     else:
         refuse_folder(target, overwrite)
-    if kind == ".mp4" and shutil.which("ffmpeg") is None:
-        allowed = "an .mp4 needs ffmpeg, which is not installed; a .gif or a folder does not"
-        raise PlanflyError.of_argument("movie", kind, allowed, shown="", file=target)
+    program = _ffmpeg(target) if kind == ".mp4" else ""
     film = MovieFrames(log.setup, log.track, start, end, speed or max(1.0, (end - start) / _LASTS))
     if len(film) > _MAX_FRAMES:
         allowed = f"{len(film):,} frames: at most {_MAX_FRAMES:,}; raise `speed`"
         raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
     if not kind:
         return _write_folder(target, film)
-    write_whole(target, _gif(film) if kind == ".gif" else _mp4(film))
+    write_whole(target, _gif(film) if kind == ".gif" else _mp4(film, program))
     return [target]
 
 
@@ -126,7 +125,18 @@ def _gif(film: MovieFrames) -> bytes:
     return data.getvalue()
 
 
-def _mp4(film: MovieFrames) -> bytes:
+def _ffmpeg(target: Path) -> str:
+    """The encoder: ffmpeg on the path, else that of the extra.  Raises MissingExtraError where there is neither."""
+    found = shutil.which("ffmpeg")
+    if found is not None:
+        return found
+    need_extra("films", f"{target}: an .mp4 needs ffmpeg (a .gif or a folder does not), or")
+    from imageio_ffmpeg import get_ffmpeg_exe
+
+    return str(get_ffmpeg_exe())
+
+
+def _mp4(film: MovieFrames, program: str) -> bytes:
     """Frames through ffmpeg, as raw pixels on its input.  Raises OSError with its last words if it fails."""
     frames = film.frames()
     first = next(frames)
@@ -134,7 +144,7 @@ def _mp4(film: MovieFrames) -> bytes:
     with temporary_folder("planfly-movie-") as folder, tempfile.TemporaryFile() as messages:
         out = folder / "film.mp4"
         command = [
-            "ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+            program, "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
             "-r", str(RATE), "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(out),
         ]  # fmt: skip
         with (

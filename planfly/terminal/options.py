@@ -195,7 +195,9 @@ def flight_options(parser: CommandParser) -> None:
     """What decides a flight beside its mission: aircraft, weather, autopilot, and when it is stopped."""
     flown_by_options(parser)
     steering_options(parser).add_argument(
-        "--autopilot", metavar="PATH", help="fly ArduPilot SITL in planfly's physics: the path of the arduplane program"
+        "--autopilot",
+        metavar="PATH",
+        help="fly ArduPilot SITL in planfly's physics: the path of the arduplane program (extra planfly[live])",
     )
     limits = parser.group("limits of the flight")
     limits.add_argument(

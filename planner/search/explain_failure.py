@@ -24,6 +24,7 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 # --- Zones that separate start and destination ---
@@ -75,11 +76,7 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
         cells[end] = _OPEN
     if _connected(cells, ends):
         return None
-    # Imported here, as below: only the explanation of a failure needs it.
-    from scipy import ndimage
-
-    regions, _ = ndimage.label(cells == _OPEN)
-    adjacent = [ndimage.binary_dilation(regions == regions[end]) for end in ends]
+    adjacent = [_grown(_reached(cells == _OPEN, end)) for end in ends]
     both = [set(cells[edge].tolist()) for edge in adjacent]
     found = (both[0] & both[1]) or (both[0] | both[1])
     return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(found) if z >= 0), pitch)
@@ -95,10 +92,27 @@ def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Fl
 
 def _connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
     """Whether open cells connect the two ends."""
-    from scipy import ndimage
+    return bool(_reached(cells == _OPEN, ends[0])[ends[1]])
 
-    regions, _ = ndimage.label(cells == _OPEN)
-    return bool(regions[ends[0]] == regions[ends[1]] != 0)
+
+def _reached(is_open: Flags, start: tuple[int, int, int]) -> Flags:
+    """The open cells that are reached from one of them through their sides; none from a cell that is not open."""
+    reached = np.zeros_like(is_open)
+    reached[start] = is_open[start]
+    count = -1
+    while count != (count := int(reached.sum())):
+        reached = _grown(reached) & is_open
+    return reached
+
+
+def _grown(cells: Flags) -> Flags:
+    """Cells and those that share a side with one of them."""
+    grown = cells.copy()
+    for axis in range(cells.ndim):
+        whole, one = np.moveaxis(grown, axis, 0), np.moveaxis(cells, axis, 0)
+        whole[1:] |= one[:-1]
+        whole[:-1] |= one[1:]
+    return grown
 
 
 @compiled

@@ -65,7 +65,7 @@ RESULTS = {
 }
 ERRORS = {
     *("PlanflyError", "FlightError", "LogError", "MissionError", "ParameterError", "ScenarioError", "StartError"),
-    *("TerrainError", "SchedulerError", "SpreadError", "ArgumentError"),
+    *("TerrainError", "SchedulerError", "SpreadError", "ArgumentError", "MissingExtraError"),
 }
 
 

@@ -14,6 +14,7 @@ from world.errors import (
     CrashError,
     FlightError,
     LogError,
+    MissingExtraError,
     MissionError,
     ParameterError,
     PlanflyError,
@@ -28,7 +29,7 @@ KINDS = (ScenarioError, TerrainError, MissionError, FlightError, ParameterError,
 def test_every_error_is_a_planfly_error() -> None:
     members = [kind for _, kind in inspect.getmembers(world.errors, inspect.isclass)]
     defined = [kind for kind in members if kind.__module__ == "world.errors"]
-    assert set(defined) == {PlanflyError, StartError, CrashError, ArgumentError, *KINDS}
+    assert set(defined) == {PlanflyError, StartError, CrashError, ArgumentError, MissingExtraError, *KINDS}
     assert all(issubclass(kind, PlanflyError) for kind in defined)
 
 
@@ -39,11 +40,12 @@ def test_no_error_hides_a_fault_of_the_program() -> None:
     assert StartError.__mro__[1:] == CrashError.__mro__[1:] == FlightError.__mro__
     # Callers may take a number that is out of its range for what Python calls it.
     assert ArgumentError.__mro__[1:-1] == (PlanflyError, ValueError, Exception, BaseException)
+    assert MissingExtraError.__mro__[1:-1] == (PlanflyError, ImportError, Exception, BaseException)
 
 
 def test_the_tree_in_the_docstring_names_each_error() -> None:
     tree = (world.errors.__doc__ or "").splitlines()
-    for kind in (StartError, CrashError, ArgumentError, *KINDS):
+    for kind in (StartError, CrashError, ArgumentError, MissingExtraError, *KINDS):
         assert sum(kind.__name__ in line for line in tree) == 1
 
 

@@ -12,12 +12,12 @@ from aircraft.catalog import Aircraft
 from aircraft.envelope import GRAVITY
 from flight.dynamics.fdm import Fdm, LoopAccess
 from flight.dynamics.state import Commands
-from flight.live.link import RunningClock
 from flight.mission.items import Home
 from flight.simulation.tick import READ_FIELDS, Workspace
 from world.errors import FlightError
 from world.files import read_toml
 from world.kernels import Record
+from world.running_clock import RunningClock
 
 # ----------------------------------------------------------------------
 # ArduPilot's JSON physics interface: the packets that pass between an autopilot and the physics it flies in.

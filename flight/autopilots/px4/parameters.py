@@ -248,12 +248,12 @@ def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float
     >>> [round(gain, 2) for gain in speed_filter_gains(0.07, 0.2, 0.2)]
     [1.92, 0.26, 2.12, 0.67]
     """
-    # Imported here: planning by another autopilot does without.
-    from scipy.linalg import solve_continuous_are
-
-    chain, noise = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed * speed, rate * rate])
-    spread = solve_continuous_are(chain.T, np.eye(2), np.diag([0.0, process * process]), noise)
-    gains = spread @ np.linalg.inv(noise)
+    chain, precision = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([speed**-2.0, rate**-2.0])
+    # The Riccati equation by the stable eigenvectors of its Hamiltonian (Potter 1966, SIAM J. Appl. Math. 14, 496-501).
+    hamiltonian = np.block([[chain.T, -precision], [-np.diag([0.0, process * process]), -chain]])
+    roots, vectors = np.linalg.eig(hamiltonian)
+    stable = vectors[:, roots.real < 0.0]
+    gains = np.real(stable[2:] @ np.linalg.inv(stable[:2])) @ precision
     return float(gains[0, 0]), float(gains[0, 1]), float(gains[1, 0]), float(gains[1, 1])
 
 

@@ -1,35 +1,18 @@
-"""A flight in other programs' forms: a table (`.csv`, `.parquet`), a telemetry log (`.tlog`), a log of PX4 (`.ulg`)."""
+"""A flight in other programs' forms: a table (`.csv`, `.parquet`), a log of PX4 (`.ulg`)."""
 
 import csv
 import io
 import struct
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.mission_server import listed, to_message
-from flight.live.telemetry import (
-    ACTIVE,
-    AUTO,
-    COMPLETE,
-    CRITICAL,
-    INFO,
-    PERIODS,
-    WARNING,
-    SnapshotMaker,
-    Status,
-    status_texts,
-    telemetry_message,
-)
-from flight.mission.items import OVER_HOME, Home, MissionItem
-from flight.simulation.local_map import LocalMap
-from flight.simulation.track import PITCH, ROLL, THROTTLE, YAW, track_rows
+from flight.mission.items import OVER_HOME, MissionItem
+from flight.simulation.track import PITCH, ROLL, THROTTLE, YAW
 from logs.recording.reader import FlightLog
-from logs.recording.state_channel import EPOCH_NS, FIELDS
-from world.errors import PlanflyError
+from logs.recording.state_channel import FIELDS
+from world.extras import need_extra
 from world.frames import to_geo
 
 Floats = NDArray[np.float64]
@@ -79,18 +62,16 @@ def csv_text(log: FlightLog) -> str:
 def parquet_bytes(log: FlightLog) -> bytes:
     """The table as a Parquet file, in the types of the log, with the scenario's name and origin as metadata.
 
-    Raises PlanflyError where pyarrow is not installed.
+    Raises MissingExtraError without the extra ``tables``.
 
     >>> from logs.recording.example_log import example_log
     >>> parquet_bytes(example_log())[:4]
     b'PAR1'
     """
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError as error:
-        allowed = "the package pyarrow is not installed (extra: planfly[tables])"
-        raise PlanflyError(f".parquet: {allowed}", field="suffix", value=".parquet", allowed=allowed) from error
+    need_extra("tables", ".parquet needs")
+    import pyarrow as pa
+    from pyarrow import parquet
+
     scenario = log.setup.scenario
     about = {
         "planfly.scenario": scenario.name,
@@ -102,99 +83,6 @@ def parquet_bytes(log: FlightLog) -> bytes:
     sink = io.BytesIO()
     parquet.write_table(table, sink, compression="zstd")
     return sink.getvalue()
-
-
-# ----------------------------------------------------------------------
-# A flight as the telemetry log (`.tlog`) that a ground station would have kept of it.
-#
-# The form is Mission Planner's, MAVProxy's and pymavlink's: before each MAVLink frame the time that it came at, eight
-# bytes, microseconds since 1970, the highest first.  Frames are those of the live vehicle, at its rates; the clock is
-# the
-# log's own, which begins with the year 2000.
-
-_STAMP = struct.Struct(">Q")
-_HEARTBEATS = 1.0  # s
-_SEVERITY = {"debug": INFO, "info": INFO, "warning": WARNING, "error": CRITICAL, "fatal": CRITICAL}
-_VEHICLE, _STATION = (1, mavlink.MAV_COMP_ID_AUTOPILOT1), (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
-
-
-def telemetry_bytes(log: FlightLog) -> bytes:
-    """Bytes of the `.tlog`: the mission as it was uploaded, then telemetry, waypoints reached, and events as texts.
-
-    >>> from logs.recording.example_log import example_log
-    >>> data = telemetry_bytes(example_log())
-    >>> struct.unpack(">Q", data[:8])[0] == EPOCH_NS // 1000, data[8] == 0xFD  # the first frame is of MAVLink 2
-    (True, True)
-    """
-    senders = {ends: mavlink.MAVLink(None, *ends) for ends in (_VEHICLE, _STATION)}
-    out = bytearray()
-    for time, ends, message in _frames(log):
-        sender = senders[ends]
-        out += _STAMP.pack(EPOCH_NS // 1000 + round(time * 1e6)) + message.pack(sender)
-        sender.seq = (sender.seq + 1) % 256
-    return bytes(out)
-
-
-def _frames(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
-    """Messages in order: when (s of the flight), from whom, and what."""
-    for message in _upload(log):
-        yield 0.0, _STATION, message
-    for time, message in _messages_of(log):
-        yield time, _VEHICLE, message
-
-
-def _upload(log: FlightLog) -> Iterator[Any]:
-    items, _, _ = listed(log.setup.mission)
-    yield mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
-    yield mavlink.MAVLink_mission_count_message(1, 1, len(items), 0)
-    for item in items:
-        yield to_message(item)
-
-
-def _messages_of(log: FlightLog) -> Iterator[tuple[float, Any]]:
-    setup, track = log.setup, log.track
-    snapshots = SnapshotMaker(setup, LocalMap.around(setup))
-    start = snapshots.before_start(setup)
-    home = setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
-    status = Status(start, home, battery=setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
-    status.total, items = len(setup.mission.items), setup.route.items
-    numbers = {item.seq: k for k, item in enumerate(setup.mission.items, 1)}
-    due = {"HEARTBEAT": 0.0, **dict.fromkeys(PERIODS, 0.0)}
-    events, texts, leg = list(log.events), 0, -1
-    rows = track_rows(track)
-    for row, time in zip(rows, track.time.tolist(), strict=True):
-        while events and events[0].time <= time:
-            texts += 1
-            event = events.pop(0)
-            for piece in status_texts(event.text, _SEVERITY.get(event.level, INFO), texts):
-                yield time, piece
-        now = [name for name, at in due.items() if time >= at - 1e-6]
-        if not now and int(row.leg) == leg:
-            continue
-        snapshot = snapshots.snapshot(row)
-        if not snapshot.finite:
-            continue
-        status.snapshot, status.boot, status.wall = snapshot, time, EPOCH_NS / 1e9 + time
-        if int(row.leg) != leg:
-            passed = items[max(0, leg + 1) : int(row.leg) + 1]
-            leg = int(row.leg)
-            for item in passed[passed >= 0].tolist():
-                yield time, mavlink.MAVLink_mission_item_reached_message(numbers[item])
-            ahead = items[leg + 1 :]
-            status.current = numbers[int(ahead[ahead >= 0][0])] if np.any(ahead >= 0) else status.current
-            yield time, telemetry_message("MISSION_CURRENT", status)
-        for name in now:
-            due[name] += max(PERIODS.get(name, _HEARTBEATS), 1e-3)
-            yield time, telemetry_message(name, status)
-    end = float(track.time[-1]) if len(track) else 0.0
-    for event in events:
-        texts += 1
-        for piece in status_texts(event.text, _SEVERITY.get(event.level, INFO), texts):
-            yield end, piece
-    status.armed = status.flying = False
-    status.mission_state = COMPLETE if log.ended == "completed" else ACTIVE
-    for name in ("HEARTBEAT", "MISSION_CURRENT"):
-        yield end, telemetry_message(name, status)
 
 
 # ----------------------------------------------------------------------

@@ -176,16 +176,39 @@ def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[
     if a.scenario.origin == b.scenario.origin:
         there, here = (log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second))
         if len(there) and len(here):
-            # Imported here: nothing else of a report needs it.
-            from scipy.spatial import KDTree
-
-            away = KDTree(there).query(here)[0]
+            away = nearest_distances(here, there)
             notes.append(
                 f"tracks: {number(float(away.mean()))} m apart on average, {number(float(away.max()))} m at most"
             )
     else:
         notes.append("map origins differ: the tracks are not laid over each other")
     return notes
+
+
+# Points of a track that are looked at together.
+_TOGETHER = 32
+
+
+def nearest_distances(points: Floats, track: Floats) -> Floats:
+    """Distance (n,) from each of some points (n, 3) to the nearest of a track (m, 3), both along a way.
+
+    Neighbours along a way lie near each other: boxes about some of them say which of the others may be nearest.
+
+    >>> nearest_distances(np.array([[0.0, 3.0, 4.0], [9.0, 0.0, 0.0]]), np.array([[0.0, 0.0, 0.0], [10.0, 0.0, 0.0]]))
+    array([5., 1.])
+    """
+    begins = np.arange(0, len(track), _TOGETHER)
+    low, high = np.minimum.reduceat(track, begins), np.maximum.reduceat(track, begins)
+    parts = np.array_split(track, begins[1:])
+    out = []
+    for first in range(0, len(points), _TOGETHER):
+        some = points[first : first + _TOGETHER]
+        least, most = some.min(axis=0), some.max(axis=0)
+        nearest = np.linalg.norm(np.maximum(0.0, np.maximum(low - most, least - high)), axis=1)
+        farthest = np.linalg.norm(np.maximum(high - least, most - low), axis=1)
+        near = np.concatenate([parts[k] for k in np.flatnonzero(nearest <= farthest.min())])
+        out.append(np.sqrt(((some[:, None] - near[None]) ** 2).sum(axis=2).min(axis=1)))
+    return np.concatenate(out)
 
 
 def _wind(setup: FlightSetup) -> str:

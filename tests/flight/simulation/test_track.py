@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 import sys
 from dataclasses import fields
 from pathlib import Path
@@ -32,6 +33,7 @@ from flight.simulation.track import (
     track_columns,
     track_rows,
 )
+from world.errors import MissingExtraError
 
 
 def _rows() -> Rows:
@@ -147,11 +149,12 @@ def test_parquet_reads_back_with_its_types(track: Track, tmp_path: Path, kind: t
 
 
 @pytest.mark.parametrize(("library", "method"), [("pandas", "to_pandas"), ("pyarrow", "to_parquet")])
-def test_a_missing_library_is_named(
+def test_a_missing_extra_is_named(
     library: str, method: str, track: Track, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("flight.simulation.track.find_spec", lambda name: None if name == library else sys)
-    with pytest.raises(ImportError, match=f"{library} is not installed") as caught:
+    monkeypatch.setitem(sys.modules, library, None)
+    line = re.escape(f"{method}() needs the extra 'tables': pip install 'planfly[tables]'")
+    with pytest.raises(MissingExtraError, match=f"^{line}$") as caught:
         getattr(track, method)(*([tmp_path / "a"] if method == "to_parquet" else []))
     assert caught.value.name == library
     assert list(tmp_path.iterdir()) == []

@@ -1,6 +1,7 @@
 """A verdict as data: the place of every kind of finding, what could be changed, and both in a verdict.json."""
 
 import json
+import sys
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,6 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
-from logs.verdict import findings
 from logs.verdict.findings import (
     SCHEMA,
     UNKNOWN_AIRCRAFT,
@@ -45,7 +45,7 @@ from planfly.terminal.verdict_lines import verdict_lines
 from tests.logs.verdict.judging import ROUTE, bad_plan, judge, leg, of, suggested, waypoint
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import fly_path, make_setup
-from world.errors import LogError
+from world.errors import LogError, MissingExtraError
 
 THREAT = {
     "name": "Alfa",
@@ -320,6 +320,6 @@ def test_a_table_has_a_row_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     assert table.dtypes[["planned", "flown", "limit", "tolerance", "margin"]].unique().tolist() == [float]
     empty = Verdict((), flyable=True, complete=True, lines=(), level="flown").to_pandas()
     assert list(empty.columns) == list(table.columns)
-    monkeypatch.setattr(findings, "find_spec", lambda _: None)
-    with pytest.raises(ImportError, match="pandas is not installed"):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingExtraError, match=r"^to_pandas\(\) needs the extra 'tables'"):
         made_verdict().to_pandas()

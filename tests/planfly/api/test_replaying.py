@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import pytest
 
 import planfly
-from flight.live import link
 from logs.recording.example_log import example_log
 from planfly.api import replaying
+from world import running_clock
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         state[1] += 1
 
     monkeypatch.setattr(replaying, "time", SimpleNamespace(sleep=sleep))
-    monkeypatch.setattr(link, "time", SimpleNamespace(monotonic=lambda: state[0]))
+    monkeypatch.setattr(running_clock, "time", SimpleNamespace(monotonic=lambda: state[0]))
     return state
 
 

@@ -8,12 +8,12 @@ import pytest
 from distributed import KilledWorker
 
 from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.campaign_worker import CampaignPlugin
 from planfly.campaigns.flight_row import FlightRow, lost_row
 from planfly.campaigns.tables import same_flight
 from planfly.campaigns.worker_pool import (
     LOST,
     REPORTED_EVERY,
-    CampaignPlugin,
     FlightRate,
     FlightRequest,
     WorkerError,

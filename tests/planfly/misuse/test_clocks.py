@@ -185,4 +185,4 @@ def test_durations_are_taken_from_clocks_that_nobody_sets() -> None:
             r"\btime\.time(_ns)?\(|from time import .*\btime\b|datetime\.(now|utcnow|today)\(", path.read_text("utf-8")
         )
     ]
-    assert found == ["flight/live/vehicle.py", "planfly/replays/live.py"]
+    assert found == ["flight/live/vehicle.py", "planfly/replays/stations.py"]

@@ -35,7 +35,7 @@ HOLD = {
     # Looks at the sockets that its process was given.
     "planfly/campaigns/fork_server.py": "`campaign`, `winds`",
     "planfly/campaigns/worker_pool.py": "`campaign`, `winds`",
-    "planfly/replays/live.py": "`replay --foxglove`",
+    "planfly/replays/foxglove_server.py": "`replay --foxglove`",
     "planfly/replays/origin_gate.py": "`replay --foxglove`",
 }
 

@@ -19,7 +19,7 @@ import pytest
 from flight.simulation.track import Track
 from logs.recording.state_channel import EPOCH_NS, state_class
 from planfly.cli import main
-from planfly.replays.live import SUBPROTOCOL
+from planfly.replays.foxglove_server import SUBPROTOCOL
 from tests.clients import need
 from tests.logs.made_flight import make_setup, make_track, record
 
@@ -237,4 +237,5 @@ def test_without_the_package_it_is_one_line(
 ) -> None:
     monkeypatch.setitem(sys.modules, "foxglove", None)
     assert main(["replay", str(log_path), "--foxglove"]) == 2
-    assert "foxglove-sdk is not installed" in capsys.readouterr().err
+    line = "planfly: --foxglove needs the extra 'foxglove': pip install 'planfly[foxglove]'"
+    assert capsys.readouterr().err.splitlines() == [line]

@@ -4,7 +4,9 @@ import json
 import os
 import stat
 import sys
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -70,7 +72,7 @@ def test_a_folder_takes_the_frames(log_path: Path, tmp_path: Path) -> None:
     ("target", "more", "message"),
     [
         ("film.avi", (), ".gif, .mp4 or a folder is expected"),
-        ("film.mp4", (), "needs ffmpeg, which is not installed"),
+        ("film.mp4", (), "film.mp4: an .mp4 needs ffmpeg (a .gif or a folder does not), or the extra 'films'"),
         ("none/film.gif", (), "does not exist"),
         ("film.gif", ("--speed", "0.001"), "frames: at most 5,000; raise --speed"),
         ("film.gif", ("--foxglove",), "one of them is expected"),
@@ -82,6 +84,7 @@ def test_what_cannot_be_filmed(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.chdir(tmp_path)
     assert main(["replay", str(log_path), "--movie", target, *more]) == 2
     printed = capsys.readouterr().err.strip().splitlines()
@@ -89,10 +92,12 @@ def test_what_cannot_be_filmed(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("extra", [False, True])
 def test_an_mp4_is_what_ffmpeg_makes_of_the_frames(
-    log: FlightLog, log_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A program in ffmpeg's place keeps its arguments and its input."""
+    extra: bool, log: FlightLog, log_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """A program in place of ffmpeg, on the path or of the extra, keeps its arguments and its input."""
     fake = tmp_path / "ffmpeg"
     fake.write_text(
         f"#!{sys.executable}\nimport json, pathlib, sys\n"
@@ -101,7 +106,14 @@ def test_an_mp4_is_what_ffmpeg_makes_of_the_frames(
         encoding="utf-8",
     )
     fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
-    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    if extra:
+        monkeypatch.setenv("PATH", str(tmp_path / "none"))
+        module = ModuleType("imageio_ffmpeg")
+        module.__spec__ = ModuleSpec("imageio_ffmpeg", None)
+        module.get_ffmpeg_exe = lambda: str(fake)  # type: ignore[attr-defined]
+        monkeypatch.setitem(sys.modules, "imageio_ffmpeg", module)
+    else:
+        monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     target = tmp_path / "film.mp4"
     assert main(["replay", str(log_path), "--movie", str(target), "--speed", "24"]) == 0
     frames = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0).frames())

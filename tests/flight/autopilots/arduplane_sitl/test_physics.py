@@ -36,11 +36,11 @@ from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import waypoint_records
-from flight.live import link
 from flight.mission.items import Home
 from flight.simulation.tick import Workspace
 from tests.setups import setup_maker
 from world.errors import FlightError
+from world.running_clock import RunningClock
 
 MOTION = BodyMotion(
     12.5, 0.01, -0.02, 0.03, 0.5, -0.25, -9.8, 100.25, -200.5, -30.125, 0.1, -0.05, 1.5, 24.0, -3.5, 0.75, 25.5
@@ -148,7 +148,7 @@ def looked_at(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> Callable[..
     def begin(silence: float, leaps: dict[int, float] | None = None) -> Looks:
         looks = Looks(leaps)
         monkeypatch.setattr(physics, "SILENCE", silence)
-        port.watch, port._clock = looks, link.RunningClock(lambda: looks.now)
+        port.watch, port._clock = looks, RunningClock(lambda: looks.now)
         looks.now += 0.1  # since the port was opened
         return looks
 

@@ -26,9 +26,9 @@ from logs.views.exports.log_files import (
     flight_columns,
     parquet_bytes,
     px4_log_bytes,
-    telemetry_bytes,
 )
-from world.errors import PlanflyError
+from logs.views.exports.telemetry_file import telemetry_bytes
+from world.errors import MissingExtraError
 from world.frames import to_geo
 
 
@@ -64,7 +64,7 @@ def test_parquet_keeps_types_and_says_what_it_is(log_file: Path) -> None:
 def test_without_pyarrow_the_extra_is_named(log_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = read_log(log_file)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(PlanflyError, match=r"pyarrow is not installed \(extra: planfly\[tables\]\)"):
+    with pytest.raises(MissingExtraError, match=r"^\.parquet needs the extra 'tables'"):
         parquet_bytes(log)
 
 

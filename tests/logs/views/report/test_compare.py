@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
@@ -20,6 +21,7 @@ from logs.views.report.compare import (
     comparison_data,
     comparison_views,
     difference_lines,
+    nearest_distances,
     write_comparison,
 )
 from tests.soak import SOAK
@@ -119,3 +121,14 @@ def test_the_page_has_both_flights_and_a_map_where_they_share_an_origin(log_file
     away = replace(log.setup.scenario, origin=replace(origin, lat_deg=origin.lat_deg + 1.0))
     apart = data(replace(first, setup=replace(log.setup, scenario=away)))
     assert (apart["scene"], "map" in apart["charts"]) == (None, False)
+
+
+@pytest.mark.parametrize("apart", [0.0, 40.0, 9000.0])
+def test_the_nearest_of_a_track_is_that_of_a_tree(apart: float) -> None:
+    """Turns, a climb, and a second way that is noise about the first, some way off, and of another length."""
+    time = np.arange(0.0, 400.0, 0.25)
+    course = np.cumsum(0.02 * np.sign(np.sin(time / 25.0)))
+    track = np.cumsum(np.column_stack([6.0 * np.sin(course), 6.0 * np.cos(course), 0.3 + 0.0 * time]), axis=0)
+    points = track[100:1333] + np.random.default_rng(2).normal(0.0, 4.0, (1233, 3)) + np.array([apart, 0.0, 0.0])
+    wanted = KDTree(track).query(points)[0]
+    assert nearest_distances(points, track) == pytest.approx(wanted, abs=1e-9)

@@ -1,0 +1,114 @@
+"""A log played into ground stations, as if it were flown now."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from flight.live.link import Access, Link
+from flight.live.telemetry import (
+    ACTIVE,
+    AUTO,
+    COMPLETE,
+    INFO,
+    PERIODS,
+    SnapshotMaker,
+    Status,
+    heartbeat,
+    status_texts,
+    telemetry_message,
+)
+from flight.mission.items import Home
+from flight.simulation.local_map import LocalMap
+from flight.simulation.track import track_rows
+from logs.recording.reader import FlightLog
+from planfly.open_mission import CUT_SHORT
+from world.errors import FlightError
+
+Stopped = Callable[[], bool]
+OnMessage = Callable[[str], None]
+
+
+def play_to_stations(
+    log: FlightLog, access: Access, *, speed: float, wait: float, stopped: Stopped, on_message: OnMessage
+) -> None:
+    """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers in ``wait`` s."""
+    link = Link(access)
+    snapshots = SnapshotMaker(log.setup, LocalMap.around(log.setup))
+    track = log.track
+    rows = track_rows(track)
+    start = snapshots.before_start(log.setup)
+    home = log.setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
+    status = Status(start, home, battery=log.setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
+    items = log.setup.route.items
+    status.total = int(max(items.max(), 0))
+    player = _Player(link, status, on_message)
+    try:
+        player.wait(wait, stopped)
+        if not link.peers:
+            asked = ",".join(f"{host}:{port}" for host, port in access.to)
+            raise FlightError.of_argument("to", asked, f"no ground station has answered within {wait:g} s")
+        begun, k = link.clock(), 0
+        player.announce(f"replay of {log.source} at {speed:g}x")
+        while k < len(rows) - 1 and not stopped():
+            played = (link.clock() - begun) * speed
+            k = min(len(rows) - 1, int(np.searchsorted(track.time, played, side="right")))
+            snapshot = snapshots.snapshot(rows[k])
+            if snapshot.finite:
+                status.snapshot = snapshot
+                status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
+            player.step(0.01)
+        if log.ended == "completed" and k == len(rows) - 1:
+            status.mission_state = COMPLETE
+        status.armed = status.flying = False
+        player.announce(f"replay over: {log.ended or CUT_SHORT}")
+        player.rest(1.5, stopped)
+    finally:
+        link.close()
+
+
+class _Player:
+    """Telemetry of a log, without a vehicle behind it."""
+
+    def __init__(self, link: Link, status: Status, on_message: OnMessage) -> None:
+        self._link, self._status, self._on_message = link, status, on_message
+        self._born = link.clock()
+        self._hello = 0.0
+        self._texts = 0
+
+    def announce(self, text: str) -> None:
+        """Send a text to the stations, and on_message it here."""
+        self._on_message(text)
+        self._texts += 1
+        for peer in self._link.peers.values():
+            for piece in status_texts(text, INFO, self._texts):
+                self._link.send(piece, peer)
+
+    def wait(self, timeout: float, stopped: Stopped) -> None:
+        """Call stations until one answers, or ``timeout`` seconds are over."""
+        end = self._link.clock() + timeout
+        while not self._link.peers and self._link.clock() < end and not stopped():
+            self.step(0.05)
+
+    def rest(self, seconds: float, stopped: Stopped) -> None:
+        """Go on sending the last snapshot."""
+        end = self._link.clock() + seconds
+        while self._link.clock() < end and not stopped():
+            self.step(0.02)
+
+    def step(self, pause: float) -> None:
+        """Read what stations send, send them what is due, and pause, s."""
+        now = self._link.clock()
+        self._status.boot, self._status.wall = now - self._born, time.time()
+        self._link.receive()
+        for notice in self._link.notices():
+            self._on_message(notice)
+        if now >= self._hello:
+            self._hello = now + 1.0
+            self._link.send_heartbeat(heartbeat(self._status))
+        for peer in self._link.peers.values():
+            for name, due in peer.due.items():
+                if now >= due:
+                    self._link.send(telemetry_message(name, self._status), peer)
+                    peer.due[name] = max(due + PERIODS[name], now - PERIODS[name])
+        time.sleep(pause)
