@@ -7,7 +7,7 @@ from pathlib import Path
 from flight.mission.fences import fence_zones, numbered, with_fences
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
-from flight.mission.items import Mission, MissionItem
+from flight.mission.items import OTHER_VEHICLES, Command, Mission, MissionItem, command_name
 from flight.mission.placing import place_stops
 from flight.mission_files.formats import read_fence, read_mission
 from flight.simulation.setup import FlightSetup
@@ -194,7 +194,7 @@ def open_mission(
     if path.suffix.lower() == ".json":
         opened = open_plan(path, terrain, changed)
         return _placed(opened, path.stem, scenario_name, terrain, seed, changed, fences)
-    mission = fences.on_mission(read_mission(path))
+    mission = fences.on_mission(for_fixed_wing(read_mission(path)))
     if scenario_name is not None:
         scenario = changed(load_scenario(scenario_name, terrain))
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
@@ -204,6 +204,23 @@ def open_mission(
     airframe = load_airframe(scenario)
     number = choose_seed(scenario, seed)
     return OpenedMission(make_setup(scenario, airframe, mission, number, placed=placed), airframe, path.stem)
+
+
+def for_fixed_wing(mission: Mission) -> Mission:
+    """The mission, if a fixed wing can fly it.  Raises MissionError for a step that only other vehicles take.
+
+    >>> spline = MissionItem(3, 82, 3, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> for_fixed_wing(Mission(None, (spline,), source="a.waypoints"))
+    Traceback (most recent call last):
+        ...
+    world.errors.MissionError: a.waypoints: item 3: NAV_SPLINE_WAYPOINT: for a multicopter: planfly flies fixed-wing ...
+    """
+    for item in mission.items:
+        if item.command in OTHER_VEHICLES:
+            name = command_name(item.command)
+            allowed = f"for {OTHER_VEHICLES[Command(item.command)]}: planfly flies fixed-wing aircraft"
+            raise MissionError.at(mission.source, f"item {item.seq}", name, allowed, shown=name)
+    return mission
 
 
 def _mission_names(folder: Path) -> list[str]:

@@ -22,6 +22,7 @@ from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
+from logs.verdict.conditions import Conditions, conditions_of
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.places import ReferenceFlights
@@ -115,10 +116,15 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     plan = make_plan(scenario, airframe, number)
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     if not plan.feasible:
-        return PlanThenFly(plan, mission, None, judge_plan_only(plan))
+        return PlanThenFly(plan, mission, None, judge_plan_only(plan, planned_for(scenario, airframe)))
     setup = make_setup(scenario, airframe, mission, number, plan=plan)
     flown = fly_and_judge(setup, airframe, log)
     return PlanThenFly(plan, mission, flown.track, flown.verdict)
+
+
+def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
+    """What a plan of a scenario is for."""
+    return conditions_of(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
 
 
 def make_plan(

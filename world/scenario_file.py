@@ -19,7 +19,7 @@ MAX_BYTES = 16 * 2**20
 
 
 def parse_scenario(text: str, source: str) -> ScenarioFile:
-    """Check the text of a TOML scenario file; ``source`` names it in messages.
+    """Check the text of a TOML scenario file; ``source`` names it in messages.  One that names no aircraft says so.
 
     Raises ScenarioError with one line: file, key, value and what is allowed.
     """
@@ -33,7 +33,10 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
         raise ScenarioError(
             f'{source}: terrain.kind: "none": allowed are "dem", "peaks" and "flat"', file=source, field="terrain.kind"
         )
-    return check_scenario(data, source)
+    made = check_scenario(data, source)
+    if "aircraft" in made.flight.model_fields_set:
+        return made
+    return made.model_copy(update={"flight": made.flight.model_copy(update={"aircraft_by_default": True})})
 
 
 def check_scenario(data: Any, source: str) -> ScenarioFile:

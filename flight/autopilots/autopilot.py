@@ -278,6 +278,11 @@ class Autopilot(ABC):
         return self.title
 
     @property
+    def version(self) -> str:
+        """The release that flies, or whose law does; "" for planfly's own guidance, which has planfly's version."""
+        return ""
+
+    @property
     def acceptance_radius(self) -> float | None:
         """Distance (m) from a waypoint at which it turns to the next leg where the mission states none.
 

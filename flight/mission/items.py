@@ -98,6 +98,8 @@ class Command(IntEnum):
     DO_MOUNT_CONTROL = 205
     DO_SET_CAM_TRIGG_DIST = 206
     DO_FENCE_ENABLE = 207
+    NAV_SET_YAW_SPEED = 213
+    DO_GUIDED_LIMITS = 222
     SET_CAMERA_MODE = 530
     JUMP_TAG = 600
     DO_JUMP_TAG = 601
@@ -112,6 +114,8 @@ class Command(IntEnum):
     NAV_FENCE_CIRCLE_INCLUSION = 5003
     NAV_FENCE_CIRCLE_EXCLUSION = 5004
     NAV_RALLY_POINT = 5100
+    DO_WINCH = 42600
+    NAV_ATTITUDE_TIME = 42703
 
 
 C = Command
@@ -127,6 +131,20 @@ CAMERA = frozenset(
     {C.DO_DIGICAM_CONTROL, C.DO_SET_CAM_TRIGG_DIST, C.SET_CAMERA_MODE, C.IMAGE_START_CAPTURE, C.IMAGE_STOP_CAPTURE}
     | {C.VIDEO_START_CAPTURE, C.VIDEO_STOP_CAPTURE}
 )
+# Steps of a flight that no fixed wing takes, and whose they are.  ArduPlane goes on to the next command
+# (`Plane::start_command`), so that of the way a piece is missing; but for QuadPlanes, which land to place a payload.
+OTHER_VEHICLES = {
+    C.NAV_SPLINE_WAYPOINT: "a multicopter",
+    C.NAV_GUIDED_ENABLE: "a multicopter or a rover",
+    C.NAV_PAYLOAD_PLACE: "a multicopter or a VTOL aircraft",
+    C.NAV_ATTITUDE_TIME: "a multicopter",
+    C.NAV_SET_YAW_SPEED: "a rover",
+    C.NAV_VTOL_TAKEOFF: "a VTOL aircraft",
+    C.NAV_VTOL_LAND: "a VTOL aircraft",
+    C.DO_VTOL_TRANSITION: "a VTOL aircraft",
+}
+# What ArduPlane passes over without a change of its way.
+PASSED_OVER = frozenset({C.CONDITION_YAW, C.DO_GUIDED_LIMITS, C.DO_WINCH})
 FENCES = frozenset(range(5001, 5005))
 # Other commands whose fifth to seventh numbers are latitude, longitude and height.
 _LOCATED_DO = frozenset(

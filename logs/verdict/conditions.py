@@ -2,53 +2,149 @@
 
 import math
 from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import find_aircraft
+from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import surveys_of
 from world.errors import FlightError
+from world.scenario import Scenario
+from world.scenario_tables import Navigation
+from world.wind import Turbulence
 
 _NAV = {
     "perfect": "exact",
     "rtk": "with RTK's error (0.05 m on each axis)",
     "gnss": "with GNSS's error (1.5 m on each axis)",
 }
+AirspeedSource = Literal["scenario", "parameters", "aircraft", "flight"]
+_WHOSE_AIRSPEED: dict[AirspeedSource, str] = {
+    "scenario": "as stated",
+    "parameters": "by the autopilot's parameters",
+    "aircraft": "its cruise speed",
+    "flight": "as it was flown",
+}
 
 
-def condition_lines(setup: FlightSetup) -> list[str]:
-    """The aircraft and its speed, and whether anybody named it; the weather and the ground."""
-    return [_aircraft_line(setup), _weather_line(setup)]
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What a verdict is for; of an imported flight as far as its log tells.
+
+    aircraft: its name, or its folder; "" for an imported flight whose aircraft nobody named.
+    mass_kg: None where the aircraft is not on this machine.
+    aircraft_named: whether anybody named it; if not, it is the default.
+    airspeed_mps: until the mission sets another.  airspeed_kind: equivalent is less than true at height.
+    airspeed_source: who states it: "scenario" (or an option), "parameters" (of the autopilot), "aircraft" (its cruise);
+    "flight" of an imported one by what it flew.
+    wind_mps, wind_from_deg: the mean wind, and where it comes from.
+    turbulence, navigation: None where it was not simulated.
+    autopilot: who steers, with the settings that decide most.  autopilot_version: "" for planfly's own guidance.
+    terrain: its file or name, None for none.  height_datum: what the terrain's heights count from.
+    """
+
+    aircraft: str
+    mass_kg: float | None
+    aircraft_named: bool
+    airspeed_mps: float
+    airspeed_kind: Literal["true", "equivalent"]
+    airspeed_source: AirspeedSource
+    wind_mps: float
+    wind_from_deg: float
+    turbulence: Turbulence | None
+    navigation: Navigation | None
+    autopilot: str
+    autopilot_version: str
+    terrain: str | None
+    height_datum: str | None
 
 
-def navigation_text(setup: FlightSetup) -> str:
-    """How well the autopilot knows where it is, in words."""
-    return f"navigation {_NAV[setup.nav]}"
-
-
-def _aircraft_line(setup: FlightSetup) -> str:
-    table = setup.scenario.flight
-    mass = ""
+def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
+    """What a plan made in a scenario is for.  aircraft: its name or folder.  airspeed: m/s."""
+    table, wind, terrain = scenario.flight, scenario.wind, scenario.terrain
+    mass = None
     # A log's aircraft need not be on this machine.
     with suppress(FlightError):
-        mass = f", {find_aircraft(setup.aircraft).mass:.3g} kg"
-    whose = "its cruise speed" if table.airspeed_mps is None else "as stated"
-    line = f"Aircraft: {setup.aircraft}{mass}, {setup.airspeed:.3g} m/s true airspeed ({whose})"
-    if not table.aircraft_by_default:
+        mass = find_aircraft(aircraft).mass
+    return Conditions(
+        aircraft=aircraft,
+        mass_kg=mass,
+        aircraft_named=not table.aircraft_by_default,
+        airspeed_mps=airspeed,
+        airspeed_kind="equivalent" if autopilot.equivalent_airspeeds else "true",
+        airspeed_source=_source_of_airspeed(scenario, autopilot),
+        wind_mps=wind.speed,
+        wind_from_deg=round(math.degrees(wind.from_course) % 360.0, 9),
+        turbulence=wind.turbulence,
+        navigation=table.steering.nav,
+        autopilot=autopilot.described(aircraft),
+        autopilot_version=autopilot.version,
+        terrain=None if terrain is None else terrain.source,
+        height_datum=None if terrain is None else terrain.datum,
+    )
+
+
+def _source_of_airspeed(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
+    if scenario.flight.airspeed_mps is not None:
+        return "scenario"
+    return "aircraft" if autopilot.stated_airspeed is None else "parameters"
+
+
+def setup_conditions(setup: FlightSetup) -> Conditions:
+    """What the verdict of a flight, or of a mission that is not flown, is for."""
+    found = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
+    found = replace(found, navigation=setup.nav)
+    source = setup.source
+    if source is None:
+        return found
+    flown = found.airspeed_source == "aircraft" and "airspeed" in source.holds
+    if not source.aircraft_known:
+        found = replace(found, aircraft="", mass_kg=None, aircraft_named=False)
+    return replace(
+        found,
+        airspeed_source="flight" if flown else found.airspeed_source,
+        turbulence=None,
+        navigation=None,
+        autopilot=source.program or "not stated",
+        autopilot_version="",
+    )
+
+
+def condition_lines(conditions: Conditions) -> list[str]:
+    """The aircraft and its speed, and whether anybody named it; the weather, navigation and ground."""
+    return [_aircraft_line(conditions), _world_line(conditions)]
+
+
+def autopilot_line(conditions: Conditions, *, flown: bool) -> str:
+    """Who flew, or for whom it is judged without a flight."""
+    return f"{'Flown by' if flown else 'Autopilot'}: {conditions.autopilot}"
+
+
+def _aircraft_line(made: Conditions) -> str:
+    speed = f"{made.airspeed_mps:.3g} m/s {made.airspeed_kind} airspeed ({_WHOSE_AIRSPEED[made.airspeed_source]})"
+    if not made.aircraft:
+        return f"Aircraft: nobody named one (--aircraft names yours), so none of its limits are judged; {speed}"
+    mass = "" if made.mass_kg is None else f", {made.mass_kg:.3g} kg"
+    line = f"Aircraft: {made.aircraft}{mass}, {speed}"
+    if made.aircraft_named:
         return line
     return f"{line}; nobody named an aircraft, so it is the default (--aircraft names yours)"
 
 
-def _weather_line(setup: FlightSetup) -> str:
-    wind, terrain = setup.scenario.wind, setup.scenario.terrain
+def _world_line(made: Conditions) -> str:
     blows = "no wind"
-    if wind.speed > 0.0:
-        blows = f"wind {wind.speed:.3g} m/s from {math.degrees(wind.from_course) % 360.0:.0f} degrees"
-    turbulence = "no turbulence" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
-    ground = "no terrain" if terrain is None else f"terrain {terrain.source}, heights above {terrain.datum}"
-    return f"Conditions: {blows}, {turbulence}; {ground}"
+    if made.wind_mps > 0.0:
+        blows = f"wind {made.wind_mps:.3g} m/s from {made.wind_from_deg:.0f} degrees"
+    turbulence = ""
+    if made.turbulence is not None:
+        turbulence = ", no turbulence" if made.turbulence == "none" else f", {made.turbulence} turbulence"
+    navigation = "" if made.navigation is None else f"; navigation {_NAV[made.navigation]}"
+    ground = "no terrain" if made.terrain is None else f"terrain {made.terrain}, heights above {made.height_datum}"
+    return f"Conditions: {blows}{turbulence}{navigation}; {ground}"
 
 
 # Legs count as beside each other where their courses differ, or are opposite, by no more than this, and where at least

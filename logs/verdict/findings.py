@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from flight.autopilots.autopilot import AutopilotProgram, Parameters
+from logs.verdict.conditions import Conditions
 from logs.verdict.places import DecidingParameter, LevelAnswer, Place, Suggestion
 from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
 from world.extras import need_extra
@@ -92,6 +93,7 @@ class Verdict:
     unjudged: what was not judged, so that the flight is not flyable although nothing failed; "" for nothing: items that
     the log of an imported flight lacks, its end, or slopes that the aircraft is not known well enough for.
     imported: of a flight that another program logged, which was flown as planned or was not.
+    conditions: what it is for: aircraft, speed, weather, navigation, autopilot, ground; the lines say it too.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -113,6 +115,7 @@ class Verdict:
     parameters: Parameters | None = None
     unjudged: str = ""
     imported: bool = False
+    conditions: Conditions | None = None
 
     @property
     def answer(self) -> str:
@@ -326,6 +329,7 @@ def verdict_json(verdict: Verdict) -> str:
         "answer": verdict.answer,
         "undecided": verdict.undecided,
         "summary": verdict.summary,
+        "conditions": None if verdict.conditions is None else asdict(verdict.conditions),
         "flown_by": None if verdict.program is None else asdict(verdict.program),
         "parameters": None if verdict.parameters is None else _parameters_data(verdict.parameters),
         "levels": [_level_data(level) for level in verdict.levels],

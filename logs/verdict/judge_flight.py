@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs.verdict.conditions import setup_conditions
 from logs.verdict.findings import Finding, Verdict, left_open
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
@@ -75,7 +76,8 @@ def judge_flight(
     findings = with_suggestions(requirements, aligned, findings)
     levels = _levels(requirements, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
-    lines = summary_lines(findings, setup, "flown", levels, deciding)
+    conditions = setup_conditions(setup)
+    lines = summary_lines(findings, setup, "flown", levels, conditions, deciding)
     return Verdict(
         *(findings, flyable, complete, lines, "flown"),
         levels=levels,
@@ -85,6 +87,7 @@ def judge_flight(
         program=setup.autopilot.program,
         parameters=setup.autopilot.parameters,
         unjudged=unjudged,
+        conditions=conditions,
     )
 
 

@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flight.simulation.setup import FlightSetup
+from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, setup_conditions
 from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Verdict, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
 from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines, undecided_text
+from logs.verdict.wording import problems_by_kind
 from planner.plan import Plan, Violation
 
 # ----------------------------------------------------------------------
@@ -119,9 +121,18 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     flyable = complete and not unjudged and not fails
     said = headline(findings, flyable, setup.envelope.source)
     levels = (LevelAnswer("geometry", flyable, said, undecided=bool(unjudged) and not fails),)
-    lines = summary_lines(findings, setup, "geometric", levels)
-    notes = setup.route.notes
-    return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=notes, unjudged=unjudged)
+    conditions = setup_conditions(setup)
+    return Verdict(
+        findings,
+        flyable,
+        complete,
+        summary_lines(findings, setup, "geometric", levels, conditions),
+        "geometric",
+        levels,
+        notes=setup.route.notes,
+        unjudged=unjudged,
+        conditions=conditions,
+    )
 
 
 def flown_level(setup: FlightSetup) -> LevelName:
@@ -151,12 +162,15 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
         LevelAnswer("geometry", passes, headline(predicted, passes)),
         LevelAnswer(flown_level(setup), False, headline(findings, False)),
     )
-    lines = summary_lines(findings, setup, "geometric", levels)
-    return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.route.notes)
+    conditions = setup_conditions(setup)
+    lines = summary_lines(findings, setup, "geometric", levels, conditions)
+    return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.route.notes, conditions=conditions)
 
 
-def judge_plan_only(plan: Plan) -> Verdict:
+def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
     """Judge a run that found no feasible plan, so that nothing was flown: level "plan", never complete.
+
+    conditions: what it was planned for.
 
     >>> import numpy as np
     >>> from planner.plan import Certificate
@@ -196,7 +210,8 @@ def judge_plan_only(plan: Plan) -> Verdict:
             )
         )
     findings.append(_not_feasible(plan))
-    return Verdict(tuple(findings), False, False, _plan_lines(findings, plan), "plan")
+    lines = _plan_lines(findings, plan, conditions)
+    return Verdict(tuple(findings), False, False, lines, "plan", conditions=conditions)
 
 
 def _not_feasible(plan: Plan) -> Finding:
@@ -208,10 +223,12 @@ def _not_feasible(plan: Plan) -> Finding:
     )
 
 
-def _plan_lines(findings: list[Finding], plan: Plan) -> tuple[str, ...]:
+def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | None) -> tuple[str, ...]:
     failed = [item for item in findings if item.ok is False and item.rule != "completion"]
-    if not failed:
-        return (headline(findings, False),)
-    text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
-    problems = (f"Problem: {problem}" for problem in plan.certificate.problems)
-    return (f"not flyable: no feasible plan was found: {text}", "Nothing was flown", *problems)
+    first, more = headline(findings, False), []
+    if failed:
+        text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
+        first = f"not flyable: no feasible plan was found: {text}"
+        more = ["Nothing was flown", *(f"Problem: {one}" for one in problems_by_kind(plan.certificate.problems))]
+    said = [] if conditions is None else [*condition_lines(conditions), autopilot_line(conditions, flown=False)]
+    return (first, *said, *more)

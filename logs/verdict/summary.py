@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.conditions import condition_lines, corridor_line, navigation_text
+from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
 from logs.verdict.findings import UNKNOWN_WAY, Finding, Verdict, left_open
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
@@ -163,16 +163,18 @@ def summary_lines(
     setup: FlightSetup,
     level: str,
     levels: Sequence[LevelAnswer],
+    conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Lines of the summary: the answer; whose fault it is; start and conditions; what was not judged; the levels.
+    """Lines of the summary: the answer; whose fault it is; start, conditions, autopilot; what was not judged; levels.
 
     levels: the verdict's own last, with the headline.
     """
     *others, own = levels
     lines = [own.headline, *_whose_fault(levels, deciding, setup)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
-    lines += condition_lines(setup)
+    lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
+    lines += _parameter_lines(setup) if level == "flown" else []
     silent: dict[str, str] = {}
     for item in findings:
         if item.ok is None and RULES[item.rule].explained:
@@ -189,8 +191,6 @@ def summary_lines(
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
     if level == "flown":
-        lines.append(f"Flown by: {setup.autopilot.described(setup.aircraft)}; {navigation_text(setup)}")
-        lines += _parameter_lines(setup)
         lines += [line] if (line := corridor_line(setup)) else []
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")

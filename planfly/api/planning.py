@@ -7,10 +7,12 @@ from functools import partial
 from pathlib import Path
 
 from flight.autopilots.catalog import program_autopilot
+from logs.verdict.conditions import Conditions
 from planfly.airframe import choose_seed, load_airframe
 from planfly.arguments import check_arguments, is_wind
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import PLANNING
+from planfly.pipeline import planned_for
 from planfly.stages import stage
 from planfly.targets import file_target
 from planner.plan import Plan, plan_json, read_plan
@@ -306,6 +308,11 @@ def _stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> S
         return "budget" if deadline is not None and time.monotonic() >= deadline else ""
 
     return ends
+
+
+def conditions_of_plan(plan: Plan) -> Conditions:
+    """Aircraft, speed, weather, autopilot and ground that a plan is for."""
+    return planned_for(plan.scenario, load_airframe(plan.scenario))
 
 
 def what_blocks(plan: Plan) -> tuple[str, ...]:

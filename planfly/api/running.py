@@ -21,7 +21,7 @@ from planfly.arguments import check_arguments
 from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_text
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
-from planfly.pipeline import autopilot_log, fly_and_judge, make_plan, make_setup
+from planfly.pipeline import autopilot_log, fly_and_judge, make_plan, make_setup, planned_for
 from planfly.refine import refine as refine_rounds
 from planfly.return_flights import returns_line
 from planfly.stages import say_replaced, stage
@@ -223,7 +223,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     for target in (folder / "mission.waypoints", folder / "mission.plan"):
         write_whole(target, mission_text(mission, mission_kind(target)))
     if not plan.feasible:
-        verdict = judge_plan_only(plan)
+        verdict = judge_plan_only(plan, planned_for(task.scenario, airframe))
         write_whole(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)

@@ -89,7 +89,8 @@ def plan(args: argparse.Namespace) -> int:
 
 
 def _answer(made: "Plan", target: "Path", code: int) -> object:
-    from planfly.terminal.answers import PlanAnswer
+    from planfly.api.planning import conditions_of_plan
+    from planfly.terminal.answers import PlanAnswer, conditions_document
     from planner.plan import Objective
 
     return PlanAnswer(
@@ -105,6 +106,7 @@ def _answer(made: "Plan", target: "Path", code: int) -> object:
         evaluations=made.evaluations,
         ended=made.ended,
         problems=list(made.certificate.problems),
+        conditions=conditions_document(conditions_of_plan(made)),
     )
 
 
@@ -140,17 +142,22 @@ def _check_replanning(args: argparse.Namespace) -> None:
 
 def _print_plan(made: "Plan") -> None:
     """A plan on the terminal."""
+    from logs.verdict.conditions import autopilot_line, condition_lines
+    from logs.verdict.wording import problems_by_kind
+    from planfly.api.planning import conditions_of_plan
     from planner.plan import Objective
 
     state = "safe" if made.safe else "feasible, but inside a missile's reach" if made.feasible else "no feasible plan"
     length = float(made.objectives[Objective.LENGTH_RATIO])
     print(f"{state}: {len(made.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {made.algorithm}")
+    conditions = conditions_of_plan(made)
+    print("\n".join([*condition_lines(conditions), autopilot_line(conditions, flown=False)]))
     if made.ended != "completed":
         why = "at its budget" if made.ended == "budget" else "by Ctrl-C"
         print(f"  note    the search was ended {why}, after {made.evaluations:,} evaluations: the best plan so far")
     if made.flown_legs:
         print(f"  note    legs 0..{made.flown_legs - 1} are flown and kept; judged is what follows them")
-    for problem in made.certificate.problems:
+    for problem in problems_by_kind(made.certificate.problems):
         print(f"  failed  {problem}")
     for obstacle in planfly.what_blocks(made):
         print(f"  note    {obstacle}")

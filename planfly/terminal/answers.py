@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import asdict
 from typing import Any, Literal
 
 from pydantic import ConfigDict, TypeAdapter
@@ -10,6 +11,7 @@ from pydantic.dataclasses import dataclass
 from aircraft.catalog import Aircraft
 from flight.mission.surveys import PhotoLine
 from flight.simulation.setup import FlightSetup
+from logs.verdict.conditions import Conditions
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.measures.photo_lines import LineMeasure
 from logs.verdict.returns.glides_text import glide_range_text, glides_headline
@@ -164,6 +166,35 @@ class ProgramDocument:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ConditionsDocument:
+    """What a verdict or a plan is for; of an imported flight as far as its log tells."""
+
+    aircraft: str
+    """Its name or folder; empty for an imported flight whose aircraft nobody named."""
+    mass_kg: float | None
+    aircraft_named: bool
+    """Whether anybody named it; if not, it is the default."""
+    airspeed_mps: float
+    """Until the mission sets another."""
+    airspeed_kind: str
+    """true or equivalent."""
+    airspeed_source: str
+    """scenario (or an option), parameters, aircraft (its cruise speed) or flight (as it was flown)."""
+    wind_mps: float
+    wind_from_deg: float
+    turbulence: str | None
+    """null where it was not simulated, as navigation."""
+    navigation: str | None
+    """perfect, rtk or gnss."""
+    autopilot: str
+    """With the settings that decide most."""
+    autopilot_version: str
+    """Empty for planfly's own guidance, and where a log's program states it."""
+    terrain: str | None
+    height_datum: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class VerdictDocument:
     """Whether a plan really flies: also the content of verdict.json."""
 
@@ -178,11 +209,18 @@ class VerdictDocument:
     """Whether nothing failed, and something was not judged that had to be."""
     summary: str
     """Lines for a person, of which the first answers the question."""
+    conditions: ConditionsDocument | None
+    """What it is for; null where that is not known."""
     flown_by: ProgramDocument | None
     parameters: ParametersDocument | None
     levels: list[LevelDocument]
     deciding_parameter: DecidingDocument | None
     findings: list[FindingDocument]
+
+
+def conditions_document(conditions: Conditions) -> ConditionsDocument:
+    """What a plan is for as an answer has it."""
+    return ConditionsDocument(**asdict(conditions))
 
 
 def verdict_document(verdict: Verdict) -> VerdictDocument:
@@ -474,6 +512,8 @@ class PlanAnswer:
     """completed, budget or interrupted."""
     problems: list[str]
     """What of the plan is not feasible."""
+    conditions: ConditionsDocument
+    """What it is for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from logs.verdict.conditions import autopilot_line, condition_lines
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.rules.registry import RULES
 from planfly.terminal.command_parser import coloured
@@ -38,6 +39,9 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
         # Where another value of a parameter passes, the second line names it.
         more = f"; {rest[0]}" if rest and not verdict.flyable else ""
         lines.append(f"{name}: " + coloured(first, "good" if verdict.flyable else "bad") + more)
+        if verdict.conditions is not None:
+            said = (*condition_lines(verdict.conditions), autopilot_line(verdict.conditions, flown=True))
+            lines += [f"  {line}" for line in said]
     return lines
 
 

@@ -140,11 +140,11 @@ def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> f
         name = f"turn at waypoint {piece['number']}" if piece["of_arc"] else f"leg {piece['number']}"
         if math.isnan(margin) or not low.get(name, math.inf) <= margin:
             low[name] = margin
-    for name, margin in low.items():
+    for name, margin in sorted(low.items(), key=lambda one: (not math.isnan(one[1]), one[1])):
         if math.isnan(margin):
             problems.append(f"{name}: leaves the terrain that is known")
         else:
-            wanted = f"{data.clearance:g} m and {data.buffer:g} m in reserve wanted"
+            wanted = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve wanted"
             problems.append(f"{name}: {margin + data.clearance:.1f} m above ground at its lowest, {wanted}")
     return smallest
 
@@ -178,10 +178,10 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
         # NaN off the terrain is reported by the clearance.
         if left < float(piece["buffer"]) - _EPSILON:
             high[name] = min(high.get(name, math.inf), left)
-    for name, (distance, z) in near.items():
+    for name, (distance, z) in sorted(near.items(), key=lambda one: one[1]):
         problems.append(f"{name}: {_too_near(problem, distance, z)}")
-    for name, left in high.items():
-        wanted = f"{space.max_height:g} m allowed, {space.buffer:g} m in reserve wanted"
+    for name, left in sorted(high.items(), key=lambda one: one[1]):
+        wanted = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve wanted"
         problems.append(f"{name}: {space.max_height - left:.1f} m above ground at its highest, {wanted}")
     return float(pieces["zones"]["nearest"].min()), headroom
 

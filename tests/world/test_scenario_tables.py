@@ -128,7 +128,7 @@ def test_every_default() -> None:
         },
         "flight": {
             "aircraft": "aerosonde",
-            "aircraft_by_default": None,
+            "aircraft_by_default": True,
             "airspeed_mps": None,
             "max_bank_deg": 30.0,
             "autopilot": None,

@@ -13,6 +13,7 @@ from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick
 from flight.autopilots.arduplane.navigator import REACHED_HEIGHT, turn_distance
 from flight.autopilots.arduplane.parameters import (
     HEIGHT_CANDIDATES,
+    RELEASE,
     SIDE_CANDIDATES,
     ArduPilotParameters,
     default_parameters,
@@ -109,9 +110,14 @@ class ArduPlane(Autopilot):
         made = self.parameters
         whose = f"the parameters of {made.source}" if made.source else "its default parameters"
         return (
-            f"ArduPlane's law with {whose} (WP_RADIUS {made.wp_radius:g} m,"
+            f"ArduPlane {RELEASE}'s law with {whose} (WP_RADIUS {made.wp_radius:g} m,"
             f" NAVL1_PERIOD {made.navl1_period:g} s, TECS_HDEM_TCONST {made.tecs_height_demand_time:g} s)"
         )
+
+    @property
+    def version(self) -> str:
+        """The release whose law it is."""
+        return RELEASE
 
     @property
     def acceptance_radius(self) -> float | None:

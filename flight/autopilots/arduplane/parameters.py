@@ -24,6 +24,8 @@ from world.kernels import Record, record_dtype
 Floats = NDArray[np.float64]
 
 
+# Whose law, parameters and defaults these are.
+RELEASE = "4.6"
 # Of an aircraft, beside its model: what ArduPlane has to be told of it.
 AIRCRAFT_FILE = "ardupilot.parm"
 

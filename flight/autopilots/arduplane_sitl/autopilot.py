@@ -59,6 +59,11 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
         """The program, and the parameters that a person changed."""
         return super().described(aircraft) if self.program is None else describe_program(self.program, aircraft)
 
+    @property
+    def version(self) -> str:
+        """What the program calls itself, or the release of the law before the flight."""
+        return super().version if self.program is None else self.program.version
+
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
         """Start the program.  Raises FlightError for one that does not start, and ParameterError for a bad file."""
         # Imported here: nobody else needs MAVLink.

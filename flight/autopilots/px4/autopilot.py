@@ -118,6 +118,11 @@ class Px4(Autopilot):
         )
 
     @property
+    def version(self) -> str:
+        """The release whose law it is."""
+        return self.parameters.version
+
+    @property
     def acceptance_radius(self) -> float | None:
         """NAV_ACC_RAD; up to 1.16 guidance's own switch distance at sea level where that is more."""
         return self.turn_distance(math.pi, 0.0)

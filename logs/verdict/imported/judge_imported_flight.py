@@ -21,6 +21,7 @@ from flight.simulation.setup import (
     VerticalDatum,
 )
 from flight.simulation.track import Track
+from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, setup_conditions
 from logs.verdict.findings import Finding, Verdict, make_finding
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between, stretch_end_text
 from logs.verdict.judge_geometry import track_findings
@@ -43,14 +44,19 @@ _LISTED = 4
 
 
 def imported_lines(
-    findings: Sequence[Finding], setup: FlightSetup, own: LevelAnswer, flown: Sequence[FlownLegs]
+    findings: Sequence[Finding],
+    setup: FlightSetup,
+    own: LevelAnswer,
+    flown: Sequence[FlownLegs],
+    conditions: Conditions,
 ) -> tuple[str, ...]:
     """Lines of the summary, the headline first."""
     source = setup.source
     if source is None:
         return (own.headline,)
-    lines = [own.headline, *_judged_lines(source, flown), *_unjudged_lines(findings)]
-    lines.append(f"Flown by: {source.program or 'not stated'} ({source.format} {source.file}{_when(source)})")
+    lines = [own.headline, *condition_lines(conditions)]
+    lines.append(f"{autopilot_line(conditions, flown=True)} ({source.format} {source.file}{_when(source)})")
+    lines += [*_judged_lines(source, flown), *_unjudged_lines(findings)]
     if source.mission:
         lines.append(f"Mission: {source.mission}")
     lines.append(f"Heights: {heights_text(source)}")
@@ -228,7 +234,8 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     answer = [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if failed or not unjudged else []
     said = "; ".join([*answer, *filter(None, [unjudged])])
     own = LevelAnswer(setup.autopilot.level, flyable, said, undecided=bool(unjudged) and not failed)
-    lines = imported_lines(findings, setup, own, flown)
+    conditions = setup_conditions(setup)
+    lines = imported_lines(findings, setup, own, flown, conditions)
     return Verdict(
         findings,
         flyable,
@@ -241,6 +248,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         parameters=setup.autopilot.parameters,
         unjudged=unjudged,
         imported=True,
+        conditions=conditions,
     )
 
 

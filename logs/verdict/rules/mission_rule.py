@@ -22,6 +22,7 @@ from flight.mission.items import (
     LANDINGS,
     OVER_HOME,
     OVER_TERRAIN,
+    PASSED_OVER,
     PLACES,
     TAKEOFFS,
     Command,
@@ -52,9 +53,7 @@ _PX4 = frozenset(
     | {211, 214, 260, 530, 531, 532, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 4501, 42600}
 )
 # Others that ArduPlane takes.
-_ARDUPLANE = frozenset(
-    {18, 30, 83, 92, 94, 112, 114, 115, 181, 182, 184, 186, 207, 208, 210, 212, 216, 218, 222, 223, 600, 601}
-)
+_ARDUPLANE = frozenset({18, 30, 83, 94, 112, 114, 181, 182, 184, 186, 207, 208, 210, 212, 216, 218, 223, 600, 601})
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
@@ -138,8 +137,9 @@ def _validity(mission: Mission) -> Iterator[_Remark]:
     for item in mission.items:
         name = command_name(item.command)
         if item.command not in _PX4:
-            known = item.command in _ARDUPLANE
+            known = item.command in _ARDUPLANE | PASSED_OVER
             taken = "ArduPlane takes it" if known else "nor does ArduPlane take it"
+            taken = "ArduPlane passes it over" if item.command in PASSED_OVER else taken
             yield REFUSED if known else False, item.seq, f"unsupported command {name}; {taken}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (

@@ -1,40 +1,56 @@
 """What a verdict says it is for: an aircraft that somebody named or nobody did, its speed, the weather, the ground."""
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
-from logs.verdict.conditions import condition_lines, corridor_line, least_gap
-from tests.logs.made_flight import make_setup
+from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.autopilots.px4.autopilot import Px4
+from flight.simulation.setup import FlightSetup, ImportedLog
+from logs.verdict.conditions import condition_lines, corridor_line, least_gap, setup_conditions
+from logs.verdict.findings import verdict_json
+from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
+from tests.logs.made_flight import make_setup, make_track
+from tests.logs.verdict.judging import bad_plan
 from world.errors import FlightError
 from world.scenario import with_flight, with_wind
 from world.scenario_tables import FlightTable
 
 
+def lines_of(setup: FlightSetup) -> list[str]:
+    return condition_lines(setup_conditions(setup))
+
+
 def test_an_aircraft_that_nobody_named_is_said_to_be_the_default() -> None:
     setup = make_setup()
     unnamed = replace(setup.scenario, flight=FlightTable(aircraft_by_default=True))
-    line, _ = condition_lines(setup.in_scenario(unnamed))
+    line, _ = lines_of(setup.in_scenario(unnamed))
     assert line.startswith("Aircraft: aerosonde, 11 kg, ")
     assert line.endswith("; nobody named an aircraft, so it is the default (--aircraft names yours)")
     # An option that says nothing of the aircraft names none either.
-    line, _ = condition_lines(setup.in_scenario(with_flight(unnamed, airspeed_mps=24.0)))
+    line, _ = lines_of(setup.in_scenario(with_flight(unnamed, airspeed_mps=24.0)))
     assert "nobody named" in line
     assert "(as stated)" in line
-    line, _ = condition_lines(setup.in_scenario(with_flight(unnamed, aircraft="aerosonde")))
+    line, _ = lines_of(setup.in_scenario(with_flight(unnamed, aircraft="aerosonde")))
     assert "nobody" not in line
 
 
 def test_weather_and_ground() -> None:
     setup = make_setup()
     windy = with_wind(setup.scenario, 8.04, 3.0 * 3.14159265 / 2.0, "moderate")
-    _, line = condition_lines(setup.in_scenario(windy))
-    assert line.startswith("Conditions: wind 8.04 m/s from 270 degrees, moderate turbulence; terrain ")
+    _, line = lines_of(setup.in_scenario(windy))
+    begin = "Conditions: wind 8.04 m/s from 270 degrees, moderate turbulence; navigation exact; terrain "
+    assert line.startswith(begin)
     assert "heights above " in line
     calm = replace(with_wind(setup.scenario, 0.0, 0.0, "none"), terrain=None)
-    _, line = condition_lines(setup.in_scenario(calm))
-    assert line == "Conditions: no wind, no turbulence; no terrain"
+    _, line = lines_of(setup.in_scenario(calm))
+    assert line == "Conditions: no wind, no turbulence; navigation exact; no terrain"
+    _, line = lines_of(replace(setup, nav="gnss"))
+    assert "; navigation with GNSS's error (1.5 m on each axis); " in line
 
 
 def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,8 +58,58 @@ def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyP
         raise FlightError(f"{name}: no such folder")
 
     monkeypatch.setattr("logs.verdict.conditions.find_aircraft", missing)
-    line, _ = condition_lines(make_setup())
+    line, _ = lines_of(make_setup())
     assert " kg" not in line
+
+
+def test_the_kind_of_an_airspeed_and_who_states_it() -> None:
+    """ArduPlane and PX4 fly equivalent airspeeds, planfly's guidance true ones."""
+    setup = make_setup()
+    mine = parameters_of("AIRSPEED_CRUISE 21\n", "mine.parm")
+    unstated = setup.in_scenario(replace(setup.scenario, flight=FlightTable()))
+    said = [
+        lines_of(replace(unstated, autopilot=autopilot))[0].partition(" kg, ")[2]
+        for autopilot in (setup.autopilot, ArduPlane(default_parameters()), ArduPlane(mine))
+    ]
+    assert said == [
+        "25.2 m/s true airspeed (its cruise speed)",
+        "25.2 m/s equivalent airspeed (its cruise speed)",
+        "25.2 m/s equivalent airspeed (by the autopilot's parameters)",
+    ]
+    assert setup_conditions(replace(unstated, autopilot=ArduPlane(mine))).autopilot_version == "4.6"
+    px4 = Px4.load(FlightTable(autopilot="px4", px4_version="1.16"), load_aircraft("aerosonde"), "a")
+    found = setup_conditions(replace(unstated, autopilot=px4))
+    assert (found.autopilot_version, found.airspeed_kind) == ("1.16", "equivalent")
+
+
+def test_every_verdict_is_told_what_it_is_for_and_holds_it_as_data() -> None:
+    """Of a route, of a plan that is not feasible, and of a flight: in its first lines and in its JSON."""
+    setup = make_setup()
+    conditions = setup_conditions(setup)
+    said = [*condition_lines(conditions), "Autopilot: planfly's guidance on the fly-by path"]
+    geometric, planned = judge_geometry(setup), judge_plan_only(bad_plan(setup), conditions)
+    assert list(geometric.lines[2:5]) == said  # after the answer, and how it starts
+    assert list(planned.lines[1:4]) == said
+    for verdict in (geometric, planned):
+        assert json.loads(verdict_json(verdict))["conditions"] == asdict(conditions)
+
+
+def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
+    setup = make_setup()
+    source = ImportedLog("a.BIN", "", "ArduPilot dataflash log", "ArduPlane V4.6.0", holds=("airspeed",))
+    setup = replace(setup.in_scenario(replace(setup.scenario, flight=FlightTable())), source=source)
+    lines = lines_of(setup)
+    assert lines[0] == (
+        "Aircraft: nobody named one (--aircraft names yours), so none of its limits are judged;"
+        " 25.2 m/s true airspeed (as it was flown)"
+    )
+    assert "turbulence" not in lines[1]
+    assert "navigation" not in lines[1]
+    named = replace(setup, source=replace(source, aircraft_known=True, holds=()))
+    assert lines_of(named)[0] == "Aircraft: aerosonde, 11 kg, 25.2 m/s true airspeed (its cruise speed)"
+    verdict = judge_flight(setup, make_track(), "")
+    assert list(verdict.lines[1:3]) == lines
+    assert verdict.lines[3].startswith("Flown by: ArduPlane V4.6.0 (ArduPilot dataflash log a.BIN")
 
 
 def lines(gap: float, *, overlap: float = 1.0) -> np.ndarray:

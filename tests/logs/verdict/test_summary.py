@@ -4,7 +4,8 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_parameters, parameters_of
+from logs.verdict.conditions import setup_conditions
 from logs.verdict.findings import Finding, Verdict, make_finding, message
 from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
 from logs.verdict.rules.registry import RULES
@@ -74,14 +75,19 @@ def test_a_take_off_or_a_landing_that_was_not_judged_is_named_too() -> None:
 def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     setup = replace(make_setup([[0, 0, 300], [0, 2000, 300]]), nav="gnss")
     levels = (LevelAnswer("autopilot", True, "flyable"),)
-    lines = summary_lines([], replace(setup, autopilot=ArduPlane(default_parameters())), "flown", levels)
+
+    def lines_by(parameters: ArduPilotParameters) -> tuple[str, ...]:
+        by = replace(setup, autopilot=ArduPlane(parameters))
+        return summary_lines([], by, "flown", levels, setup_conditions(by))
+
+    lines = lines_by(default_parameters())
     assert (
-        "Flown by: ArduPlane's law with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
-        " TECS_HDEM_TCONST 3 s); navigation with GNSS's error (1.5 m on each axis)"
+        "Flown by: ArduPlane 4.6's law with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
+        " TECS_HDEM_TCONST 3 s)"
     ) in lines
     assert not [line for line in lines if line.startswith("Parameters")]
     mine = parameters_of("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
-    lines = summary_lines([], replace(setup, autopilot=ArduPlane(mine)), "flown", levels)
+    lines = lines_by(mine)
     assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
     known = len(mine.values) - 1
     assert (
@@ -89,7 +95,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
     returns = parameters_of("RTL_RADIUS 80\nRTL_AUTOLAND 1\n", "mine.parm")
-    lines = summary_lines([], replace(setup, autopilot=ArduPlane(returns)), "flown", levels)
+    lines = lines_by(returns)
     assert any(line.endswith("defaults; read, not flown: RTL_AUTOLAND") for line in lines)
 
 

@@ -46,13 +46,54 @@ def test_a_step_on_the_spot_is_flown_within_its_own_height(up: float, tmp_path: 
 
 
 def test_check_names_px4s_rules(tmp_path: Path) -> None:
-    target = tmp_path / "v.json"
-    assert main(["check", str(MISSIONS / "mission_planner_land.waypoints"), "--json", str(target)]) == 4
+    """A landing steeper than PX4's parameter has it, and a command that neither autopilot has."""
+    mission, target = tmp_path / "land.waypoints", tmp_path / "v.json"
+    text = (MISSIONS / "mission_planner_land.waypoints").read_text(encoding="utf-8")
+    mission.write_text(text.replace("4\t0\t3\t183\t", "4\t0\t3\t5000\t"), encoding="utf-8")
+    assert main(["check", str(mission), "--json", str(target)]) == 4
     findings = json.loads(target.read_text())["findings"]
     reasons = {item["reason"]: item["ok"] for item in findings if item["rule"] == "mission" and item["ok"] is not True}
-    # A landing steeper than PX4's parameter has it is PX4's to refuse; a spline no fixed wing's autopilot flies.
     assert [ok for reason, ok in reasons.items() if "(PX4 checkFixedWindLandApproach)" in reason] == [None]
     assert [ok for reason, ok in reasons.items() if "(PX4 checkMissionItemValidity)" in reason] == [False]
+
+
+OTHERS = {
+    82: "NAV_SPLINE_WAYPOINT: for a multicopter",
+    92: "NAV_GUIDED_ENABLE: for a multicopter or a rover",
+    94: "NAV_PAYLOAD_PLACE: for a multicopter or a VTOL aircraft",
+    42703: "NAV_ATTITUDE_TIME: for a multicopter",
+    213: "NAV_SET_YAW_SPEED: for a rover",
+    84: "NAV_VTOL_TAKEOFF: for a VTOL aircraft",
+    85: "NAV_VTOL_LAND: for a VTOL aircraft",
+    3000: "DO_VTOL_TRANSITION: for a VTOL aircraft",
+}
+
+
+@pytest.mark.parametrize("command", OTHERS)
+def test_a_mission_for_another_vehicle_is_a_line(
+    command: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A .waypoints file names no vehicle: its steps do."""
+    mission = tmp_path / "m.waypoints"
+    row = f"5\t0\t3\t{command}\t0\t0\t0\t0\t46.03\t8.0\t120\t1\n"
+    mission.write_text(MISSION.format(up=200) + row, encoding="utf-8")
+    for name in ("check", "fly"):
+        assert main([name, str(mission)]) == 2
+        wanted = f"planfly: {mission}: item 5: {OTHERS[command]}: planfly flies fixed-wing aircraft\n"
+        assert capsys.readouterr().err == wanted
+
+
+@pytest.mark.parametrize(("command", "name"), [(115, "CONDITION_YAW"), (42600, "DO_WINCH"), (222, "DO_GUIDED_LIMITS")])
+def test_what_arduplane_passes_over_is_no_other_vehicles(
+    command: int, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mission = tmp_path / "m.waypoints"
+    row = f"5\t0\t2\t{command}\t0\t0\t0\t0\t0\t0\t0\t1\n"
+    mission.write_text(MISSION.format(up=201) + row, encoding="utf-8")
+    assert main(["check", str(mission)]) == 0
+    out = capsys.readouterr().out
+    assert f"{name}: not flown" in out
+    assert "ArduPlane takes it" not in out
 
 
 FENCED = """QGC WPL 110
@@ -180,9 +221,13 @@ def test_several_autopilots_are_told_in_one_table(tmp_path: Path, capsys: pytest
     assert said[0].split() == ["ardupilot", "px4"]
     assert said[1].split() == ["verdict", "flyable", "not", "flyable"]
     assert any(line.split()[0] == "corridor" and line.endswith("failed") for line in said)
-    assert said[-2].startswith("ardupilot: flyable")
-    assert "px4: not flyable: corridor" in said[-1]
-    assert "would pass" in said[-1]
+    assert said[-8].startswith("ardupilot: flyable")
+    assert said[-7].startswith(
+        "  Aircraft: aerosonde, 11 kg, 25 m/s equivalent airspeed (its cruise speed); nobody named"
+    )
+    assert said[-5].startswith("  Flown by: ArduPlane 4.6's law with its default parameters")
+    assert "px4: not flyable: corridor" in said[-4]
+    assert "would pass" in said[-4]
 
 
 @pytest.mark.parametrize(

@@ -22,8 +22,8 @@ LEGS = {
     "qgc_amsl.plan": 4,
     "qgc_takeoff.plan": 7,
 }
-# What fails of them whoever flies: a jump without end, and a spline, which no fixed wing's autopilot flies.
-NOT_FLYABLE = {"endless.waypoints": "energy", "mission_planner_land.waypoints": "mission"}
+# What fails of them whoever flies: a jump without end.
+NOT_FLYABLE = {"endless.waypoints": "energy"}
 # What their first line says beside the terrain: a course that is the autopilot's, ground that no file knows.
 UNJUDGED_ENDS = {
     "mission_planner.waypoints": "; take-off not judged",
