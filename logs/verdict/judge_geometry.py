@@ -12,7 +12,6 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
 from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines, undecided_text
-from logs.verdict.wording import problems_by_kind
 from planner.plan import Plan, Violation
 
 # ----------------------------------------------------------------------
@@ -229,6 +228,6 @@ def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | No
     if failed:
         text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
         first = f"not flyable: no feasible plan was found: {text}"
-        more = ["Nothing was flown", *(f"Problem: {one}" for one in problems_by_kind(plan.certificate.problems))]
+        more = ["Nothing was flown", *(f"Problem: {problem}" for problem in plan.certificate.problems)]
     said = [] if conditions is None else [*condition_lines(conditions), autopilot_line(conditions, flown=False)]
     return (first, *said, *more)

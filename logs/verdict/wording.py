@@ -1,8 +1,6 @@
 """Places, changes and disagreements in words.  Nothing of ours reads these words back."""
 
 import math
-import re
-from collections.abc import Iterable
 
 from logs.verdict.places import Change, DecidingParameter, Disagreement, Place, Suggestion
 from logs.verdict.tolerances import ON_THE_SPOT
@@ -10,9 +8,6 @@ from world.threats import threat_label
 
 # How a unit stands after a number.
 UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs", "%": " %"}
-# Places that are named where the same is wrong at several.
-_PLACES = 6
-_NUMBER = re.compile(r"[0-9][0-9.,]*")
 # Longest statement of a headline, characters.
 _LONGEST = 80
 
@@ -182,25 +177,6 @@ def deciding_text(deciding: DecidingParameter) -> str:
     elif off is not None:
         does = f"puts it {abs(off):.0f} m {'low' if off < 0.0 else 'high'} on {where}"
     return f"{deciding.name} {deciding.current:g} {does}; {deciding.passing:g} would pass"
-
-
-def problems_by_kind(problems: Iterable[str]) -> list[str]:
-    """A plan's problems, those that differ by their place and numbers alone as one: the first, and where else.
-
-    >>> low = [f"leg {k}: {9 + k}.0 m above ground at its lowest" for k in range(3)]
-    >>> problems_by_kind([*low, "waypoint 4: 2.0 m outside the area, floor or ceiling"])
-    ['leg 0: 9.0 m above ground at its lowest (also leg 1, leg 2)', 'waypoint 4: 2.0 m outside ...']
-    """
-    groups: dict[str, list[str]] = {}
-    for problem in problems:
-        where, colon, what = problem.partition(": ")
-        groups.setdefault(_NUMBER.sub("", what) if colon else where, []).append(problem)
-    lines = []
-    for first, *others in groups.values():
-        named = ", ".join(other.partition(": ")[0] for other in others[:_PLACES])
-        more = f", {len(others) - _PLACES} more" if len(others) > _PLACES else ""
-        lines.append(f"{first} (also {named}{more})" if others else first)
-    return lines
 
 
 def shortened(text: str) -> str:

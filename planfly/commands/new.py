@@ -45,7 +45,6 @@ def new_options(line: LineParser) -> None:
 
 def new(args: argparse.Namespace) -> int:
     """Write it, and plan it; 4 where the plan is not safe, which does not take the file away."""
-    from logs.verdict.wording import problems_by_kind
     from planner.plan import Objective
 
     file = call(planfly.new_scenario, args)
@@ -60,7 +59,7 @@ def new(args: argparse.Namespace) -> int:
         print(f"{safe}: {len(made.waypoints)} waypoints, {ratio:.3f} times the straight line")
     else:
         print(coloured("plans     no safe path", "bad"))
-        for said in (*problems_by_kind(made.certificate.problems), *planfly.what_blocks(made)):
+        for said in (*made.certificate.problems, *planfly.what_blocks(made)):
             print(f"  {said}")
     print(f"next      planfly run {shlex.quote(str(file))}")
 

@@ -143,7 +143,6 @@ def _check_replanning(args: argparse.Namespace) -> None:
 def _print_plan(made: "Plan") -> None:
     """A plan on the terminal."""
     from logs.verdict.conditions import autopilot_line, condition_lines
-    from logs.verdict.wording import problems_by_kind
     from planfly.api.planning import conditions_of_plan
     from planner.plan import Objective
 
@@ -157,7 +156,7 @@ def _print_plan(made: "Plan") -> None:
         print(f"  note    the search was ended {why}, after {made.evaluations:,} evaluations: the best plan so far")
     if made.flown_legs:
         print(f"  note    legs 0..{made.flown_legs - 1} are flown and kept; judged is what follows them")
-    for problem in problems_by_kind(made.certificate.problems):
+    for problem in made.certificate.problems:
         print(f"  failed  {problem}")
     for obstacle in planfly.what_blocks(made):
         print(f"  note    {obstacle}")

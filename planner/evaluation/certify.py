@@ -56,24 +56,49 @@ def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
     return float(missile_distance(data, np.ascontiguousarray(waypoints)))
 
 
+# How far inside its limit (negative: beyond), where, and what is wrong.
+_Fault = tuple[float, str, str]
+# Places that are named beside the worst.
+_NAMED = 6
+
+
+def _worst_and_others(found: list[_Fault]) -> list[str]:
+    """Faults of one kind as one line: the worst, and where else; none for none."""
+    if not found:
+        return []
+    (_, where, what), *others = sorted(found, key=lambda one: one[0])
+    named = ", ".join(name for _, name, _ in others[:_NAMED])
+    more = f", {len(others) - _NAMED} more" if len(others) > _NAMED else ""
+    return [f"{where}: {what}" + (f" (also {named}{more})" if others else "")]
+
+
 def _turns(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Smallest margin of a turn to its limit, rad."""
     allowed = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN
     wanted = 0.0 if data.legs_hold_turns else ANGLE_MARGIN
     margins = allowed - turning_angles(with_courses(data, waypoints))
-    for i, margin in enumerate(margins):
-        if margin < wanted - _EPSILON:
-            turned, largest = math.degrees(allowed - margin), math.degrees(allowed - wanted)
-            problems.append(f"waypoint {i}: turns {turned:.1f} deg, allowed {largest:.1f} deg")
+    largest = math.degrees(allowed - wanted)
+    problems += _worst_and_others(
+        [
+            (margin, f"waypoint {i}", f"turns {math.degrees(allowed - margin):.1f} deg, allowed {largest:.1f} deg")
+            for i, margin in enumerate(margins.tolist())
+            if margin < wanted - _EPSILON
+        ]
+    )
     return float(margins.min(initial=math.inf))
 
 
 def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Smallest length of a leg that remains between its turns, m; inf where legs need not hold their turns."""
-    for i, run in enumerate(leg_runs(waypoints)):
-        if run < CERTIFIED_LEG:
-            problems.append(f"leg {i}: {run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
+    problems += _worst_and_others(
+        [
+            (run, f"leg {i}", f"{run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
+            for i, run in enumerate(leg_runs(waypoints).tolist())
+            if run < CERTIFIED_LEG
+        ]
+    )
     smallest = math.inf
+    found: list[_Fault] = []
     if not data.legs_hold_turns:
         return smallest
     lengths = turn_and_roll_lengths(data, waypoints)
@@ -83,7 +108,9 @@ def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -
         smallest = min(smallest, float(run - need - roll))
         settle = settling_length(float(need), float(run)) + roll
         if need + settle > run + _EPSILON:
-            problems.append(f"leg {i}: {run:.0f} m long, its turns need {need:.0f} m and {settle:.0f} m to settle")
+            what = f"{run:.0f} m long, its turns need {need:.0f} m and {settle:.0f} m to settle"
+            found.append((float(run - need) - settle, f"leg {i}", what))
+    problems += _worst_and_others(found)
     return smallest
 
 
@@ -95,6 +122,7 @@ def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> 
         return smallest
     radii, tangents = fly_by_radii(data, waypoints), turn_tangents(data.aircraft, waypoints)
     rises = np.tan(leg_slopes(waypoints))
+    found: list[_Fault] = []
     for i in range(1, len(waypoints) - 1):
         if tangents[i] <= 0.0 or radii[i] <= 0.0:
             continue
@@ -106,8 +134,9 @@ def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> 
             inside = min(climb - slope, dive + slope)
             smallest = min(smallest, inside + data.angle_margin)
             if inside < -_EPSILON:
-                problems.append(f"turn at waypoint {i}: {_too_steep(slope, climb, dive, ' along its arc')}")
+                found.append((inside, f"turn at waypoint {i}", _too_steep(slope, climb, dive, " along its arc")))
                 break
+    problems += _worst_and_others(found)
     return smallest
 
 
@@ -115,11 +144,13 @@ def _leg_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> 
     """Smallest slope margin of the legs, rad."""
     smallest = math.inf
     limits = leg_slope_limits(data, waypoints)
+    found: list[_Fault] = []
     for i, (slope, climb, dive) in enumerate(zip(leg_slopes(waypoints), *limits, strict=True)):
         inside = min(climb - slope, dive + slope)
         smallest = min(smallest, inside + data.angle_margin)
         if inside < -_EPSILON:
-            problems.append(f"leg {i}: {_too_steep(slope, climb, dive)}")
+            found.append((inside, f"leg {i}", _too_steep(slope, climb, dive)))
+    problems += _worst_and_others(found)
     return smallest
 
 
@@ -140,12 +171,14 @@ def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> f
         name = f"turn at waypoint {piece['number']}" if piece["of_arc"] else f"leg {piece['number']}"
         if math.isnan(margin) or not low.get(name, math.inf) <= margin:
             low[name] = margin
-    for name, margin in sorted(low.items(), key=lambda one: (not math.isnan(one[1]), one[1])):
-        if math.isnan(margin):
-            problems.append(f"{name}: leaves the terrain that is known")
-        else:
-            wanted = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve wanted"
-            problems.append(f"{name}: {margin + data.clearance:.1f} m above ground at its lowest, {wanted}")
+    wanted = f"{data.clearance:g} m and {data.buffer:.1f} m in reserve wanted"
+    off = [(0.0, name, "leaves the terrain that is known") for name, margin in low.items() if math.isnan(margin)]
+    over = [
+        (margin, name, f"{margin + data.clearance:.1f} m above ground at its lowest, {wanted}")
+        for name, margin in low.items()
+        if not math.isnan(margin)
+    ]
+    problems += [*_worst_and_others(off), *_worst_and_others(over)]
     return smallest
 
 
@@ -154,9 +187,11 @@ def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> floa
     low = np.array([data.west, data.south, data.floor])
     high = np.array([data.east, data.north, data.ceiling])
     margins = np.minimum(waypoints - low, high - waypoints).min(axis=1)
-    problems.extend(
-        f"waypoint {i}: {-margins[i]:.1f} m outside the area, floor or ceiling"
-        for i in np.nonzero(margins < -_EPSILON)[0]
+    problems += _worst_and_others(
+        [
+            (float(margins[i]), f"waypoint {i}", f"{-margins[i]:.1f} m outside the area, floor or ceiling")
+            for i in np.nonzero(margins < -_EPSILON)[0]
+        ]
     )
     return float(margins.min())
 
@@ -178,11 +213,17 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
         # NaN off the terrain is reported by the clearance.
         if left < float(piece["buffer"]) - _EPSILON:
             high[name] = min(high.get(name, math.inf), left)
-    for name, (distance, z) in sorted(near.items(), key=lambda one: one[1]):
-        problems.append(f"{name}: {_too_near(problem, distance, z)}")
-    for name, left in sorted(high.items(), key=lambda one: one[1]):
-        wanted = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve wanted"
-        problems.append(f"{name}: {space.max_height - left:.1f} m above ground at its highest, {wanted}")
+    for zone in dict.fromkeys(z for _, z in near.values()):
+        problems += _worst_and_others(
+            [(distance, name, _too_near(problem, distance, z)) for name, (distance, z) in near.items() if z == zone]
+        )
+    wanted = f"{space.max_height:g} m allowed, {space.buffer:.1f} m in reserve wanted"
+    problems += _worst_and_others(
+        [
+            (left, name, f"{space.max_height - left:.1f} m above ground at its highest, {wanted}")
+            for name, left in high.items()
+        ]
+    )
     return float(pieces["zones"]["nearest"].min()), headroom
 
 

@@ -65,6 +65,20 @@ def test_what_fails_names_the_zone_and_the_leg(made: Made) -> None:
     assert certificate(made(zones=tower(-9.0)), STRAIGHT).problems == ("leg 0: 9.0 m inside mast",)
 
 
+def test_what_fails_at_several_places_is_one_line_the_worst_first(made: Made) -> None:
+    """A leg climbs above what is allowed, the corner before it too near: one line.  A mast by each leg: a line each."""
+    path = np.array([[0.0, 0.0, 150.0], [1500.0, 0.0, 150.0], [3000.0, 0.0, 156.0]])
+    low = {"max_height_m": 153.0, "min_clearance_m": 30}
+    assert certificate(made(limits=low), path).problems == (
+        "leg 1: 156.0 m above ground at its highest, 153 m allowed, 5.0 m in reserve wanted (also turn at waypoint 1)",
+    )
+    near, far = tower(1.0, 2250.0)[0] | {"name": "near"}, tower(4.0, 750.0)[0] | {"name": "far"}
+    assert certificate(made(zones=[near, far]), path).problems == (
+        "leg 0: 4.0 m from far, 10 m or 5 m in height wanted",
+        "leg 1: 1.0 m from near, 10 m or 5 m in height wanted",
+    )
+
+
 def test_a_zone_inside_a_turn_is_what_the_arc_comes_near(made: Made) -> None:
     """An arc of 121 m radius or more passes 50 m within the corner of 90 degrees: there stands a mast."""
     ends = {"destination": {"east_m": 3000, "north_m": 2900, "amsl_m": 150}}
