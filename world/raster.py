@@ -257,7 +257,9 @@ def _placed_file(file: Path, placed: _Placed, read: Callable[[int, int, int, int
         raise TerrainError.at(file, "bands", placed.bands, allowed, shown=f"{placed.bands} of kind {placed.kind!r}")
     forward = placed.transform
     if placed.crs is None or forward is None or forward.determinant == 0.0:
-        raise TerrainError(f"{file}: no coordinate reference system and position are stated", file=file)
+        beside = file.with_name(f"{file.name}.aux.xml")
+        unread = f" in the file itself; {beside.name} is not read" if beside.exists() else ""
+        raise TerrainError(f"{file}: no coordinate reference system and position are stated{unread}", file=file)
     try:
         transformer, (stated, metres) = crs_transformer(placed.crs), height_unit(placed.crs)
     except ValueError as error:

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyproj
 import pytest
 import rasterio
 from rasterio import Affine
@@ -17,11 +18,20 @@ from world.scenario import Scenario, load_scenario
 
 ROOT = Path(__file__).parents[2]
 WEST, NORTH, STEP, PIXELS, HEIGHT = 8.0, 46.1, 0.001, 40, 500.0
+# As programs wrote it before systems of three dimensions had numbers.
+OLD_COMPOUND = (
+    'COMPD_CS["WGS 84 + Ellipsoid (metre)",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],'
+    'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],VERT_CS["Ellipsoid (metre)",'
+    'VERT_DATUM["Ellipsoid",2002],UNIT["metre",1],AXIS["Up",UP]]]'
+)
 # Reference systems of elevation files as EPSG numbers them, and whether EPSG says that heights are ellipsoidal.
 SYSTEMS = {
     "EPSG:4979": True,  # WGS 84, three-dimensional
     "EPSG:4937": True,  # ETRS89, three-dimensional
     "EPSG:9754": True,  # WGS 84 (G2139), three-dimensional
+    "EPSG:7843": True,  # GDA2020, three-dimensional
+    "EPSG:6319": True,  # NAD83(2011), three-dimensional
+    OLD_COMPOUND: True,
     "EPSG:4326": False,
     "EPSG:32632": False,
     "EPSG:4326+5773": False,  # EGM96 height
@@ -169,3 +179,17 @@ def test_a_grid_of_the_geoid_converts_heights(tmp_path: Path) -> None:
     assert float(middle) == pytest.approx(HEIGHT - undulation, abs=1e-3)
     # A degree of longitude is 77.4 km there.
     assert float(east) - float(middle) == pytest.approx(-0.5 * 0.9 / 77.4, abs=1e-4)
+
+
+def test_a_reference_system_that_stands_beside_the_file_is_named(tmp_path: Path) -> None:
+    """GeoTIFF has no place for a projected system of three dimensions: GDAL writes it into a file beside."""
+    file = tmp_path / "hill.tif"
+    write_tile(file, pyproj.CRS("EPSG:32632").to_3d().to_wkt())
+    beside = tmp_path / "hill.tif.aux.xml"
+    assert beside.exists()
+    said = "no coordinate reference system and position are stated"
+    with pytest.raises(TerrainError, match=rf"{said} in the file itself; hill\.tif\.aux\.xml is not read$"):
+        open_raster(str(file))
+    beside.unlink()
+    with pytest.raises(TerrainError, match=f"{said}$"):
+        open_raster(str(file))

@@ -96,8 +96,14 @@ def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] 
 
 
 def _command(line: str) -> str:
-    """A line without its comment.  V may stand before its variable without a space."""
-    return re.sub(r"^V(?=[DXWZ]\s*=)", "V ", line.partition("*")[0].strip(), flags=re.IGNORECASE)
+    """A line without its comment.  V may stand before its variable without a space.
+
+    In what draws, as in some countries' files, a semicolon begins a comment, too; a name may hold one.
+    """
+    line = line.partition("*")[0].strip()
+    if line[:1].upper() in ("D", "V"):
+        line = line.partition(";")[0].rstrip()
+    return re.sub(r"^V(?=[DXWZ]\s*=)", "V ", line, flags=re.IGNORECASE)
 
 
 def _finished(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
@@ -111,6 +117,8 @@ def _finished(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
     if block.times:
         entries["times"] = block.times
     shapes = [bool(block.corners), bool(block.airway), block.circle is not None]
+    if not any((*shapes, block.name, block.limits)):
+        return where, "without name, limits and shape"
     if sum(shapes) != 1:
         allowed = "one shape is expected: corners and arcs, a circle, or an airway"
         raise ScenarioError(f"{source}: {where}: {allowed}", file=source, allowed=allowed)
@@ -159,7 +167,7 @@ def _altitude(text: str, key: str) -> dict[str, Any] | None:
     """A limit as openAIP states it; None for one that bounds nothing."""
     if text.upper() in ("GND", "SFC", "SURFACE", "0") and key == "lowerLimit":
         return None
-    if text.upper() in ("UNL", "UNLIM", "UNLIMITED") and key == "upperLimit":
+    if text.upper() in ("UNL", "UNLIM", "UNLTD", "UNLIMITED") and key == "upperLimit":
         return None
     if (level := _LEVEL.fullmatch(text)) is not None:
         return {"value": float(level[1]), "unit": "FL", "referenceDatum": "STD"}

@@ -1,8 +1,9 @@
 """UAS geographical zones as Europe's authorities publish them: the JSON of EUROCAE ED-269, and ED-318's GeoJSON.
 
 ED-269: features with a list of volumes, each a polygon or a circle between two limits.  ED-318: GeoJSON features whose
-geometries have a `layer`, and points an `extent`; its schema is public (https://github.com/UASGeoZones/ED-318).  Of
-either, a zone without a restriction keeps nobody out.
+geometries have a `layer`, and points an `extent`; its schema is public (https://github.com/UASGeoZones/ED-318).  Spain
+(ENAIRE) has what ED-318 says of a zone in tables of its own, `UASZone` and `verticalLayer`, or the layer and the times
+among the properties.  Of any, a zone without a restriction keeps nobody out.
 """
 
 import math
@@ -19,6 +20,8 @@ _UNLIMITED = 99_999.0
 _UNITS = {"M": "M", "FT": "FT"}
 _DATUMS = ("AGL", "AMSL", "WGS84", "SFC")
 _FREE = "NO_RESTRICTION"
+# What says when a zone applies, where Spain has it among the properties.
+_PERIOD = ("startDateTime", "endDateTime", "day", "startTime", "endTime", "startEvent", "endEvent")
 # A date without an offset from UTC may be of any zone of time.
 _EARLIEST, _LATEST = timedelta(hours=-14), timedelta(hours=12)
 
@@ -43,7 +46,13 @@ def is_ed318(feature: Any) -> bool:
     (True, False)
     """
     properties = feature.get("properties") if isinstance(feature, dict) else None
-    return isinstance(properties, dict) and {"type", "variant"} <= properties.keys()
+    return isinstance(properties, dict) and {"type", "variant"} <= _stated(properties).keys()
+
+
+def _stated(properties: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What properties say of a zone, in a table of its own or not."""
+    zone = properties.get("UASZone")
+    return {**properties, **zone} if isinstance(zone, dict) else properties
 
 
 def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_Found]:
@@ -95,18 +104,22 @@ def ed318_zones(feature: Mapping[str, Any], where: str, number: int, source: str
 
     where: names the feature in the file.  number: counts it from 0.
     """
-    properties = feature["properties"]
+    properties = _stated(feature["properties"])
     name = _name(properties.get("name")) or _name(properties.get("identifier")) or f"zone {number + 1}"
     where = f"{where} ({name})"
     if (restriction := _word(properties["type"])) == _FREE:
         yield where, restriction
         return
-    times = _times(properties.get("limitedApplicability"), f"{source}: {where}")
+    applicability = properties.get("limitedApplicability")
+    if applicability is None and any(properties.get(key) for key in _PERIOD):
+        applicability = [{**properties, "schedule": [properties]}]
+    times = _times(applicability, f"{source}: {where}")
     stated = {"times": times} if times else {}
+    own = properties.get("verticalLayer")
     geometries = list(_geometries(feature.get("geometry")))
     for k, geometry in enumerate(geometries, 1):
         label = f"{name} {k}/{len(geometries)}" if len(geometries) > 1 else name
-        for entries in _ed318_layer(geometry, f"{source}: {where}"):
+        for entries in _ed318_layer(geometry, own if isinstance(own, dict) else properties, f"{source}: {where}"):
             yield where, {**entries, "name": label, **stated}
 
 
@@ -120,11 +133,12 @@ def _geometries(geometry: Any) -> Iterator[Any]:
         yield geometry
 
 
-def _ed318_layer(geometry: Any, source: str) -> Iterator[dict[str, Any]]:
+def _ed318_layer(geometry: Any, beside: Mapping[str, Any], source: str) -> Iterator[dict[str, Any]]:
+    """Entries of each part of a geometry between its layer's limits, or those that stand beside it."""
     geometry = geometry if isinstance(geometry, dict) else {}
     layer = geometry.get("layer")
-    layer = layer if isinstance(layer, dict) else {}
-    unit = layer.get("uom") or "m"
+    layer = layer if isinstance(layer, dict) else beside
+    unit = layer.get("uom") or layer.get("UOM") or "m"
     limits = {
         f"{side}Limit": _limit(layer.get(side), unit, layer.get(f"{side}Reference"), side, source)
         for side in ("lower", "upper")
@@ -236,7 +250,8 @@ def _moment(value: Any, unknown: timedelta) -> datetime | None:
 
 def _daily(start: datetime | None, end: datetime | None, daily: Mapping[str, Any]) -> Period:
     """A part of a schedule.  Hours by the sun, and those without an offset from UTC, are the whole day."""
-    named = [_word(day) for day in daily.get("day") or []]
+    stated_days = daily.get("day") or []
+    named = [_word(day) for day in ([stated_days] if isinstance(stated_days, str) else stated_days)]
     days = frozenset() if "ANY" in named else frozenset(WEEKDAYS.index(day) for day in named)
     stated = [daily.get(key) for key in ("startTime", "endTime")]
     first, last = _minutes(stated[0]), _minutes(stated[1], up=True)

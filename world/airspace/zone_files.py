@@ -53,15 +53,16 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
         features = data.get("features")
         if not isinstance(features, list):
             raise ScenarioError(f"{source}: features: a list is expected", file=source, field="features")
-        for k, feature in enumerate(features):
-            if is_ed318(feature):
-                yield from ed318_zones(feature, f"features[{k}]", k, source)
-            else:
-                yield _geojson_zone(feature, f"features[{k}]", k, source)
+        named = [(f"features[{k}]", feature) for k, feature in enumerate(features)]
     elif kind == "Feature":
-        yield _geojson_zone(data, "feature", 0, source)
+        named = [("feature", data)]
     else:
-        yield _geojson_zone({"type": "Feature", "geometry": data}, "geometry", 0, source)
+        named = [("geometry", {"type": "Feature", "geometry": data})]
+    for k, (where, feature) in enumerate(named):
+        if is_ed318(feature):
+            yield from ed318_zones(feature, where, k, source)
+        else:
+            yield _geojson_zone(feature, where, k, source)
 
 
 def _no_number(name: str) -> float:

@@ -51,6 +51,7 @@ def test_places(text: str, wanted: list[float]) -> None:
     [
         ("GND", "2500ft AMSL", {"ceiling_amsl_m": 762.0}),
         ("SFC", "3000 MSL", {"ceiling_amsl_m": 914.4}),
+        ("SFC", "UNLTD", {}),
         ("500ft AGL", "300m AGL", {"floor_agl_m": 152.4, "ceiling_agl_m": 300.0}),
         ("1500 GND", "UNL", {"floor_agl_m": 457.2}),
         # 9,500 ft are 2,895.6 m, and 400 m are kept for the pressure of the day.
@@ -104,6 +105,30 @@ def test_limits_that_leave_no_height_lose_the_upper_one(
     assert (zone.floor_amsl_m, zone.ceiling_amsl_m) == pytest.approx(wanted)
     said = "z.openair: upper limits of 0, or equal to the lower one, are taken for none: no ceiling: R1 (P)"
     assert found.notes == [said]
+
+
+def test_a_semicolon_in_what_draws_begins_a_comment() -> None:
+    """As the files of Malawi and of German low-flying areas have it; in a name it is none."""
+    entries = entries_of(
+        "AC R\nAN LAKE; WEST\nAL GND\nAH FL95\nDP 46:00.000 N 008:00.000 E ; follows the border\n"
+        "DP 46:00:00N 008:06:00E;\t(railway) northward, 5 NM * and a star\nDP 46:06:00N 008:06:00E\n"
+    )
+    assert entries["name"] == "LAKE; WEST (R)"
+    assert entries["rings_deg"] == [[[46.0, 8.0], [46.0, 8.1], [46.1, 8.1]]]
+    assert entries_of(f"{HEAD}V X=46:00:00N 008:00:00E ; tower\nDC 2 ; NM")["radius_m"] == 2.0 * 1852.0
+
+
+def test_colours_without_an_airspace_are_none(tmp_path: Path) -> None:
+    """The Czech file begins each kind of airspace so; an airspace whose shape is missing is refused all the same."""
+    path = tmp_path / "zones.openair"
+    colours = "AC Q\nSP 0,2,127,0,127\nSB -1,-1,-1\n\n"
+    path.write_text(f"{colours}{HEAD}{SQUARE}AC CTR\nSB 1,1,1\n", encoding="utf-8")
+    found = read_zone_file(path, "z.openair")
+    assert [zone.name for zone in found.zones] == ["LAKE (R)"]
+    assert found.notes == ["z.openair: 2 zones keep nobody out: without name, limits and shape"]
+    path.write_text(f"{colours}{HEAD}", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"line 5 \(LAKE\): one shape is expected"):
+        read_zone_file(path, "z.openair")
 
 
 def test_a_circle_is_a_cylinder() -> None:

@@ -191,6 +191,39 @@ def test_what_is_no_zone_is_a_line(case: str, tmp_path: Path) -> None:
     assert str(caught.value).isprintable()
 
 
+ANYTIME = {"startDateTime": "", "endDateTime": ""}
+ANY_DAY = {"day": "ANY", "startTime": "", "startEvent": "", "endTime": "", "endEvent": ""}
+IN_MAY = {"startDateTime": "2026-05-01T00:00:00Z", "endDateTime": "2026-06-01T00:00:00Z"}
+
+
+def spanish(form: str, applies: dict[str, str], daily: dict[str, str]) -> dict[str, Any]:
+    """A feature as Spain has it: with tables of its own, or all among its properties."""
+    zone = {"identifier": "LEBZ45", "name": "", "type": "REQ_AUTHORIZATION", "variant": "COMMON", "reasons": "OTHER"}
+    limits = {"upper": 900, "upperReference": "AGL", "lower": 45, "lowerReference": "AGL"}
+    tables = {
+        "UASZone": zone,
+        "verticalLayer": limits | {"UOM": "M"},
+        "limitedApplicability": [{**applies, "schedule": [daily]}],
+    }
+    flat = zone | limits | {"uom": "M"} | applies | daily
+    return {"type": "Feature", "geometry": POLYGON, "properties": tables if form == "tables" else flat}
+
+
+@pytest.mark.parametrize("form", ["tables", "flat"])
+def test_zones_as_spain_publishes_them(form: str, tmp_path: Path) -> None:
+    """In a collection and alone; limits and times do not stand where ED-318 has them."""
+    feature = spanish(form, ANYTIME, ANY_DAY)
+    for data in (feature, {"type": "FeatureCollection", "features": [feature]}):
+        (zone,) = read(data, tmp_path).zones
+        assert (zone.name, zone.kind, zone.rings_deg, zone.times) == ("LEBZ45", "exclusion", [OUTLINE], None)
+        assert limits_of(zone) == {"floor_agl_m": 45.0, "ceiling_agl_m": 900.0}
+    (zone,) = read(spanish(form, IN_MAY, ANY_DAY | {"day": "SAT"}), tmp_path).zones
+    assert zone.times == ["2026-05-01T00:00Z/2026-06-01T00:00Z SAT"]
+    free = spanish(form, ANYTIME, ANY_DAY)
+    (free["properties"]["UASZone"] if form == "tables" else free["properties"])["type"] = "NO_RESTRICTION"
+    assert read(free, tmp_path).zones == []
+
+
 def test_other_geojson_with_a_type_of_its_own_stays_what_it_was() -> None:
     feature = {
         "type": "Feature",
