@@ -66,7 +66,7 @@ def flight_text(setup: FlightSetup) -> str:
     time = f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
     if seconds >= 2.0 * 3600.0:
         time = f"{seconds / 3600.0:.1f} h"
-    return f"{setup.path.length / 1000.0:.1f} km, about {time}"
+    return f"{setup.path.length / 1000.0:.1f} km, about {time} in the air"
 
 
 # How a flight ended that was still under way.

@@ -123,36 +123,92 @@ def _say(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
+# s.  Where no terminal is, an estimate is first told this long after work began, and again when four times as long has
+# passed, at least once a minute.
+_FIRST_TOLD, _TOLD_AGAIN, _TOLD_EVERY = 2.0, 4.0, 60.0
+
+
+class _TimeLeft:
+    """How long a stage of work will still take, if it goes on as it went since it began."""
+
+    def __init__(self) -> None:
+        self._began = time.monotonic()
+        self._due = _FIRST_TOLD
+
+    def estimate(self, done: float, total: float) -> str:
+        """In words; "" where nothing is done yet, or all, or where nobody knows how much there is."""
+        if not 0.0 < done < total:
+            return ""
+        return f"{_duration(self._passed() * (total - done) / done)} left"
+
+    def is_due(self) -> bool:
+        """Whether it is time to tell again; asked by what then tells."""
+        passed = self._passed()
+        if passed < self._due:
+            return False
+        self._due = min(_TOLD_AGAIN * passed, passed + _TOLD_EVERY)
+        return True
+
+    def _passed(self) -> float:
+        return time.monotonic() - self._began
+
+
+def _duration(seconds: float) -> str:
+    """A duration that is an estimate.
+
+    >>> _duration(0.4), _duration(89.0), _duration(600.0), _duration(9000.0)
+    ('1 s', '89 s', '10 min', '2.5 h')
+    """
+    if seconds < 120.0:
+        return f"{max(1.0, seconds):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
 @contextmanager
 def progress(title: str) -> Iterator[Advance]:
-    """Show a stage of work; the work reports how much of how much is done, and a remark."""
+    """Show a stage of work; the work reports how much of how much is done, and a remark.
+
+    Beside the remark stands how long it will still take, where the remark does not say.  A total of 0 is one that
+    nobody knows.
+    """
     if not sys.stderr.isatty():
         yield from _lines(title)
         return
     from tqdm import tqdm
 
+    left = _TimeLeft()
     with tqdm(total=100, desc=title, bar_format="{desc:<22} {bar:30} {percentage:3.0f} %{postfix}", leave=True) as bar:
 
         def advance(done: float, total: float, remark: str = "") -> None:
-            share = 100.0 * done / total if total > 0 else 100.0
+            share = 100.0 * done / total if total > 0 else 0.0
             bar.update(max(0.0, min(100.0, share) - bar.n))
-            if remark:
-                bar.set_postfix_str(remark)
+            bar.set_postfix_str(_with_estimate(remark, left.estimate(done, total)))
 
         yield advance
         bar.update(100 - bar.n)
 
 
-def _lines(title: str) -> Iterator[Advance]:
-    """A line when work begins and one when it is done; none for input that is refused before it begins."""
-    started = time.monotonic()
-    last: str | None = None
+def _with_estimate(remark: str, estimate: str) -> str:
+    return ", ".join(filter(None, [remark, "" if _says_left(remark) else estimate]))
 
-    def remember(_done: float, _total: float, remark: str = "") -> None:
-        nonlocal last
-        if last is None:
+
+def _says_left(remark: str) -> bool:
+    """Whether a remark has an estimate of its own: of work that is resumed, or that may turn out to be more."""
+    return " left" in remark
+
+
+def _lines(title: str) -> Iterator[Advance]:
+    """A line when work begins, one now and then, and one when it is done; none for input that is refused before."""
+    left, last, begun = _TimeLeft(), "", False
+    started = time.monotonic()
+
+    def remember(done: float, total: float, remark: str = "") -> None:
+        nonlocal last, begun
+        if not begun:
             _say(f"{title} ...")
-        last = remark
+        elif (estimate := left.estimate(done, total)) and left.is_due():
+            _say(f"{title}: {_with_estimate(remark, estimate)}")
+        last, begun = remark, True
 
     yield remember
     end = f": {last}" if last else ""

@@ -68,7 +68,10 @@ def test_what_a_flight_comes_to_is_told_before(long: Path, capsys: pytest.Captur
     flown = fly_and_judge(opened.setup, opened.airframe, None)
     assert flown.ended == "completed"
     assert predicted_seconds(opened.setup) == pytest.approx(float(flown.track.time[-1]), rel=0.05)
-    assert told == f"{opened.setup.path.length / 1e3:.1f} km, about {predicted_seconds(opened.setup) / 60:.0f} min"
+    assert (
+        told
+        == f"{opened.setup.path.length / 1e3:.1f} km, about {predicted_seconds(opened.setup) / 60:.0f} min in the air"
+    )
 
 
 def test_energy_ends_a_flight(long: Path) -> None:

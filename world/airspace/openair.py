@@ -50,13 +50,13 @@ class _Block:
 
 
 def is_openair(text: str) -> bool:
-    r"""Whether a text's first command is the one that begins an airspace.
+    r"""Whether a text's first command is the one that begins an airspace, or a name that stands before one by mistake.
 
     >>> is_openair("* Slovenia\nAC D\nAN CTR"), is_openair("QGC WPL 110")
     (True, False)
     """
     lines = (line for line in map(_command, text.splitlines()) if line)
-    return next(lines, "").upper().startswith("AC ")
+    return next(lines, "").upper().startswith(("AC ", "AN "))
 
 
 def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] | str]]:

@@ -300,8 +300,9 @@ def is_zone_file(path: Path) -> bool:
     if suffix != ".txt":
         return suffix in SUFFIXES
     try:
-        with path.open(encoding="latin-1") as file:
-            return is_openair(file.read(65536))
+        with path.open("rb") as file:
+            # A letter that is cut in two, or of another encoding, is no command.
+            return is_openair(file.read(65536).decode("utf-8-sig", errors="replace"))
     except OSError:
         return False
 

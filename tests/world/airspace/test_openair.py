@@ -107,6 +107,19 @@ def test_limits_that_leave_no_height_lose_the_upper_one(
     assert found.notes == [said]
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-8", "latin-1"])
+def test_a_text_file_is_openair_by_its_first_command(encoding: str, tmp_path: Path) -> None:
+    """Switzerland's file begins with the mark of UTF-8, and comments."""
+    path = tmp_path / "zones.txt"
+    path.write_text(f"* Lac L\u00e9man\n{HEAD}{SQUARE}", encoding=encoding)
+    assert is_zone_file(path)
+    assert len(read_zone_file(path, "zones.txt").zones) == 1
+    path.write_text(f"AN LAKE\nAC R\n{SQUARE}", encoding=encoding)
+    assert is_zone_file(path)
+    with pytest.raises(ScenarioError, match="line 1: AN: no AC before it begins an airspace"):
+        read_zone_file(path, "zones.txt")
+
+
 def test_a_semicolon_in_what_draws_begins_a_comment() -> None:
     """As the files of Malawi and of German low-flying areas have it; in a name it is none."""
     entries = entries_of(
