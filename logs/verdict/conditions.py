@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import find_aircraft
+from aircraft.tracking import CORRIDOR_RADII
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import surveys_of
@@ -155,23 +156,25 @@ _SAME_LINE = 1.0
 
 
 def corridor_line(setup: FlightSetup) -> str:
-    """That a corridor which nobody stated is wider than the gap between lines of a survey; "" where it is not.
+    """How wide a corridor is that nobody stated, what it is made of, and that it is wider than the gap between legs.
 
-    A flight that keeps to such a corridor may have flown beside its lines all along.
+    A flight that keeps to one so wide may have flown beside its lines all along.  "" where it is stated, or where how
+    far a survey's lines were kept to is judged line by line.
     """
-    limits, autopilot = setup.scenario.limits, setup.autopilot
-    # How far a survey's lines were kept to is judged line by line.
-    if surveys_of(setup):
+    half, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
+    if setup.scenario.limits.corridor_m is not None or surveys_of(setup):
         return ""
+    origin = "planfly's default"
+    if CORRIDOR_RADII * radius >= half:
+        origin = f"{CORRIDOR_RADII:g} times {setup.autopilot.title}'s acceptance radius of {radius:.0f} m"
+    line = f"Corridor: {half:.0f} m to either side of the legs, {origin} ([limits] corridor_m states one)"
     gap = least_gap(setup.route.waypoints)
-    if limits.corridor_m is not None or gap is None or gap[0] >= setup.corridor:
-        return ""
+    if gap is None or gap[0] >= half:
+        return line
     metres, leg = gap
-    radius = autopilot.acceptance_radius
-    origin = "planfly's default" if not radius else f"by {autopilot.title}'s acceptance radius of {radius:.0f} m"
     return (
-        f"Corridor: {setup.corridor:.0f} m to either side, {origin}, is wider than the {metres:.0f} m between legs"
-        f" {leg} and {leg + 2}: keeping to it does not show that the lines were flown ([limits] corridor_m states one)"
+        f"{line}; it is wider than the {metres:.0f} m between legs {leg} and {leg + 2}: keeping to it does not show"
+        " that the lines were flown"
     )
 
 

@@ -106,7 +106,7 @@ def test_the_limit_of_time_is_in_ticks() -> None:
 
 
 def test_a_short_flight_is_told_in_seconds() -> None:
-    assert flight_text(example_log().setup).endswith(" s")
+    assert flight_text(example_log().setup).endswith(" s in the air")
 
 
 # ----------------------------------------------------------------------

@@ -92,7 +92,10 @@ def parse_time(text: str) -> datetime:
     '2026-05-01T22:00:00+00:00'
     """
     whole = re.sub(r"T24:00(:00(\.0+)?)?", "T00:00", text)
-    found = datetime.fromisoformat(whole)
+    try:
+        found = datetime.fromisoformat(whole)
+    except ValueError:
+        raise ValueError(f"{text[:40]!r}: a time by ISO 8601 is expected, as 2026-05-01T10:00+02:00") from None
     if found.tzinfo is None:
         raise ValueError(f"{text[:40]!r}: no offset from UTC: write Z, or +02:00")
     try:

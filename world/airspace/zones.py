@@ -180,15 +180,20 @@ def mended_rings(rings: Sequence[Sequence[Sequence[float]]]) -> list[list[list[f
     """Rings of the area that an outline with its holes encloses, where they cross; none for an outline of no area.
 
     rings: of [latitude, longitude], the outline first.  One that does not lie inside another is no hole: it is a part
-    of the area.  The area is larger by `MENDED_BY` on all sides.  Returns None where nothing is to be mended.
+    of the area; one of fewer than three different corners is none.  The area is larger by `MENDED_BY` on all sides.
+    Returns None where nothing is to be mended.
 
     >>> len(mended_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]]))  # both halves of a bow tie, joined in the middle
     1
     >>> mended_rings([[[0, 0], [2, 0], [2, 2]]]) is None
     True
     """
-    if any(len(ring) < 3 for ring in rings) or not all(math.isfinite(x) for ring in rings for at in ring for x in at):
+    if not all(math.isfinite(x) for ring in rings for at in ring for x in at):
         return None
+    if any(len(set(map(tuple, ring))) < 3 for ring in rings):
+        whole = [[list(at) for at in ring] for ring in rings if len(set(map(tuple, ring))) > 2]
+        again = mended_rings(whole) if whole else None
+        return whole if again is None else again
     if shapely.Polygon(rings[0], rings[1:]).is_valid:
         return None
     made = _enclosed([shapely.Polygon(ring) for ring in rings])

@@ -21,7 +21,7 @@ from flight.simulation.setup import (
     VerticalDatum,
 )
 from flight.simulation.track import Track
-from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, setup_conditions
+from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line, setup_conditions
 from logs.verdict.findings import Finding, Verdict, make_finding
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between, stretch_end_text
 from logs.verdict.judge_geometry import track_findings
@@ -57,6 +57,7 @@ def imported_lines(
     lines = [own.headline, *condition_lines(conditions)]
     lines.append(f"{autopilot_line(conditions, flown=True)} ({source.format} {source.file}{_when(source)})")
     lines += [*_judged_lines(source, flown), *_unjudged_lines(findings)]
+    lines += [line] if (line := corridor_line(setup)) else []
     if source.mission:
         lines.append(f"Mission: {source.mission}")
     lines.append(f"Heights: {heights_text(source)}")

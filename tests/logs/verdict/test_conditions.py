@@ -110,6 +110,7 @@ def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
     verdict = judge_flight(setup, make_track(), "")
     assert list(verdict.lines[1:3]) == lines
     assert verdict.lines[3].startswith("Flown by: ArduPlane V4.6.0 (ArduPilot dataflash log a.BIN")
+    assert corridor_line(setup) in verdict.lines
 
 
 def lines(gap: float, *, overlap: float = 1.0) -> np.ndarray:
@@ -134,15 +135,21 @@ def test_the_gap_between_lines_of_a_survey(waypoints: np.ndarray, gap: float | N
     assert (None if found is None else found[0]) == pytest.approx(gap)
 
 
-def test_a_corridor_wider_than_the_gap_between_lines_is_told() -> None:
+def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wider_than() -> None:
+    """30 m by default, and twice the 90 m at which ArduPlane takes a waypoint for reached."""
     setup = make_setup()
     survey = replace(setup, route=replace(setup.route, waypoints=lines(20.0)))
     assert setup.corridor == 30.0
+    default = "Corridor: 30 m to either side of the legs, planfly's default ([limits] corridor_m states one)"
     assert corridor_line(survey) == (
-        "Corridor: 30 m to either side, planfly's default, is wider than the 20 m between legs 0 and 2: keeping to it"
-        " does not show that the lines were flown ([limits] corridor_m states one)"
+        f"{default}; it is wider than the 20 m between legs 0 and 2: keeping to it does not show that the lines were"
+        " flown"
     )
-    assert corridor_line(replace(setup, route=replace(setup.route, waypoints=lines(31.0)))) == ""
-    assert corridor_line(setup) == ""
+    assert corridor_line(replace(setup, route=replace(setup.route, waypoints=lines(31.0)))) == default
+    assert corridor_line(setup) == default
+    assert corridor_line(replace(setup, autopilot=ArduPlane(default_parameters()))) == (
+        "Corridor: 180 m to either side of the legs, 2 times ArduPlane's acceptance radius of 90 m"
+        " ([limits] corridor_m states one)"
+    )
     stated = setup.scenario.limits.model_copy(update={"corridor_m": 30.0})
     assert corridor_line(survey.in_scenario(replace(setup.scenario, limits=stated))) == ""

@@ -236,9 +236,15 @@ def test_a_line_that_is_none_is_named(text: str, tmp_path: Path) -> None:
     assert str(caught.value).isprintable()
 
 
-def test_an_outline_of_no_area_is_left_out_and_said(tmp_path: Path) -> None:
+THERE_AND_BACK = "DP 46:00:00N 008:00:00E\nDP 46:06:00N 008:06:00E\nDP 46:12:00N 008:06:00E\nDP 46:06:00N 008:06:00E\n"
+# As Switzerland has a cable; and the same place three times.
+CABLE = "DP 47:14:18 N 009:24:49 E\nDP 47:14:13 N 009:24:42 E\n"
+ONE_PLACE = "DP 46:00:00N 008:00:00E\n" * 3
+
+
+@pytest.mark.parametrize("way", [THERE_AND_BACK, CABLE, CABLE + CABLE, ONE_PLACE])
+def test_an_outline_of_no_area_is_left_out_and_said(way: str, tmp_path: Path) -> None:
     """A way there and back, as France's file of 2011 has one; a file of nothing else has no zone, and says why."""
-    way = "DP 46:00:00N 008:00:00E\nDP 46:06:00N 008:06:00E\nDP 46:12:00N 008:06:00E\nDP 46:06:00N 008:06:00E\n"
     path = tmp_path / "z.openair"
     for more, count in (("", 0), (f"AC R\nAN LAKE\n{SQUARE}", 1)):
         path.write_text(f"AC Q\nAN RUN\n{way}{more}", encoding="utf-8")
