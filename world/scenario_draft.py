@@ -263,7 +263,7 @@ def _flown(draft: Draft) -> str:
 {_line("aircraft", _text(draft.aircraft), "planfly aircraft lists them; a folder of your own")}
 {_line("autopilot", _text(draft.autopilot), '"ardupilot", "px4", or "ideal": planfly' + "'s own guidance")}{version}
 {_line("# params", '"mine.param"', "its parameters, as a ground station saves them")}
-{_line("# airspeed_mps", _number(draft.airspeed), "true; by default this, the aircraft's cruise speed")}
+{_line("# airspeed_mps", _number(draft.airspeed), "equivalent, by planfly's guidance true; by default this")}
 
 [wind]
 {_line("speed_mps", "0", "your forecast, 0 to 40")}

@@ -123,23 +123,29 @@ def _say(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-# s.  Where no terminal is, an estimate is first told this long after work began, and again when four times as long has
+# s.  Where no terminal is, an estimate is told this long after the first report, and again when four times as long has
 # passed, at least once a minute.
 _FIRST_TOLD, _TOLD_AGAIN, _TOLD_EVERY = 2.0, 4.0, 60.0
 
 
 class _TimeLeft:
-    """How long a stage of work will still take, if it goes on as it went since it began."""
+    """How long a stage of work will still take, if it goes on as it went since its first report.
+
+    What comes before that is not the work: kernels may have been compiled.
+    """
 
     def __init__(self) -> None:
-        self._began = time.monotonic()
+        self._first: tuple[float, float] | None = None
         self._due = _FIRST_TOLD
 
     def estimate(self, done: float, total: float) -> str:
-        """In words; "" where nothing is done yet, or all, or where nobody knows how much there is."""
-        if not 0.0 < done < total:
+        """In words; "" where nothing has been done since the first report, or all, or where the total is not known."""
+        if self._first is None:
+            self._first = time.monotonic(), done
+        more = done - self._first[1]
+        if not (more > 0.0 and done < total):
             return ""
-        return f"{_duration(self._passed() * (total - done) / done)} left"
+        return f"{_duration(self._passed() * (total - done) / more)} left"
 
     def is_due(self) -> bool:
         """Whether it is time to tell again; asked by what then tells."""
@@ -150,7 +156,7 @@ class _TimeLeft:
         return True
 
     def _passed(self) -> float:
-        return time.monotonic() - self._began
+        return 0.0 if self._first is None else time.monotonic() - self._first[0]
 
 
 def _duration(seconds: float) -> str:
@@ -204,9 +210,10 @@ def _lines(title: str) -> Iterator[Advance]:
 
     def remember(done: float, total: float, remark: str = "") -> None:
         nonlocal last, begun
+        estimate = left.estimate(done, total)
         if not begun:
             _say(f"{title} ...")
-        elif (estimate := left.estimate(done, total)) and left.is_due():
+        elif estimate and left.is_due():
             _say(f"{title}: {_with_estimate(remark, estimate)}")
         last, begun = remark, True
 
