@@ -1,6 +1,6 @@
 """The numbers and words that a call may be given: one table for the API's keywords and the command line's options."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from world.errors import ArgumentError
@@ -112,6 +112,12 @@ def check_arguments(**given: Any) -> None:
 _KEYWORDS = {"served_speed": "speed"}
 
 
+# mm.  The largest side of a sensor, across the way and along it, and the longest focal length.
+_MILLIMETRES = (1000.0, 1000.0, 10_000.0)
+# What a camera is, in messages.
+CAMERA = "the sensor across the way and along it and the focal length, mm, and maybe overlaps along and across, %"
+
+
 def is_wind(speed: float, from_deg: float) -> bool:
     """Whether a steady wind can be flown in: m/s, and degrees that it blows from.
 
@@ -128,3 +134,18 @@ def is_place(lat: float, lon: float) -> bool:
     (True, False)
     """
     return -89.0 <= lat <= 89.0 and -180.0 <= lon <= 180.0
+
+
+def is_camera(numbers: Sequence[float]) -> bool:
+    """Whether numbers are a camera's sensor, across the way and along it, its focal length, all mm, and maybe overlaps.
+
+    The overlaps, with the next photo and with those of the next line, are percent.
+
+    >>> is_camera((23.5, 15.6, 16.0)), is_camera((23.5, 15.6, 16.0, 75.0, 60.0)), is_camera((23.5, 15.6, 0.0))
+    (True, True, False)
+    """
+    if len(numbers) not in (3, 5) or not all(
+        0.0 < one <= most for one, most in zip(numbers, _MILLIMETRES, strict=False)
+    ):
+        return False
+    return all(0.0 <= one < 100.0 for one in numbers[3:])

@@ -7,11 +7,12 @@ from typing import Literal
 
 from flight.autopilots.autopilot import Autopilot
 from flight.mission.items import Command, Mission
-from flight.mission.survey_layout import SurveyLayout, turn_around_of, with_layout
-from flight.mission.surveys import Survey
+from flight.mission.placing import place_stops
+from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Verdict
 from logs.verdict.measures.route_requirements import surveys_of
+from logs.verdict.rules.registry import RULES
 from planfly.airframe import Airframe, load_airframe
 from planfly.pipeline import fly_and_judge, make_setup
 from planfly.reference_flights import deciding_parameter
@@ -21,7 +22,7 @@ from world.scenario import with_flight
 RemedyKind = Literal["side", "turn-around", "every", "course", "parameter", "airspeed"]
 
 # Turn-arounds that are tried, m; lines that are left out; shares of the airspeed.
-TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 150.0, 200.0, 300.0, 400.0)
+TURN_AROUNDS = (25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 175.0, 200.0, 250.0, 300.0, 350.0, 400.0)
 EVERY = (2, 3, 4)
 SLOWER = (0.95, 0.9, 0.85, 0.8, 0.7)
 # An airspeed keeps so far above the slowest that the aircraft flies.
@@ -52,30 +53,56 @@ class SurveyRemedy:
     turn_around: float = math.nan
 
 
+@dataclass(frozen=True, slots=True)
+class NearMiss:
+    """A change that was flown and did not pass, with as many usable lines as any.
+
+    what: that was tried, in words.
+    usable, lines: how many of how many.
+    verdict: of the flight.
+    """
+
+    what: str
+    usable: int
+    lines: int
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class TriedRemedies:
+    """What was found: changes with which all lines can be used.
+
+    nearest: where there are none, what came nearest; None where nothing better than the mission itself was flown.
+    kept: why no other layout was tried, in words; "" where some were.
+    """
+
+    remedies: tuple[SurveyRemedy, ...] = ()
+    nearest: NearMiss | None = None
+    kept: str = ""
+
+
 def survey_remedies(
     setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None] = lambda _: None
-) -> tuple[SurveyRemedy, ...]:
+) -> TriedRemedies:
     """What alone would let all photo lines be flown, by kind; of each kind the least change that was found.
 
     verdict: on the flight of the setup.  on_trial: called before each flight with what is tried.
     A change passes where no photo line fails, and nothing else that did not fail before.
     """
-    lost = [item for item in verdict.findings if item.rule == "survey" and item.ok is False]
-    surveys = surveys_of(setup)
-    if not lost or not surveys:
-        return ()
-    worst = max(surveys, key=lambda one: sum(_of(one, item) for item in lost))
+    if _whole(verdict) or not surveys_of(setup):
+        return TriedRemedies()
     tried = _Trials(setup, airframe, verdict, on_trial)
-    longer = tried.turn_around(worst)
+    longer = tried.turn_around()
     found = [
-        tried.side(worst),
+        tried.side(),
         longer,
-        tried.every(worst, math.inf if longer is None else longer.value),
-        tried.course(worst),
+        tried.every(math.inf if longer is None else longer.value),
+        tried.course(),
         tried.parameter(),
         tried.airspeed(),
     ]
-    return tuple(one for one in found if one is not None)
+    remedies = tuple(one for one in found if one is not None)
+    return TriedRemedies(remedies, None if remedies else tried.nearest, tried.kept)
 
 
 def _worst_margins(verdict: Verdict) -> dict[str, float]:
@@ -88,105 +115,149 @@ def _worst_margins(verdict: Verdict) -> dict[str, float]:
     return worst
 
 
-def _of(survey: Survey, item: Finding) -> bool:
-    return item.place.index is not None and survey.first <= item.place.index < survey.last
+def _usable(verdict: Verdict) -> tuple[int, int]:
+    """How many of how many photo lines a verdict finds usable."""
+    lines = [item.ok for item in verdict.findings if item.rule == "survey" and not item.check]
+    return sum(ok is True for ok in lines), len(lines)
+
+
+def _whole(verdict: Verdict) -> bool:
+    """Whether all lines can be used, and their photos overlap."""
+    usable, lines = _usable(verdict)
+    return 0 < lines == usable and not any(item.rule == "survey" and item.ok is False for item in verdict.findings)
+
+
+_Laid = tuple[Verdict, Mission, float]
 
 
 class _Trials:
-    """Flights of one mission, changed in one thing at a time."""
+    """Flights of one mission, changed in one thing at a time.
+
+    The surveys with lines that are lost are laid out otherwise, all alike.
+    """
 
     def __init__(
         self, setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None]
     ) -> None:
         self._setup, self._airframe, self._on_trial = setup, airframe, on_trial
         self._worst, self._verdict = _worst_margins(verdict), verdict
+        lost = {item.place.index for item in verdict.findings if item.rule == "survey" and item.ok is not True}
+        found = surveys_of(setup)
+        self._numbers = [n for n, one in enumerate(found) if not lost.isdisjoint(range(one.first, one.last))]
+        self._surveys = [found[n] for n in self._numbers]
+        self._now = min(turn_around_of(setup.route, one) for one in self._surveys)
+        kept = (kept_layout(setup.mission, setup.route, one) for one in self._surveys)
+        self.kept = next((why for why in kept if why), "")
+        self.nearest: NearMiss | None = None
+
+    def _made(self, mission: Mission, airframe: Airframe) -> FlightSetup:
+        """The setup of a changed mission; places above each other are taken, as in the mission itself."""
+        scenario = self._setup.scenario
+        placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
+        return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
     def _fly(self, mission: Mission, airframe: Airframe, what: str) -> tuple[Verdict, float] | None:
         """The verdict of a flight, and its length; None where it cannot be laid out."""
         self._on_trial(what)
-        scenario = self._setup.scenario
         try:
-            setup = make_setup(scenario, airframe, mission, self._setup.seed)
+            setup = self._made(mission, airframe)
         except PlanflyError:
             return None
-        flown = fly_and_judge(setup, airframe, None, reference=False)
-        return flown.verdict, setup.path.length
+        verdict = fly_and_judge(setup, airframe, None, reference=False).verdict
+        usable, lines = _usable(verdict)
+        best, failed = self.nearest, len(verdict.failed)
+        before = _usable(self._verdict)[0] if best is None else best.usable
+        if usable > before or (best is not None and usable == before and failed < len(best.verdict.failed)):
+            self.nearest = NearMiss(what, usable, lines, verdict)
+        return verdict, setup.path.length
 
     def _passes(self, verdict: Verdict) -> bool:
-        """Whether all lines of a flight can be used, and nothing else is worse than it was."""
-        lines = [item.ok for item in verdict.findings if item.rule == "survey"]
-        if not lines or not all(ok is True for ok in lines):
-            return False
-        return all(worst >= self._worst.get(rule, math.inf) for rule, worst in _worst_margins(verdict).items())
+        """Whether all lines of a flight can be used, and nothing else fails that did not, or noticeably worse."""
+        return _whole(verdict) and all(
+            rule in self._worst and worst >= self._worst[rule] - (RULES[rule].scale or math.inf)
+            for rule, worst in _worst_margins(verdict).items()
+        )
 
-    def _laid(self, survey: Survey, layout: SurveyLayout, what: str) -> tuple[Verdict, Mission, float] | None:
-        """A layout that passes; None where it does not."""
-        mission = with_layout(self._setup.mission, self._setup.route, survey, layout, self._setup.scenario.origin)
-        flown = None if mission is None else self._fly(mission, self._airframe, what)
-        return None if mission is None or flown is None or not self._passes(flown[0]) else (flown[0], mission, flown[1])
+    def _laid(self, layout: SurveyLayout, what: str) -> _Laid | None:
+        """A flight of the surveys laid out otherwise; None where that cannot be done."""
+        mission, setup = self._setup.mission, self._setup
+        # From the last on: one laid out otherwise may count as two.
+        for number in reversed(self._numbers):
+            survey = surveys_of(setup)[number]
+            made = with_layout(mission, setup.route, survey, layout, self._setup.scenario.origin)
+            if made is None:
+                return None
+            mission = made
+            try:
+                setup = self._made(mission, self._airframe)
+            except PlanflyError:
+                return None
+        flown = self._fly(mission, self._airframe, what)
+        return None if flown is None else (flown[0], mission, flown[1])
 
-    def turn_around(self, survey: Survey) -> SurveyRemedy | None:
+    def _passed(self, layout: SurveyLayout, what: str) -> _Laid | None:
+        """A flight of the surveys laid out otherwise that passes."""
+        laid = self._laid(layout, what)
+        return None if laid is None or not self._passes(laid[0]) else laid
+
+    def turn_around(self) -> SurveyRemedy | None:
         """The least turn-around that passes, of those longer than the survey's."""
-        now = turn_around_of(self._setup.route, survey)
-        found = self._least(survey, 1, [one for one in TURN_AROUNDS if one > now + 1.0])
-        return None if found is None else SurveyRemedy("turn-around", "", now, found[0], "m", *found[1], found[0])
+        found = self._least(1, [one for one in TURN_AROUNDS if one > self._now + 1.0])
+        return None if found is None else SurveyRemedy("turn-around", "", self._now, found[0], "m", *found[1], found[0])
 
-    def side(self, survey: Survey) -> SurveyRemedy | None:
+    def side(self) -> SurveyRemedy | None:
         """The lines from the other side, which turns into the wind where it was turned with it."""
         if self._setup.scenario.wind.speed <= 0.0:
             return None
-        now = turn_around_of(self._setup.route, survey)
-        passed = self._laid(survey, SurveyLayout(now, backwards=True), "the lines from the other side")
-        return None if passed is None else SurveyRemedy("side", "", 0.0, 1.0, "", *passed, now)
+        passed = self._passed(SurveyLayout(self._now, backwards=True), "the lines from the other side")
+        return None if passed is None else SurveyRemedy("side", "", 0.0, 1.0, "", *passed, self._now)
 
-    def every(self, survey: Survey, at_most: float) -> SurveyRemedy | None:
+    def every(self, at_most: float) -> SurveyRemedy | None:
         """The least number of lines to go on by, with turn-arounds shorter than these (m) that pass with it."""
-        now = turn_around_of(self._setup.route, survey)
-        tried = [now, *(one for one in TURN_AROUNDS if now + 1.0 < one < at_most)]
+        tried = [self._now, *(one for one in TURN_AROUNDS if self._now + 1.0 < one < at_most)]
         for every in EVERY:
-            if 2 * every > len(survey.lines):
+            if 2 * every > max(len(survey.lines) for survey in self._surveys):
                 break
-            found = self._least(survey, every, tried)
+            found = self._least(every, tried)
             if found is not None:
                 return SurveyRemedy("every", "", 1.0, float(every), "lines", *found[1], found[0])
         return None
 
-    def _least(
-        self, survey: Survey, every: int, tried: Sequence[float]
-    ) -> tuple[float, tuple[Verdict, Mission, float]] | None:
-        """The least of some rising turn-arounds (m) that passes, found by halves; None where the longest fails."""
-        if not tried:
-            return None
+    def _least(self, every: int, tried: Sequence[float]) -> tuple[float, _Laid] | None:
+        """The least of some rising turn-arounds (m) with which all lines can be used, by halves, where it passes.
 
-        def laid(metres: float) -> tuple[Verdict, Mission, float] | None:
-            order = "" if every == 1 else f"every {nth(every)} line, "
-            return self._laid(survey, SurveyLayout(metres, every), f"{order}turn-arounds of {metres:.0f} m")
-
-        low, high = -1, len(tried) - 1
-        best = laid(tried[high])
-        if best is None:
-            return None
+        One with which the flight does not get to its end is too long: the store of energy does not last.
+        """
+        order = "" if every == 1 else f"every {nth(every)} line, "
+        low, high, best = -1, len(tried), None
         while high - low > 1:
             middle = (low + high) // 2
-            passed = laid(tried[middle])
-            if passed is None:
-                low = middle
+            metres = tried[middle]
+            layout = SurveyLayout(metres, every)
+            laid = self._laid(layout, f"{order}turn-arounds of {metres:.0f} m")
+            if laid is None:
+                return None
+            if _whole(laid[0]):
+                high, best = middle, laid
+            elif "completion" in _worst_margins(laid[0]).keys() - self._worst.keys():
+                high, best = middle, None
             else:
-                high, best = middle, passed
-        return tried[high], best
+                low = middle
+        return None if best is None or not self._passes(best[0]) else (tried[high], best)
 
-    def course(self, survey: Survey) -> SurveyRemedy | None:
+    def course(self) -> SurveyRemedy | None:
         """Lines along the wind, or across it, whichever they are not; the shorter way of those that pass."""
         wind = self._setup.scenario.wind
         if wind.speed <= 0.0:
             return None
-        now, found = turn_around_of(self._setup.route, survey), []
-        for course in _other_courses(survey.course, wind.from_course):
+        now, found = self._surveys[0].course, []
+        for course in _other_courses(now, wind.from_course):
             degrees = math.degrees(course) % 180.0
-            passed = self._laid(survey, SurveyLayout(now, 1, course), f"lines on course {degrees:.0f}°")
+            layout = SurveyLayout(self._now, 1, course)
+            passed = self._passed(layout, f"lines on course {degrees:.0f}°")
             if passed is not None:
-                was = math.degrees(survey.course) % 180.0
-                found.append(SurveyRemedy("course", "", was, degrees, "deg", *passed, now))
+                was = math.degrees(now) % 180.0
+                found.append(SurveyRemedy("course", "", was, degrees, "deg", *passed, self._now))
         return min(found, key=lambda one: one.length, default=None)
 
     def parameter(self) -> SurveyRemedy | None:

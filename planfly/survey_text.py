@@ -1,12 +1,13 @@
 """Photo lines of a survey, and what would help them, in words."""
 
 import math
+from collections.abc import Sequence
 
 from flight.mission.surveys import Survey
-from logs.verdict.measures.photo_lines import LineMeasure
-from logs.verdict.rules.survey_rule import lost_text
-from logs.verdict.tolerances import PHOTO_SHARE
-from planfly.survey_remedies import SurveyRemedy, nth
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
+from logs.verdict.rules.survey_rule import FRONT, SIDE, lost_text, overlap_text
+from logs.verdict.tolerances import PHOTO_OVERLAP, PHOTO_SHARE
+from planfly.survey_remedies import NearMiss, SurveyRemedy, nth
 
 
 def usable(measure: LineMeasure | None) -> bool:
@@ -48,6 +49,49 @@ def survey_text(survey: Survey) -> str:
     """A survey's lines, spacing and course."""
     course = round(math.degrees(survey.course)) % 360
     return f"{len(survey.lines)} lines, {survey.spacing:.0f} m apart, the first on course {course}°"
+
+
+def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
+    """How much a survey's photos overlap, along its lines and across; or that nobody knows.
+
+    >>> overlap_lines(None)
+    ('overlap not judged: the camera is not known (--camera)',)
+    """
+    if measure is None:
+        return ("overlap not judged: the camera is not known (--camera)",)
+    texts = [overlap_text(measure, check) for check in (FRONT, SIDE)]
+    if measure.front is None:
+        texts[0] = "front overlap not judged: how far apart photos are taken is not stated, or none can be used"
+    return tuple(text for text in texts if text)
+
+
+def kept_overlap(measure: OverlapMeasure | None) -> bool:
+    """Whether photos overlap as they were asked to, as far as that is known.
+
+    >>> kept_overlap(None)
+    True
+    """
+    if measure is None:
+        return True
+    pairs = ((measure.front, measure.camera.front), (measure.side, measure.camera.side))
+    return all(share is None or asked is None or share >= asked - PHOTO_OVERLAP for share, asked in pairs)
+
+
+def needed_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
+    """From where on a survey's lines can be used, which says how much longer its turn-arounds would have to be."""
+    some = [one for one in lines if one is not None and one.good > 0.0]
+    if not some:
+        return (
+            f"no place of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used: there is no room to turn"
+        )
+    late, longest = max(one.late for one in some), max(one.length for one in some)
+    said = f"lines can be used from up to {late:.0f} m behind their begin on; the longest has {longest:.0f} m"
+    return f"{said}, and {len(lines) - len(some)} of {len(lines)} none that can" if len(some) < len(lines) else said
+
+
+def near_miss_text(near: NearMiss) -> str:
+    """The trial that came nearest, and what of it does not pass."""
+    return f"{near.what}: {near.usable} of {near.lines} photo lines can be used; {near.verdict.headline}"
 
 
 def remedy_text(remedy: SurveyRemedy, length: float) -> str:

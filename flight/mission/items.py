@@ -265,6 +265,36 @@ class Home:
 
 
 @dataclass(frozen=True, slots=True)
+class Camera:
+    """A camera that looks straight down, and what is asked of its photos.
+
+    across, along: what a photo shows beside and along the way, m per m above ground.
+    front, side: share of it that a photo is to share with the next, and with those of the next line; None for nothing.
+    interval: least time between photos, s; 0 where it is not known.
+    """
+
+    across: float
+    along: float
+    front: float | None = None
+    side: float | None = None
+    interval: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyPlan:
+    """What a ground station keeps of a survey beside its items.
+
+    photo: the way between photos that its items state, m, by which it is known; 0 for none, None for any survey.
+    turn_around: how far its lines go on beyond their photos, m.
+    camera: None where only distances are known.
+    """
+
+    photo: float | None
+    turn_around: float = 0.0
+    camera: Camera | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Mission:
     """A mission: what a .waypoints file, a .plan file or an upload holds.
 
@@ -275,6 +305,7 @@ class Mission:
     cruise_speed: m/s, what a .plan file's author had the ground station assume; it is never sent to an aircraft.
     warnings: what was odd about the file but could be read.
     source: names it in messages.
+    survey_plans: of its surveys, where the file keeps more of them than their items.
     """
 
     home: Home | None
@@ -284,6 +315,7 @@ class Mission:
     cruise_speed: float | None = field(default=None, compare=False)
     warnings: tuple[str, ...] = field(default=(), compare=False)
     source: str = field(default="mission", compare=False)
+    survey_plans: tuple[SurveyPlan, ...] = field(default=(), compare=False)
 
 
 def renumbered(mission: Mission) -> Mission:

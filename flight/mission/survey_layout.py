@@ -11,15 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Command, Mission, MissionItem, is_navigation, on_grid, renumbered
+from flight.mission.items import Command, Mission, MissionItem, command_name, is_navigation, on_grid, renumbered
 from flight.mission.route import Route
-from flight.mission.surveys import PhotoLine, Survey
+from flight.mission.surveys import Survey
 from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]
 
 # A line of a survey on another course is at least this long, m.
 _SHORTEST = 50.0
+# A line bends where it strays further than this from the straight one between its ends, m.
+_STRAIGHT = 5.0
 # A lead is as long as the turn-arounds to within this, m.
 _SAME_LEAD = 1.0
 
@@ -28,7 +30,7 @@ class SurveyLayout(NamedTuple):
     """How to fly a survey.
 
     turn_around: m from each line's end to where its turn begins, and from there to the next line's begin; 0 for none.
-    every: 2 for every second line on the way there and the others on the way back, 3 for every third, and so on.
+    every: 2 for every second line first and then the others, from the same side on; 3 for every third, and so on.
     course: of the lines, rad; None for the one they have.
     backwards: whether to begin with the line on the other side.
     """
@@ -40,20 +42,55 @@ class SurveyLayout(NamedTuple):
 
 
 class _Line(NamedTuple):
-    """A line to fly: its end points (2, 2) m in its direction, the items of its ends and between, and its height."""
+    """A line to fly: its corners (k, 2) m in its direction, and its items, those of its ends and of what is between."""
 
-    ends: Floats
+    corners: Floats
     items: tuple[MissionItem, ...]
+
+
+class _Items(NamedTuple):
+    """Where a survey's items stand in a mission's list, as indices.
+
+    lines: of each, the first item and the one behind its last; without a waypoint of its own at its begin, the first
+    behind what is there instead.
+    behind: the first item that is flown behind the survey's last run.
+    before: the first behind what is flown before its first run.
+    """
+
+    lines: tuple[tuple[int, int], ...]
+    before: int
+    behind: int
 
 
 def turn_around_of(route: Route, survey: Survey) -> float:
     """Least distance (m) that a survey's lines go straight on beyond their photos, at either end of a turn-around."""
-    points = route.waypoints[:, :2]
-    beyond = [
-        min(math.dist(points[one.last], points[one.ends]), math.dist(points[other.begins], points[other.first]))
-        for one, other in zip(survey.lines[:-1], survey.lines[1:], strict=True)
-    ]
-    return min(beyond)
+    return min(_beyond(route, survey))
+
+
+def _beyond(route: Route, survey: Survey) -> list[float]:
+    """How far (m) the lines go straight on at each end of each turn-around."""
+    points, pairs = route.waypoints[:, :2], zip(survey.lines[:-1], survey.lines[1:], strict=True)
+    ends = [pair for one, other in pairs for pair in ((one.last, one.ends), (other.begins, other.first))]
+    return [math.dist(points[one], points[other]) for one, other in ends]
+
+
+def kept_layout(mission: Mission, route: Route, survey: Survey) -> str:
+    """Why a survey's layout cannot be changed, in words; "" where it can."""
+    if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
+        return "the mission jumps"
+    at = {item.seq: k for k, item in enumerate(mission.items)}
+    if any(int(route.items[i]) not in at for line in survey.lines for i in range(line.first, line.last + 1)):
+        return "a line begins or ends where no item is"
+    items = _items_of(mission, route, survey)
+    for first, end in items.lines:
+        for item in mission.items[first:end]:
+            if is_navigation(item.command) and item.command != Command.NAV_WAYPOINT:
+                return f"item {item.seq}, {command_name(item.command)}, stands on a line"
+    for (_, end), (first, _) in zip(items.lines[:-1], items.lines[1:], strict=True):
+        for item in mission.items[end:first]:
+            if item.command != Command.NAV_WAYPOINT:
+                return f"item {item.seq}, {command_name(item.command)}, stands between two lines"
+    return ""
 
 
 def with_layout(
@@ -61,82 +98,84 @@ def with_layout(
 ) -> Mission | None:
     """The mission with a survey laid out otherwise; None where that cannot be done.
 
-    route: of the mission, on the map about ``origin``.  A mission that jumps, or whose lines are no items of their own,
-    keeps its layout; lines on another course need one height for all.
+    route: of the mission, on the map about ``origin``.  Where `kept_layout` says why, nothing can be changed; lines on
+    another course need straight ones, and one height for all.
     """
-    if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
+    if kept_layout(mission, route, survey):
         return None
-    at = {item.seq: k for k, item in enumerate(mission.items)}
-    seqs = [int(seq) for seq in route.items]
-    if any(seqs[i] not in at for line in survey.lines for i in range(line.first, line.last + 1)):
-        return None
-    blocks = [_block(mission, at, seqs, line) for line in survey.lines]
-    if not _only_waypoints(mission, at, seqs, survey):
-        return None
-    lines = [
-        _Line(route.waypoints[[line.first, line.last], :2], block)
-        for line, block in zip(survey.lines, blocks, strict=True)
-    ]
+    items, lines = _items_of(mission, route, survey), list[_Line]()
+    for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
+        corners, own = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
+        steps = [item for item in own if is_navigation(item.command)]
+        if _place_of(mission, route)[steps[0].seq] != photo_line.first:
+            own = (_waypoint(steps[0], corners[0], origin), *own)
+        lines.append(_Line(corners, own))
     if layout.course is not None:
         turned = _turned(lines, survey, layout.course, origin)
         if turned is None:
             return None
         lines = turned
-    first, last = at[seqs[survey.lines[0].first]], at[seqs[survey.lines[-1].last]]
-    before, after = list(mission.items[:first]), list(mission.items[last + len(_trailing(mission, last)) + 1 :])
-    _drop_extension(before, after, route, seqs, survey)
-    made = list(before)
+    longest = max(_beyond(route, survey)) + _SAME_LEAD
+    (first, _), (_, end) = items.lines[0], items.lines[-1]
+    made = [*mission.items[: items.before]]
+    made += _without_leads(mission, route, mission.items[items.before : first], survey.lines[0].first, longest)
     for line in _ordered(lines, layout):
         made += _with_ends(line, layout.turn_around, origin)
+    made += _without_leads(mission, route, mission.items[end : items.behind], survey.lines[-1].last, longest)
     # Two items of one number cannot be told apart: all are numbered anew.
-    numbered = [replace(item, seq=k) for k, item in enumerate([*made, *after], 1)]
+    numbered = [replace(item, seq=k) for k, item in enumerate([*made, *mission.items[items.behind :]], 1)]
     return renumbered(replace(mission, items=tuple(numbered)))
 
 
-def _block(mission: Mission, at: dict[int, int], seqs: Sequence[int], line: PhotoLine) -> tuple[MissionItem, ...]:
-    """A line's items, with those that stand behind its last waypoint."""
-    first, last = at[seqs[line.first]], at[seqs[line.last]]
-    return (*mission.items[first : last + 1], *_trailing(mission, last))
+def _items_of(mission: Mission, route: Route, survey: Survey) -> _Items:
+    """Where the items of a survey's lines stand, each with those that switch what is switched at its ends."""
+    at, count = {item.seq: k for k, item in enumerate(mission.items)}, len(mission.items)
+    seqs = [int(seq) for seq in route.items]
 
+    def index(waypoint: int) -> int:
+        return at.get(seqs[waypoint], count) if 0 <= waypoint < len(seqs) else count
 
-def _only_waypoints(mission: Mission, at: dict[int, int], seqs: Sequence[int], survey: Survey) -> bool:
-    """Whether lines are flown by waypoints, and nothing but waypoints stands between them."""
+    lines = []
     for line in survey.lines:
-        steps = [mission.items[at[seqs[i]]] for i in range(line.first, line.last + 1)]
-        if any(item.command != Command.NAV_WAYPOINT for item in steps):
-            return False
-    for first, last in survey.turn_arounds():
-        end = at[seqs[first]]
-        between = mission.items[end + 1 + len(_trailing(mission, end)) : at[seqs[last]]]
-        if any(item.command != Command.NAV_WAYPOINT for item in between):
-            return False
-    return True
+        # What is merged with its first waypoint stands at the same place: a take-off, say, and a waypoint.
+        first = max(
+            k for k in range(index(line.first), index(line.first + 1)) if is_navigation(mission.items[k].command)
+        )
+        if mission.items[first].command != Command.NAV_WAYPOINT:
+            first += 1
+        end = index(line.last) + 1
+        while end < count and not is_navigation(mission.items[end].command):
+            end += 1
+        lines.append((first, end))
+    into, out = survey.lines[0], survey.lines[-1]
+    before = min(index(into.begins), lines[0][0])
+    return _Items(tuple(lines), before, max(lines[-1][1], index(out.ends + 1)))
 
 
-def _trailing(mission: Mission, at: int) -> list[MissionItem]:
-    """The items behind one, up to the next step of the flight."""
-    out: list[MissionItem] = []
-    for item in mission.items[at + 1 :]:
+def _place_of(mission: Mission, route: Route) -> dict[int, int]:
+    """The waypoint at which each step of the flight stands, by its number; that before for one without its own."""
+    own, here, out = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
+    for item in mission.items:
         if is_navigation(item.command):
-            break
-        out.append(item)
+            here = own.get(item.seq, here)
+            out[item.seq] = here
     return out
 
 
-def _drop_extension(
-    before: list[MissionItem], after: list[MissionItem], route: Route, seqs: Sequence[int], survey: Survey
-) -> None:
-    """Take out the waypoints that lead straight into the first line and out of the last: they are laid out anew.
+def _without_leads(
+    mission: Mission, route: Route, items: Sequence[MissionItem], end: int, longest: float
+) -> list[MissionItem]:
+    """Items beyond an end of a survey, without the waypoints that lead straight on from it: they are laid out anew.
 
-    What is further away than the turn-arounds are long is on the way to the survey, and stays.
+    end: the waypoint.  What is further away than the turn-arounds are long is on the way to the survey, and stays.
     """
-    into, out, longest = survey.lines[0], survey.lines[-1], turn_around_of(route, survey) + _SAME_LEAD
-    points = route.waypoints[:, :2]
-    leads = dict.fromkeys(range(into.begins, into.first), into.first)
-    leads |= dict.fromkeys(range(out.last + 1, out.ends + 1), out.last)
-    beyond = {seqs[i] for i, end in leads.items() if math.dist(points[i], points[end]) <= longest}
-    for items in (before, after):
-        items[:] = [item for item in items if item.seq not in beyond or item.command != Command.NAV_WAYPOINT]
+    points, places = route.waypoints[:, :2], _place_of(mission, route)
+
+    def leads(item: MissionItem) -> bool:
+        near = item.seq in places and math.dist(points[places[item.seq]], points[end]) <= longest
+        return near and item.command == Command.NAV_WAYPOINT
+
+    return [item for item in items if not leads(item)]
 
 
 def _ordered(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
@@ -146,10 +185,10 @@ def _ordered(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
     """
     if layout.every == 1 and layout.course is None and not layout.backwards:
         return list(lines)
-    start, end = lines[0].ends
+    start, end = lines[0].corners[[0, -1]]
     unit = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
     right = np.array([unit[1], -unit[0]])
-    offsets = [float((line.ends.mean(axis=0) - start) @ right) for line in lines]
+    offsets = [float((line.corners[[0, -1]].mean(axis=0) - start) @ right) for line in lines]
     aside = sorted(range(len(lines)), key=lambda k: offsets[k])
     if (offsets[0] > 0.5 * (min(offsets) + max(offsets))) is not layout.backwards:
         aside.reverse()
@@ -157,7 +196,8 @@ def _ordered(lines: Sequence[_Line], layout: SurveyLayout) -> list[_Line]:
     for begin in range(layout.every):
         for k in aside[begin :: layout.every]:
             line, ahead = lines[k], len(out) % 2 == 0
-            out.append(line if (float((line.ends[1] - line.ends[0]) @ unit) > 0.0) == ahead else _reversed(line))
+            along = float((line.corners[-1] - line.corners[0]) @ unit) > 0.0
+            out.append(line if along == ahead else _reversed(line))
     return out
 
 
@@ -166,7 +206,7 @@ def _reversed(line: _Line) -> _Line:
     steps = [item for item in line.items if is_navigation(item.command)]
     backwards = iter(reversed(steps))
     return _Line(
-        line.ends[::-1], tuple(next(backwards) if is_navigation(item.command) else item for item in line.items)
+        line.corners[::-1], tuple(next(backwards) if is_navigation(item.command) else item for item in line.items)
     )
 
 
@@ -175,10 +215,13 @@ def _with_ends(line: _Line, turn_around: float, origin: GeoOrigin) -> list[Missi
     if turn_around <= 0.0:
         return list(line.items)
     steps = [item for item in line.items if is_navigation(item.command)]
-    start, end = line.ends
-    step = turn_around * (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
-    into, out = _waypoint(steps[0], start - step, origin), _waypoint(steps[-1], end + step, origin)
-    return [into, *line.items, out]
+    into, out = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
+    before, behind = (turn_around * way / max(float(np.hypot(*way)), 1e-9) for way in (into, out))
+    return [
+        _waypoint(steps[0], line.corners[0] + before, origin),
+        *line.items,
+        _waypoint(steps[-1], line.corners[-1] + behind, origin),
+    ]
 
 
 def _waypoint(like: MissionItem, place: Floats, origin: GeoOrigin) -> MissionItem:
@@ -191,10 +234,9 @@ def _waypoint(like: MissionItem, place: Floats, origin: GeoOrigin) -> MissionIte
 def _turned(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
     """Lines on another course over the same area, which is the hull of the lines that there are."""
     ends = [item for line in lines for item in line.items if is_navigation(item.command)]
-    if len({(item.frame, item.alt) for item in ends}) != 1:
+    if len({(item.frame, item.alt) for item in ends}) != 1 or any(_bends(line.corners) for line in lines):
         return None
-    corners = np.concatenate([line.ends for line in lines])
-    hull = convex_hull(corners)
+    hull = convex_hull(np.concatenate([line.corners for line in lines]))
     if hull is None:
         return None
     unit = np.array([math.sin(course), math.cos(course)])
@@ -212,7 +254,7 @@ def _turned(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOr
     if not out:
         return None
     # It begins where it did: at the nearest end of the nearest line.
-    start = pattern.ends[0]
+    start = pattern.corners[0]
     if math.dist(out[-1].mean(axis=0), start) < math.dist(out[0].mean(axis=0), start):
         out.reverse()
     if math.dist(out[0][1], start) < math.dist(out[0][0], start):
@@ -239,6 +281,13 @@ def convex_hull(points: Floats) -> Floats | None:
             chain.append([x, y])
         hull += chain[:-1]
     return np.array(hull) if len(hull) > 2 else None
+
+
+def _bends(corners: Floats) -> bool:
+    """Whether a line strays from the straight one between its ends by more than its legs' rounding."""
+    start, step = corners[0], corners[-1] - corners[0]
+    off = (corners - start) @ np.array([step[1], -step[0]]) / max(float(np.hypot(*step)), 1e-9)
+    return bool(np.abs(off).max() > _STRAIGHT)
 
 
 def _crossed(aside: Floats, along: Floats, at: float) -> tuple[float, float] | None:

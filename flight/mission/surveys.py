@@ -1,19 +1,21 @@
 """Surveys in a route: photo lines that lie side by side, and the turn-arounds between them.
 
 Nobody marks them in a mission: QGroundControl's survey and Mission Planner's grid are waypoints, with items that switch
-the camera between them.  So they are found by their form, whoever made them: three straight runs or more that are
-parallel, lie beside each other, and follow each other with little between them.
+the camera between them.  So they are found by their form, whoever made them: three runs or more that lie beside each
+other at one distance, and follow each other with little between them.  A run is straight, or bends as its neighbours
+do, as those of QGroundControl's corridor scan.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Command, Mission, is_navigation
+from flight.mission.items import Command, Mission, SurveyPlan, is_navigation
 from flight.mission.route import Route
 from world.geometry import leg_courses, leg_runs
 
@@ -21,26 +23,43 @@ Floats = NDArray[np.float64]
 
 # Legs are one straight run while their courses stay within this of its first leg's, rad.
 _STRAIGHT = math.radians(3.0)
-# Runs are parallel, either way round, within this, rad.
+# Runs are parallel, either way round, within this, rad, and while the distance between them changes by no more than
+# this share of it: the link between two lines, and spokes of one hub, touch.
 _PARALLEL = math.radians(10.0)
+_EVEN = 0.5
 # Neighbouring lines are at least this far apart, m, and lie beside each other over this share of the shorter one.
 _APART = 1.0
 _BESIDE = 0.5
-# A turn-around has at most this many straight runs, and is at most this many times as long as the longer of its lines.
-_RUNS_BETWEEN = 4
-_LONGEST_BETWEEN = 2.0
+# A line has at least this length, m.
+_SHORTEST = 10.0
+# A turn-around has at most this many straight runs.  It is at most this many times as long as the longer of its lines,
+# or has at most this length, m: lines at the tip of a field are short.
+_RUNS_BETWEEN = 12
+_LONGEST_BETWEEN, _SHORT_BETWEEN = 2.0, 250.0
+# A run beside another is no line where one behind it is nearer than this share of its distance and it is shorter than
+# this share of that one.
+_NEARER, _STUB = 0.5, 0.2
+# A line that is shorter than this share of both lines of another survey, between which it lies, is a turn-around there.
+_STUB_TURN = 0.5
+# Where lines bend, the runs beside each other are that, and their distance as that of the runs before, within this
+# factor.
+_ALIKE = 2.0
 # A straight run with a lead at either end has so many legs or more; leads are equally long to within this, m.
 _LEGS_WITH_LEADS = 3
 _SAME_LEAD = 1.0
-# Fewer lines than these make no survey, by their places to the side: there and back is none.
-_FEWEST = 3
+# Fewer lines than these make no survey, by their places to the side: there and back is none, but with the camera on.
+_FEWEST, _FEWEST_WITH_PHOTOS = 3, 2
+# A gap below this share of both its neighbours is none: a line that is flown twice.
+_TWICE = 0.2
+# m.  Items state the way between photos to this; ground stations write it in single precision.
+_SAME_PHOTO = 0.01
 
 
 class PhotoLine(NamedTuple):
     """A line along which photos are taken.
 
     first, last: its first and last waypoint; legs first to last - 1 are its own.
-    begins, ends: those of the straight run that it is part of, which may go on beyond it.
+    begins, ends: those of the run that it is part of, which may go on beyond it.
     photo: m of way between photos, 0 where no item states it.
     switched_on, switched_off: whether its first waypoint switches the camera on, and its last one switches it off.
     """
@@ -56,10 +75,10 @@ class PhotoLine(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """Parallel photo lines, in flying order.
+    """Photo lines beside each other, in flying order.
 
-    lines: three or more.
-    course: of the first, rad.
+    lines: three or more; two where photos are taken along them.
+    course: of the first leg of the first, rad.
     offsets: of each to the right of the first, m.
     spacing: between neighbours, m: the median gap between lines that lie beside each other.
     """
@@ -86,6 +105,44 @@ class Survey:
     def turn_arounds(self) -> list[tuple[int, int]]:
         """Waypoints at which each turn-around begins and ends: the end of a line, and the begin of the next."""
         return [(one.last, other.first) for one, other in zip(self.lines[:-1], self.lines[1:], strict=True)]
+
+    def ways_onto_lines(self) -> list[tuple[int, int]]:
+        """Its turn-arounds, and what is as much the autopilot's own: the way onto the first line and off the last."""
+        into, out = self.lines[0], self.lines[-1]
+        return [(into.begins, into.first), *self.turn_arounds(), (out.last, out.ends)]
+
+
+class LineAxis:
+    """A line laid out: how far along and beside it places are.  Beyond its ends it goes on straight."""
+
+    def __init__(self, corners: Floats) -> None:
+        """Corners: (k, 2 or 3) m, two or more."""
+        self.corners = corners
+        step = np.diff(corners[:, :2], axis=0)
+        self._runs = np.hypot(*step.T)
+        self._units = step / np.maximum(self._runs, 1e-9)[:, None]
+        self.along = np.concatenate([[0.0], np.cumsum(self._runs)])
+        self.length = float(self.along[-1])
+
+    def of(self, places: Floats) -> tuple[Floats, Floats, Floats]:
+        """Distance along the line, distance to its right, m, and its course there, rad, of places (n, 2 or 3)."""
+        nearest = np.full(len(places), np.inf)
+        out = np.zeros((3, len(places)))
+        for k, (unit, run) in enumerate(zip(self._units, self._runs, strict=True)):
+            along, across = _laid_beside(places[:, :2] - self.corners[k, :2], math.atan2(unit[0], unit[1]))
+            low = -math.inf if k == 0 else 0.0
+            high = math.inf if k == len(self._runs) - 1 else run
+            away = np.hypot(along - np.clip(along, low, high), across)
+            here = away < nearest
+            nearest[here] = away[here]
+            out[0, here], out[1, here] = self.along[k] + along[here], across[here]
+            out[2, here] = math.atan2(unit[0], unit[1])
+        return out[0], out[1], out[2]
+
+    def at(self, along: Floats) -> Floats:
+        """Places (n, 2 or 3) m on the line, at these distances along it."""
+        columns = [np.interp(along, self.along, self.corners[:, axis]) for axis in range(self.corners.shape[1])]
+        return np.stack(columns, axis=1)
 
 
 def camera_spacing(mission: Mission, route: Route) -> Floats:
@@ -115,10 +172,23 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
     return out
 
 
-def find_surveys(route: Route, camera: Floats) -> tuple[Survey, ...]:
+def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
+    """What the mission's author kept of a survey, which is known by the way between its photos; None for nothing.
+
+    Where several of one way between photos differ, nobody knows whose it is.
+    """
+    photo = survey.lines[0].photo
+    same = {one for one in mission.survey_plans if one.photo is not None and abs(one.photo - photo) <= _SAME_PHOTO}
+    if len(same) == 1:
+        return same.pop()
+    return next((one for one in mission.survey_plans if one.photo is None), None)
+
+
+def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[float, float]] = ()) -> tuple[Survey, ...]:
     """The surveys of a route, in flying order.
 
     camera: (w,) of `camera_spacing`.
+    turn_arounds: what a ground station says: by way between photos, m, how far lines go on beyond their photos, m.
 
     >>> lines = [[0, 0], [0, 900], [60, 900], [60, 0], [120, 0], [120, 900]]
     >>> points = np.array([[*place, 100.0] for place in lines], dtype=float)
@@ -134,12 +204,13 @@ def find_surveys(route: Route, camera: Floats) -> tuple[Survey, ...]:
         runs = [(first, last) for first, last in runs if (camera[first:last] != 0.0).any()]
     while at < len(runs):
         chain = _chain(route.waypoints, runs, at)
-        survey = _survey(route.waypoints, [runs[k] for k in chain], camera) if len(chain) >= _FEWEST else None
+        lines = [(runs[first][0], runs[last][1]) for first, last in chain]
+        survey = _survey(route.waypoints, lines, camera, turn_arounds)
         if survey is None:
             at += 1
             continue
         surveys.append(survey)
-        at = chain[-1] + 1
+        at = chain[-1][1] + 1
     return tuple(surveys)
 
 
@@ -160,51 +231,149 @@ def _straight_runs(route: Route) -> list[tuple[int, int]]:
     return runs
 
 
-def _chain(points: Floats, runs: Sequence[tuple[int, int]], start: int) -> list[int]:
-    """Runs that follow each other as lines of a survey, from this one on."""
-    chain, sofar = [start], np.concatenate([[0.0], np.cumsum(leg_runs(points))])
+# ----------------------------------------------------------------------
+# Which runs are lines of one survey.  A line is one straight run, or several that follow each other.
+
+
+def _chain(points: Floats, runs: Sequence[tuple[int, int]], start: int) -> list[tuple[int, int]]:
+    """First and last run of each line of a survey that begins with a run, or a little before or behind it."""
+    sofar = np.concatenate([[0.0], np.cumsum(leg_runs(points))])
+
+    def length(line: tuple[int, int]) -> float:
+        return float(sofar[runs[line[1]][1]] - sofar[runs[line[0]][0]])
+
+    chain = _follow(points, runs, start)
+    if len(chain) > 1:
+        # The way to a first line may lie beside the second.
+        others = (_follow(points, runs, other) for other in range(start, chain[1][0]))
+        chain = max(others, key=lambda one: (len(one), sum(length(line) for line in one)))
+    while len(chain) > _FEWEST_WITH_PHOTOS:
+        # The last may be a turn-around of the next survey, whose lines lie across.
+        (_, before), last = chain[-2:]
+        across = (_follow(points, runs, other) for other in range(before + 1, last[0]))
+        if not any(_turns(one, last, length) for one in across):
+            break
+        chain.pop()
+    return chain
+
+
+def _turns(chain: Sequence[tuple[int, int]], line: tuple[int, int], length: Callable[[tuple[int, int]], float]) -> bool:
+    """Whether a line is but a turn-around between two longer ones of a survey."""
+    between = [pair for pair in pairwise(chain) if pair[0][1] < line[0] and line[1] < pair[1][0]]
+    return len(chain) >= _FEWEST and any(length(line) < _STUB_TURN * min(map(length, pair)) for pair in between)
+
+
+def _follow(points: Floats, runs: Sequence[tuple[int, int]], start: int) -> list[tuple[int, int]]:
+    chain = [(start, start)]
     while True:
-        here = chain[-1]
-        for after in range(here + 1, min(len(runs), here + 2 + _RUNS_BETWEEN)):
-            between = float(sofar[runs[after][0]] - sofar[runs[here][1]])
-            longer = max(float(sofar[runs[k][1]] - sofar[runs[k][0]]) for k in (here, after))
-            if between <= _LONGEST_BETWEEN * longer and _beside(points, runs[here], runs[after]):
-                chain.append(after)
-                break
+        first, here = chain[-1]
+        for after in _next_runs(points, runs, here):
+            bends = 0
+            while (len(chain) == 1 or here - bends > first) and _mirrored(points, runs, here, after, -1 - bends):
+                bends += 1
+            if len(chain) == 1:
+                chain = [(here - bends, here)]
+            elif bends < here - first:
+                continue
+            chain.append((after, after + bends))
+            break
         else:
             return chain
 
 
-def _beside(points: Floats, one: tuple[int, int], other: tuple[int, int]) -> bool:
-    """Whether two runs are parallel and lie beside each other, and not in one line."""
+def _next_runs(points: Floats, runs: Sequence[tuple[int, int]], here: int) -> list[int]:
+    """Runs that may be, or begin, the line after one, in flying order."""
+    sofar, found = np.concatenate([[0.0], np.cumsum(leg_runs(points))]), list[tuple[int, float, float]]()
+    own = float(sofar[runs[here][1]] - sofar[runs[here][0]])
+    for after in range(here + 1, min(len(runs), here + 2 + _RUNS_BETWEEN)):
+        between = float(sofar[runs[after][0]] - sofar[runs[here][1]])
+        length = float(sofar[runs[after][1]] - sofar[runs[after][0]])
+        apart = _apart(points, runs[here], runs[after])
+        if apart is None or between > max(_LONGEST_BETWEEN * max(own, length), _SHORT_BETWEEN):
+            continue
+        # Of lines that bend here the other parts lie between.
+        if after - here <= 2 or not _mirrored(points, runs, here, after, 1):
+            found.append((after, apart, length))
+    # A leg of a turn-around may lie beside lines, too: far beside them, and short.
+    return [
+        after
+        for after, apart, length in found
+        if not any(k > after and near < _NEARER * apart and length < _STUB * long for k, near, long in found)
+    ]
+
+
+def _mirrored(points: Floats, runs: Sequence[tuple[int, int]], here: int, after: int, by: int) -> bool:
+    """Whether the runs so many beyond one and before the other lie beside each other as those two do, and join them.
+
+    by: negative for the runs before the one and beyond the other.
+    """
+    one, other, step = here + by, after - by, 1 if by > 0 else -1
+    if not (0 <= one < len(runs) and 0 <= other < len(runs)):
+        return False
+    joints = (sorted((one, one - step)), sorted((other, other + step)))
+    if any(runs[before][1] != runs[behind][0] for before, behind in joints):
+        return False
+    wide, own = _apart(points, runs[here], runs[after]), _apart(points, runs[one], runs[other])
+    lengths = [_line(points, runs[k])[2] for k in (one, other)]
+    return (
+        wide is not None
+        and own is not None
+        and max(wide, own) <= _ALIKE * min(wide, own)
+        and max(lengths) <= _ALIKE * min(lengths)
+    )
+
+
+def _apart(points: Floats, one: tuple[int, int], other: tuple[int, int]) -> float | None:
+    """How far two runs are apart, m; None where they do not lie beside each other."""
     start, course, length = _line(points, one)
     along, across = _laid_beside(points[[other[0], other[1]], :2] - start, course)
     run = float(np.hypot(*(points[other[1], :2] - points[other[0], :2])))
-    shorter = min(length, run)
-    if shorter <= 0.0 or abs(along[1] - along[0]) < math.cos(_PARALLEL) * run:
-        return False
-    shared = min(length, float(along.max())) - max(0.0, float(along.min()))
-    return shared >= _BESIDE * shorter and abs(float(across.mean())) >= _APART
-
-
-def _survey(points: Floats, runs: Sequence[tuple[int, int]], camera: Floats) -> Survey | None:
-    """The survey of some lines; None where too few of them are at places of their own."""
-    start, course, _ = _line(points, runs[0])
-    middles = np.array([0.5 * (points[first, :2] + points[last, :2]) for first, last in runs]) - start
-    offsets = _laid_beside(middles, course)[1]
-    places = np.sort(offsets)
-    gaps = np.diff(places)
-    apart = gaps[gaps >= _APART]
-    if len(apart) + 1 < _FEWEST:
+    shorter, apart = min(length, run), abs(float(across.mean()))
+    if shorter < _SHORTEST or abs(along[1] - along[0]) < math.cos(_PARALLEL) * run:
         return None
+    shared = min(length, float(along.max())) - max(0.0, float(along.min()))
+    if shared < _BESIDE * shorter or apart < _APART or abs(float(across[1] - across[0])) > _EVEN * apart:
+        return None
+    return apart
+
+
+# ----------------------------------------------------------------------
+# A survey of its lines.
+
+
+def _survey(
+    points: Floats, runs: Sequence[tuple[int, int]], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
+) -> Survey | None:
+    """The survey of some lines; None where too few of them are at places of their own."""
+    axis = LineAxis(points[runs[0][0] : runs[0][1] + 1])
+    middles = []
+    for first, last in runs:
+        other = LineAxis(points[first : last + 1])
+        middles.append(other.at(np.array([0.5 * other.length]))[0])
+    offsets = axis.of(np.array(middles))[1]
     lines = tuple(_photo_line(run, camera) for run in runs)
-    if all((line.first, line.last) == (line.begins, line.ends) for line in lines):
-        lines = _without_leads(points, lines)
-    return Survey(lines, course, tuple((offsets - offsets[0]).tolist()), float(np.median(apart)))
+    gaps = _gaps(np.sort(offsets))
+    fewest = _FEWEST_WITH_PHOTOS if all(line.photo > 0.0 for line in lines) else _FEWEST
+    if len(gaps) + 1 < fewest:
+        return None
+    # A camera that is off between lines tells where they begin.
+    on = any((camera[line.first : line.last] != 0.0).any() for line in lines)
+    between = pairwise(lines)
+    if not on or all((camera[one.last : other.first] != 0.0).all() for one, other in between):
+        lines = _without_leads(points, lines, turn_arounds)
+    course = _line(points, (runs[0][0], runs[0][0] + 1))[1]
+    return Survey(lines, course, tuple((offsets - offsets[0]).tolist()), float(np.median(gaps)))
+
+
+def _gaps(places: Floats) -> list[float]:
+    """Distances between lines at these places (n,) m, in rising order, but for lines that are flown twice."""
+    gaps = [float(gap) for gap in np.diff(places) if gap >= _APART]
+    beside = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
+    return [gap for gap, near in zip(gaps, beside, strict=True) if not near or gap > _TWICE * min(near)]
 
 
 def _photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:
-    """The part of a straight run on which the camera is on; all of it where it never is."""
+    """The part of a run on which the camera is on; all of it where it never is."""
     first, last = run
     on = np.flatnonzero(camera[first:last] != 0.0)
     if not on.size:
@@ -214,11 +383,20 @@ def _photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:
     return PhotoLine(first, last, *run, float(np.nan_to_num(camera[first])), was_off, bool(camera[last] == 0.0))
 
 
-def _without_leads(points: Floats, lines: tuple[PhotoLine, ...]) -> tuple[PhotoLine, ...]:
+def _without_leads(
+    points: Floats, lines: tuple[PhotoLine, ...], turn_arounds: Sequence[tuple[float, float]]
+) -> tuple[PhotoLine, ...]:
     """The lines without the legs that lead into them and out of them, where the camera does not tell them apart.
 
-    They are leads where those of all lines are equally long: a turn-around has one length.
+    They are as long as the ground station says, or else leads where those of all lines are equally long: a turn-around
+    has one length.
     """
+    for photo, lead in turn_arounds:
+        if abs(photo - lines[0].photo) <= _SAME_PHOTO and lead > 0.0:
+            shorter = tuple(_without_lead(points, line, lead) for line in lines)
+            # A mission may have been changed since.
+            if shorter != lines:
+                return shorter
     lengths = leg_runs(points)
     if any(line.last - line.first < _LEGS_WITH_LEADS for line in lines):
         return lines
@@ -230,6 +408,20 @@ def _without_leads(points: Floats, lines: tuple[PhotoLine, ...]) -> tuple[PhotoL
         if float(np.ptp(leads)) > _SAME_LEAD:
             return lines
     return tuple(line._replace(first=line.first + 1, last=line.last - 1) for line in lines)
+
+
+def _without_lead(points: Floats, line: PhotoLine, lead: float) -> PhotoLine:
+    """A line between the waypoints that are so far (m) from the ends of its run; an end without one stays."""
+    inner = range(line.first + 1, line.last)
+    near = max(_SAME_LEAD, 0.01 * lead)
+
+    def from_end(end: int) -> list[int]:
+        return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead) <= near]
+
+    into, out = from_end(line.begins), from_end(line.ends)
+    first = into[0] if into and line.first == line.begins else line.first
+    last = out[-1] if out and line.last == line.ends else line.last
+    return line._replace(first=first, last=last) if first < last else line
 
 
 def _line(points: Floats, run: tuple[int, int]) -> tuple[Floats, float, float]:

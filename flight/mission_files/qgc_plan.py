@@ -17,11 +17,13 @@ from flight.mission.items import (
     MAX_ITEMS,
     OVER_HOME,
     PLACES,
+    Camera,
     Command,
     Frame,
     Home,
     Mission,
     MissionItem,
+    SurveyPlan,
     command_name,
     is_located,
     item_problem,
@@ -45,9 +47,10 @@ _CALCULATED = 3
 _COORDINATE = "latitude, longitude and altitude are expected"
 
 
-def expand_items(items: list[Any], source: str, warnings: list[str]) -> list[Any]:
+def expand_items(items: list[Any], source: str, warnings: list[str], plans: list[SurveyPlan]) -> list[Any]:
     """Items of a `.plan`, the complex ones replaced by what they stand for, with a warning for each.
 
+    plans: what it keeps of its surveys beside their items is added to them.
     Raises MissionError for a kind that cannot be replaced, by name.  What an item holds is checked later.
     """
     out: list[Any] = []
@@ -60,6 +63,7 @@ def expand_items(items: list[Any], source: str, warnings: list[str]) -> list[Any
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
         if name in _TRANSECTS:
             made = _transects(item, source, place, name)
+            plans.append(_survey_plan(item["TransectStyleComplexItem"], made, f"{source}: {place}", warnings))
         elif name == _LANDING:
             made = _landing(item, source, place, _last_number(out) + 1)
         else:
@@ -100,6 +104,61 @@ def _transects(item: dict[str, Any], source: str, place: str, name: str) -> list
         allowed = "a list is expected; have the ground station save the plan anew"
         raise MissionError.at(source, field, items, allowed, shown=shown)
     return items
+
+
+class _CameraCalc(BaseModel):
+    """QGC's camera of a survey (`CameraCalc.cc`): one that it knows by name, by its lens and sensor, or by nothing."""
+
+    # QGC writes whole numbers as such.
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
+    SensorWidth: Annotated[float, Field(gt=0.0, le=1000.0)]
+    SensorHeight: Annotated[float, Field(gt=0.0, le=1000.0)]
+    FocalLength: Annotated[float, Field(gt=0.0, le=10_000.0)]
+    ImageWidth: Annotated[float, Field(gt=0.0)] | None = None
+    ImageHeight: Annotated[float, Field(gt=0.0)] | None = None
+    Landscape: bool = True
+    FrontalOverlap: Annotated[float, Field(ge=0.0, lt=100.0)] | None = None
+    SideOverlap: Annotated[float, Field(ge=0.0, lt=100.0)] | None = None
+    MinTriggerInterval: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
+
+    def camera(self) -> Camera:
+        """What it sees of level ground.  QGC takes the pixels of its longer side for square."""
+        wide, high = self.SensorWidth / self.FocalLength, self.SensorHeight / self.FocalLength
+        if self.ImageWidth is not None and self.ImageHeight is not None:
+            high = wide * self.ImageHeight / self.ImageWidth
+        across, along = (wide, high) if self.Landscape else (high, wide)
+        front, side = (None if one is None else one / 100.0 for one in (self.FrontalOverlap, self.SideOverlap))
+        return Camera(across, along, front, side, self.MinTriggerInterval or 0.0)
+
+
+def _survey_plan(held: dict[str, Any], items: list[Any], place: str, warnings: list[str]) -> SurveyPlan:
+    """What a survey keeps beside its items: how far its lines go on, and its camera where that is known."""
+    beyond = held.get("TurnAroundDistance")
+    if isinstance(beyond, bool) or not isinstance(beyond, int | float) or not 0.0 <= beyond <= 1e5:
+        beyond = 0.0
+    calc, camera = held.get("CameraCalc"), None
+    # One that QGC calls manual has distances alone.
+    if isinstance(calc, dict) and calc.get("FocalLength") is not None:
+        try:
+            camera = _CameraCalc.model_validate(calc).camera()
+        except ValidationError as error:
+            fault = error.errors()[0]
+            field = ".".join(map(str, fault["loc"]))
+            shown = "missing" if fault["type"] == "missing" else json.dumps(fault["input"])[:40]
+            warnings.append(f"{place}: CameraCalc.{field}: {shown}: its camera is left out, and no overlap is judged")
+    return SurveyPlan(_trigger_distance(items), float(beyond), camera)
+
+
+def _trigger_distance(items: list[Any]) -> float:
+    """The longest way between photos that some items state, m; 0 where none does."""
+    found = [0.0]
+    for item in items:
+        params = item.get("params") if isinstance(item, dict) else None
+        if isinstance(params, list) and params and item.get("command") == Command.DO_SET_CAM_TRIGG_DIST:
+            metres = params[0]
+            if isinstance(metres, int | float) and not isinstance(metres, bool) and 0.0 < metres <= 1e6:
+                found.append(float(metres))
+    return max(found)
 
 
 def _last_number(items: list[Any]) -> int:
@@ -249,7 +308,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
         raise MissionError(f"{source}: not valid JSON: {_line(error)}", file=source) from error
-    warnings = _check_kind(data, source)
+    warnings, plans = _check_kind(data, source)
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
@@ -280,27 +339,28 @@ def parse_plan_file(text: str, source: str) -> Mission:
         cruise_speed=file.mission.cruiseSpeed,
         warnings=tuple(warnings),
         source=source,
+        survey_plans=tuple(plans),
     )
     return renumbered(mission)
 
 
-def _check_kind(data: Any, source: str) -> list[str]:
-    """Refuse what is no plan before its missing keys are named, and expand its items; returns warnings."""
+def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
+    """Refuse what is no plan before its missing keys are named, and expand its items; gives warnings and surveys."""
     if not isinstance(data, dict):
         message = f'{source}: a JSON object with fileType "Plan" is expected, got {type(data).__name__}'
         raise MissionError(message, file=source, field="fileType")
     if (kind := data.get("fileType")) != "Plan":
         raise MissionError.at(source, "fileType", kind, '"Plan" is expected', shown=json.dumps(kind)[:60])
-    warnings: list[str] = []
+    warnings, plans = list[str](), list[SurveyPlan]()
     mission = data.get("mission")
     if isinstance(mission, dict) and isinstance(mission.get("items"), list):
-        mission["items"] = expand_items(mission["items"], source, warnings)
+        mission["items"] = expand_items(mission["items"], source, warnings, plans)
     for key in ("geoFence", "rallyPoints"):
         part = data.get(key)
         if isinstance(part, dict) and part.get("version") != 2:
             warnings.append(f"{source}: {key}: version {json.dumps(part.get('version'))[:20]}: not read; 2 is known")
             data[key] = {}
-    return warnings
+    return warnings, plans
 
 
 def _read_item(item: _Item, k: int, source: str) -> MissionItem:

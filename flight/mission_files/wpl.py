@@ -74,7 +74,8 @@ def parse_waypoints(text: str, source: str) -> Mission:
 
     Taken as found: CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, more than seven
     decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries).  Items are counted by their lines, as Mission
-    Planner, QGroundControl and MAVProxy count them, and so are the targets of jumps: seq must rise, and says no more.
+    Planner, QGroundControl and MAVProxy count them, and so are the targets of jumps: seq says nothing, beside whether
+    the first line is home's.
     Raises MissionError with file, line, field, value and what is allowed.
     """
     breaks = max(text.count("\n"), text.count("\r"))
@@ -101,10 +102,6 @@ def parse_waypoints(text: str, source: str) -> Mission:
     rows = [_row(TextLine(source, number), line) for number, line in lines[1:]]
     if not rows:
         raise MissionError(f"{source}: no items after the header", file=source)
-    for before, after in pairwise(rows):
-        if after.item.seq <= before.item.seq:
-            allowed = f"must be above the one before, {before.item.seq}"
-            raise _refused(after.where, "seq", after.item.seq, str(after.item.seq), allowed)
     warnings = _warnings(rows, *_split_home(rows))
     home, body = _split_home(_counted(rows))
     fences = numbered([row.item for row in body if row.item.command in FENCES])
@@ -212,12 +209,13 @@ def _warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str
             found.append(f"{rows[0].where}: home at 0, 0, which is no position: left out; the mission has no home")
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             found.append(f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level")
-    gaps = [after for before, after in pairwise(rows) if after.item.seq != before.item.seq + 1]
+    counted = "items are counted by their lines, as ground stations do, and jumps go by that count"
+    steps = [(after, after.item.seq - before.item.seq) for before, after in pairwise(rows)]
+    gaps, falls = [row for row, by in steps if by > 1], [row for row, by in steps if by < 1]
     if gaps:
-        found.append(
-            f"{gaps[0].where}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): items are counted by"
-            " their lines, as ground stations do, and jumps go by that count"
-        )
+        found.append(f"{gaps[0].where}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): {counted}")
+    if falls:
+        found.append(f"{falls[0].where}: seq {falls[0].item.seq} does not rise ({len(falls)} in all): {counted}")
     lost = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
     if lost:
         name = command_name(lost[0].item.command)

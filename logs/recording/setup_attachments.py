@@ -309,7 +309,11 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         versions=package_versions(),
         sha256={name: hashlib.sha256(data).hexdigest() for name, data in attachments.items()},
     )
-    unstated = {name for name in ("autopilot", "autopilot_version") if getattr(file, name) is None}
+    unstated: dict[str, Any] = {
+        name: True for name in ("autopilot", "autopilot_version") if getattr(file, name) is None
+    }
+    if not file.mission.survey_plans:
+        unstated["mission"] = {"survey_plans"}
     return {SETUP_FILE: _json(file.model_dump(by_alias=True, exclude=unstated)), **attachments}
 
 

@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from aircraft.envelope import Envelope
 from flight.autopilots.autopilot import AutopilotProgram, Origin, ParameterValue, StoredParameters
-from flight.mission.items import Home, Mission, MissionItem
+from flight.mission.items import Camera, Home, Mission, MissionItem, SurveyPlan
 from flight.mission.loiter_circles import Unjoined
 from flight.mission.return_path import ReturnCircle
 from flight.mission.route import Route
@@ -76,6 +76,24 @@ class _Home(SetupModel):
     alt: Annotated[float, Field(alias="amsl_m")]
 
 
+class _Camera(SetupModel):
+    across: Annotated[Finite, Field(gt=0.0, alias="across_m_per_m")]
+    along: Annotated[Finite, Field(gt=0.0, alias="along_m_per_m")]
+    front: Annotated[Finite, Field(ge=0.0, lt=1.0)] | None
+    side: Annotated[Finite, Field(ge=0.0, lt=1.0)] | None
+    interval: Annotated[Finite, Field(ge=0.0, alias="interval_s")]
+
+
+class _SurveyPlan(SetupModel):
+    photo: Annotated[Annotated[Finite, Field(ge=0.0)] | None, Field(alias="photo_m")]
+    turn_around: Annotated[Finite, Field(ge=0.0, alias="turn_around_m")]
+    camera: _Camera | None
+
+    def plan(self) -> SurveyPlan:
+        """The plan of the table."""
+        return _made(SurveyPlan, self, camera=None if self.camera is None else _made(Camera, self.camera))
+
+
 class MissionTable(SetupModel):
     """A `Mission` as a table."""
 
@@ -86,12 +104,15 @@ class MissionTable(SetupModel):
     cruise_speed: Annotated[float | None, Field(alias="cruise_speed_mps")]
     warnings: tuple[str, ...]
     source: str
+    survey_plans: tuple[_SurveyPlan, ...] = ()
 
     def mission(self) -> Mission:
         """The mission of the table."""
         lists = {"items": self.items, "fences": self.fences, "rally": self.rally}
         items = {name: tuple(_made(MissionItem, item) for item in found) for name, found in lists.items()}
-        return _made(Mission, self, home=None if self.home is None else _made(Home, self.home), **items)
+        plans = tuple(plan.plan() for plan in self.survey_plans)
+        home = None if self.home is None else _made(Home, self.home)
+        return _made(Mission, self, home=home, survey_plans=plans, **items)
 
 
 class RouteTable(SetupModel):

@@ -192,6 +192,9 @@ PHOTO_HEIGHT, PHOTO_HEIGHT_LEAST = 0.1, 5.0
 PHOTO_COURSE = math.radians(30.0)
 # m.  Steps that a photo line is looked at in.
 PHOTO_STEP = 1.0
+# Share of a photo.  By so much less than asked for may photos overlap: of 60 % beside, a line that is a quarter of the
+# spacing aside (`PHOTO_ASIDE`), next to one that is flown as drawn, leaves 50 %.
+PHOTO_OVERLAP = 0.1
 # Radii of the bank limit's arc.  So far beyond its waypoints a turn-around may lead that is too tight to be flown as
 # drawn: a turn back onto a line beside the one before takes 1 + sqrt(3) radii, and rolling takes the rest.
 TURN_AROUND_RADII = 3.25

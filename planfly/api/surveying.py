@@ -5,6 +5,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from flight.mission.items import Camera, SurveyPlan
 from flight.mission.surveys import Survey
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
@@ -12,23 +13,33 @@ from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
-from logs.verdict.measures.photo_lines import LineMeasure, measure_line
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.views.surveys import survey_chart
 from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario
-from planfly.arguments import check_arguments
+from planfly.arguments import CAMERA, check_arguments, is_camera
 from planfly.crash_safe_log import flight_text
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.open_mission import OpenedMission, is_log
 from planfly.pipeline import fly_and_judge
 from planfly.stages import stage
-from planfly.survey_remedies import SurveyRemedy, survey_remedies
-from planfly.survey_text import line_text, lines_headline, remedy_text, survey_text, usable
+from planfly.survey_remedies import NearMiss, SurveyRemedy, survey_remedies
+from planfly.survey_text import (
+    kept_overlap,
+    line_text,
+    lines_headline,
+    near_miss_text,
+    needed_text,
+    overlap_lines,
+    remedy_text,
+    survey_text,
+    usable,
+)
 from planfly.targets import SURVEY_FILES, clean_folder, refuse_folder
-from world.errors import LogError, MissionError
+from world.errors import ArgumentError, LogError, MissionError
 from world.files import write_whole
 from world.scenario import Scenario
 from world.scenario_tables import Guidance, Navigation
@@ -41,7 +52,10 @@ class SurveyFound:
     setup, track, verdict: of the flight.
     surveys: of the mission, in flying order.
     lines: of each survey, how its lines were flown; None for one that was not.
+    overlaps: of each survey, how much its photos overlap; None where its camera is not known.
     remedies: what would help, each flown; none where none was asked for, or nothing is lost.
+    nearest: where nothing that was asked for would help, the trial that came nearest.
+    kept: why no other layout was tried, in words.
     files: written, none where no folder was named.
     """
 
@@ -50,13 +64,16 @@ class SurveyFound:
     verdict: Verdict
     surveys: tuple[Survey, ...]
     lines: tuple[tuple[LineMeasure | None, ...], ...]
+    overlaps: tuple[OverlapMeasure | None, ...] = ()
     remedies: tuple[SurveyRemedy, ...] = ()
+    nearest: NearMiss | None = None
+    kept: str = ""
     files: tuple[Path, ...] = ()
 
     @property
     def usable(self) -> bool:
-        """Whether enough of every line can be used."""
-        return all(usable(one) for lines in self.lines for one in lines)
+        """Whether enough of every line can be used, and photos overlap as asked."""
+        return all(usable(one) for lines in self.lines for one in lines) and all(map(kept_overlap, self.overlaps))
 
     @property
     def headline(self) -> str:
@@ -67,8 +84,8 @@ class SurveyFound:
     def lines_of_lines(self) -> tuple[str, ...]:
         """Each survey, and its lines, in words."""
         out = []
-        for survey, lines in zip(self.surveys, self.lines, strict=True):
-            out.append(survey_text(survey))
+        for survey, lines, overlap in zip(self.surveys, self.lines, self.overlaps, strict=True):
+            out += [survey_text(survey), *overlap_lines(overlap)]
             out += [line_text(number, one) for number, one in enumerate(lines, 1)]
         return tuple(out)
 
@@ -76,6 +93,17 @@ class SurveyFound:
     def lines_of_remedies(self) -> tuple[str, ...]:
         """What would help, in words."""
         return tuple(remedy_text(one, self.setup.path.length) for one in self.remedies)
+
+    @property
+    def lines_without_remedy(self) -> tuple[str, ...]:
+        """That nothing was found that would help, what came nearest, and why no other layout was tried, in words."""
+        said = ["no turn-around, order, course, parameter or airspeed alone was found that would help"]
+        said += [needed_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
+        if self.kept:
+            said.append(f"no other layout was tried: {self.kept}")
+        if self.nearest is not None:
+            said.append(f"nearest: {near_miss_text(self.nearest)}")
+        return tuple(said)
 
     def __repr__(self) -> str:
         return f"<SurveyFound {self.setup.scenario.name}: {self.headline}>"
@@ -89,6 +117,7 @@ _AS_FLOWN = "a flight's photo lines are those that were flown"
 def survey(
     what: FlightLog | FlownMission | str | Path,
     *,
+    camera: tuple[float, ...] | None = None,
     suggest: bool = False,
     out: str | Path | None = None,
     overwrite: bool = True,
@@ -106,9 +135,11 @@ def survey(
     autopilot_law: str | None = None,
     nav: Navigation | None = None,
 ) -> SurveyFound:
-    """Fly a survey, and tell how much of each photo line can be used.
+    """Fly a survey, and tell how much of each photo line can be used, and how much its photos overlap.
 
     what: the path of a .waypoints or .plan, which is flown; or what `planfly.fly` gave, or a flight log or its path.
+    camera: its sensor across the way and along it, and its focal length, mm; and, if any are asked for, the overlaps
+    along lines and across them, percent; None takes those of a .plan.
     suggest: whether to look for what would let all lines be used, of a mission: longer turn-arounds, every so-manieth
     line, another course, a parameter of the autopilot, a slower flight; each is flown before it is named.
     out: folder for a picture of the lines, and for each other layout that would help as a .waypoints; None writes none.
@@ -118,6 +149,7 @@ def survey(
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
     """
     check_arguments(seed=seed)
+    taken = _camera(camera)
     given = {"scenario": scenario, "terrain": terrain, "fence": fence or None, "seed": seed, "nav": nav}
     changes: dict[str, Any] = {
         "wind": wind, "turbulence": turbulence, "at": at, "aircraft": aircraft, "airspeed": airspeed, "params": params,
@@ -133,13 +165,44 @@ def survey(
         source = what.setup.source
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)
-        setup = what.setup.in_scenario(_with_lines(what.setup.scenario))
+        setup = _with_camera(what.setup.in_scenario(_with_lines(what.setup.scenario)), taken)
         return _written(_measured(setup, what.track, judge_flight(setup, what.track, what.ended or "")), out, overwrite)
 
     def change(world: Scenario) -> Scenario:
         return _with_lines(changed_scenario(world, **changes, nav=nav))
 
-    return _written(_flown(opened_mission(what, scenario, terrain, seed, fence, change), suggest), out, overwrite)
+    opened = opened_mission(what, scenario, terrain, seed, fence, change)
+    opened = replace(opened, setup=_with_camera(opened.setup, taken))
+    return _written(_flown(opened, suggest), out, overwrite)
+
+
+def _camera(numbers: tuple[float, ...] | None) -> Camera | None:
+    """A call's camera.  Raises ArgumentError for one that is none."""
+    if numbers is None:
+        return None
+    try:
+        found = tuple(float(number) for number in numbers)
+    except (TypeError, ValueError):
+        found = ()
+    if isinstance(numbers, str | bytes) or not is_camera(found):
+        raise ArgumentError.of_argument(
+            "camera", numbers, f"{CAMERA}, are expected, as (23.5, 15.6, 16)", shown=repr(numbers)
+        )
+    width, height, focal, *asked = found
+    front, side = (one / 100.0 for one in asked) if asked else (None, None)
+    return Camera(width / focal, height / focal, front, side)
+
+
+def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
+    """A setup whose surveys are flown with a camera; overlaps that it does not ask for are those of the mission."""
+    if camera is None:
+        return setup
+    plans = []
+    for plan in setup.mission.survey_plans:
+        own = plan.camera or camera
+        front, side = (camera.front, camera.side) if camera.front is not None else (own.front, own.side)
+        plans.append(replace(plan, camera=replace(camera, front=front, side=side, interval=own.interval)))
+    return replace(setup, mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(None, 0.0, camera))))
 
 
 def _flown(opened: OpenedMission, suggest: bool) -> SurveyFound:
@@ -152,10 +215,10 @@ def _flown(opened: OpenedMission, suggest: bool) -> SurveyFound:
         return found
     with stage("looking for what would help") as advance:
         counted = count(1)
-        remedies = survey_remedies(
+        tried = survey_remedies(
             flown.setup, opened.airframe, flown.verdict, lambda text: advance(next(counted), 0.0, text)
         )
-    return replace(found, remedies=remedies)
+    return replace(found, remedies=tried.remedies, nearest=tried.nearest, kept=tried.kept)
 
 
 def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
@@ -203,4 +266,5 @@ def _measured(setup: FlightSetup, track: Track, verdict: Verdict) -> SurveyFound
         tuple(None if aligned is None else measure_line(requirements, aligned, one, line) for line in one.lines)
         for one in surveys
     )
-    return SurveyFound(setup, track, verdict, surveys, lines)
+    overlaps = tuple(None if aligned is None else measure_overlap(requirements, aligned, one) for one in surveys)
+    return SurveyFound(setup, track, verdict, surveys, lines, overlaps)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import MISSIONS, completed, files, number
+from planfly.terminal.arguments import MISSIONS, camera, completed, files, number
 from planfly.terminal.command_parser import LineParser, coloured
 from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
 from planfly.terminal.options import call, flown_by_options, result_options, steering_options, world_options
@@ -27,7 +27,14 @@ def survey_options(line: LineParser) -> None:
         parser.add_argument("what", metavar="MISSION|LOG", help=".waypoints or .plan, or a flight log (.mcap)"),
         files(*MISSIONS, "mcap"),
     )
-    parser.group("the survey").add_argument(
+    group = parser.group("the survey")
+    group.add_argument(
+        "--camera", metavar="WxH,FOCAL", type=camera,
+        help="the camera, which looks straight down: its sensor across the way and along it, and its focal length, mm, "
+        "as in 23.5x15.6,16; then the overlaps asked for, along and across, as in 23.5x15.6,16,75,60 "
+        "(default: those of a .plan)",
+    )  # fmt: skip
+    group.add_argument(
         "--suggest",
         action="store_true",
         help="look for turn-arounds, an order or a course of the lines, a parameter or an airspeed with which all can "
@@ -54,7 +61,8 @@ def survey(args: argparse.Namespace) -> int:
     for text in found.lines_of_remedies:
         print(coloured("  would help: ", "hint") + text)
     if args.suggest and not found.usable and not found.remedies:
-        print("  no turn-around, order, course, parameter or airspeed was found that would help")
+        for text in found.lines_without_remedy:
+            print(f"  {text}")
     for path in found.files:
         print(f"  written {path}")
     give_answer(args, lambda: _answer(str(args.what), found, code))
@@ -62,7 +70,13 @@ def survey(args: argparse.Namespace) -> int:
 
 
 def _answer(what: str, found: "SurveyFound", code: int) -> object:
-    from planfly.terminal.answers import SurveyAnswer, photo_line_entry, survey_remedy_entry
+    from planfly.terminal.answers import (
+        SurveyAnswer,
+        near_miss_entry,
+        overlap_entry,
+        photo_line_entry,
+        survey_remedy_entry,
+    )
 
     return SurveyAnswer(
         exit_code=code,
@@ -73,6 +87,8 @@ def _answer(what: str, found: "SurveyFound", code: int) -> object:
             [photo_line_entry(found.setup, line, one) for line, one in zip(survey.lines, lines, strict=True)]
             for survey, lines in zip(found.surveys, found.lines, strict=True)
         ],
+        overlaps=[None if one is None else overlap_entry(one) for one in found.overlaps],
         remedies=[survey_remedy_entry(one) for one in found.remedies],
+        nearest=None if found.nearest is None else near_miss_entry(found.nearest),
         files=[str(Path(path)) for path in found.files],
     )

@@ -13,14 +13,14 @@ from flight.mission.surveys import PhotoLine
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions
 from logs.verdict.findings import Verdict, verdict_json
-from logs.verdict.measures.photo_lines import LineMeasure
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from logs.verdict.returns.glides_text import glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import MARGIN
 from logs.verdict.returns.judge_returns import ReturnRange
 from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.aircraft import AircraftNumbers
 from planfly.api.returning import ReturnsFound, Suggested
-from planfly.survey_remedies import SurveyRemedy
+from planfly.survey_remedies import NearMiss, SurveyRemedy
 from world.frames import to_geo
 
 # ----------------------------------------------------------------------
@@ -825,6 +825,32 @@ class SurveyRemedyEntry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class OverlapEntry:
+    """The least overlap of a survey's photos that can be used, as shares of a photo; null where it is not known."""
+
+    front: float | None
+    """Of a photo and the next on its line."""
+    front_asked: float | None
+    front_line: int | None
+    """The line's number, from 1."""
+    side: float | None
+    """Of photos of neighbouring lines."""
+    side_asked: float | None
+    side_lines: tuple[int, int] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class NearMissEntry:
+    """What was tried, came nearest, and does not pass."""
+
+    what: str
+    usable: int
+    lines: int
+    headline: str
+    """Of the verdict on its flight."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class SurveyAnswer:
     """planfly survey: each survey's photo lines, in flying order."""
 
@@ -834,8 +860,12 @@ class SurveyAnswer:
     headline: str
     usable: bool
     surveys: list[list[PhotoLineEntry]]
+    overlaps: list[OverlapEntry | None]
+    """Of each survey; null where its camera is not known."""
     remedies: list[SurveyRemedyEntry]
     """Of --suggest."""
+    nearest: NearMissEntry | None
+    """Where it found none."""
     files: list[str]
 
 
@@ -859,6 +889,24 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | Non
         photos=None if one is None else one.photos,
         missed=None if one is None else one.missed,
     )
+
+
+def overlap_entry(one: OverlapMeasure) -> OverlapEntry:
+    """A survey's overlap as an answer has it."""
+    low, high = sorted(one.lines)
+    return OverlapEntry(
+        front=None if one.front is None else round(one.front, 4),
+        front_asked=one.camera.front,
+        front_line=None if one.front is None else one.line + 1,
+        side=None if one.side is None else round(one.side, 4),
+        side_asked=one.camera.side,
+        side_lines=None if one.side is None else (low + 1, high + 1),
+    )
+
+
+def near_miss_entry(one: NearMiss) -> NearMissEntry:
+    """What came nearest as an answer has it."""
+    return NearMissEntry(what=one.what, usable=one.usable, lines=one.lines, headline=one.verdict.headline)
 
 
 def survey_remedy_entry(one: SurveyRemedy) -> SurveyRemedyEntry:

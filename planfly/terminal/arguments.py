@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from logs.importers.open_log import SUFFIXES
-from planfly.arguments import CHOICES, RANGES, is_place, is_wind
+from planfly.arguments import CAMERA, CHOICES, RANGES, is_camera, is_place, is_wind
 
 # ----------------------------------------------------------------------
 # Texts of the command line as values, within the ranges of the API's keywords.
@@ -47,6 +47,22 @@ def wind(text: str) -> tuple[float, float]:
             f"{text!r}: SPEED,FROM is expected: m/s from 0 to 40, degrees from north that it blows from (-360..360)"
         )
     return speed, source
+
+
+def camera(text: str) -> tuple[float, ...]:
+    """WxH,FOCAL or WxH,FOCAL,FRONT,SIDE: mm of sensor and focal length, and percent of overlap.
+
+    >>> camera("23.5x15.6,16")
+    (23.5, 15.6, 16.0)
+    """
+    sensor, *others = text.split(",")
+    try:
+        numbers = tuple(float(part) for part in (*sensor.lower().split("x"), *others))
+    except ValueError:
+        numbers = ()
+    if not is_camera(numbers) or sensor.lower().count("x") != 1:
+        raise argparse.ArgumentTypeError(f"{text!r}: WxH,FOCAL or WxH,FOCAL,FRONT,SIDE is expected: {CAMERA}")
+    return numbers
 
 
 def place(text: str) -> tuple[float, float]:

@@ -1,12 +1,15 @@
-"""How much of a survey's photo line was flown as photos need it: on the line, level, at its height, camera on."""
+"""How much of a survey's photo line was flown as photos need it, and how much its photos overlap."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.surveys import PhotoLine, Survey
+from flight.mission.items import Camera
+from flight.mission.surveys import LineAxis, PhotoLine, Survey, survey_plan
 from flight.simulation.track import ROLL
 from logs.verdict.measures.acceptance import position_error, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -56,79 +59,80 @@ class LineMeasure:
     lost: tuple[tuple[float, float], ...] = ()
 
 
-class _Axis:
-    """A line laid straight: how far along and beside it places are."""
-
-    def __init__(self, points: Floats, line: PhotoLine) -> None:
-        """Points: (w, 3) of the route."""
-        self.corners = points[line.first : line.last + 1]
-        step = self.corners[-1, :2] - self.corners[0, :2]
-        self.length = float(np.hypot(*step))
-        self.east, self.north = step / max(self.length, 1e-9)
-        self.along, self._bends = self._laid(self.corners)
-
-    def _laid(self, places: Floats) -> tuple[Floats, Floats]:
-        off = places[:, :2] - self.corners[0, :2]
-        return off[:, 0] * self.east + off[:, 1] * self.north, off[:, 0] * self.north - off[:, 1] * self.east
-
-    def of(self, places: Floats) -> tuple[Floats, Floats]:
-        """Distance along the line and to the right of it, m, of places (n, 2 or 3)."""
-        along, across = self._laid(places)
-        return along, across - np.interp(along, self.along, self._bends)
-
-    def at(self, along: Floats) -> Floats:
-        """Places (n, 3) m on the line, at these distances along it."""
-        return np.stack([np.interp(along, self.along, self.corners[:, axis]) for axis in range(3)], axis=1)
-
-
 def allowed_aside(requirements: RouteRequirements, survey: Survey) -> float:
     """How far beside its line a photo may be taken, m."""
     return PHOTO_ASIDE * survey.spacing + position_error(requirements.setup)
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """The rows on which a line may have been flown.
+
+    position: (n, 3) m.  along, across: of the line, m.  ahead: whether each flies along it.
+    off, allowed: m off the planned height over ground, and how far it may be.
+    needed: what a photo needs, by what is lost without it.
+    """
+
+    axis: LineAxis
+    window: slice
+    position: Floats
+    along: Floats
+    across: Floats
+    ahead: Flags
+    off: Floats
+    allowed: Floats
+    needed: dict[str, Flags]
+
+
+def _rows(requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine) -> _Rows | None:
+    axis = LineAxis(requirements.points[line.first : line.last + 1])
+    window = _window(requirements, aligned, line)
+    if window.stop - window.start < 2 or not aligned.passed[line.begins]:
+        return None
+    position = aligned.track.position[window]
+    along, across, course = axis.of(position)
+    turned = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
+    ahead = turned <= PHOTO_COURSE
+    off, allowed = _heights_off(requirements, axis, position, along)
+    needed = {
+        "away": np.abs(across) <= allowed_aside(requirements, survey),
+        "banked": np.abs(aligned.track.attitude[window, ROLL]) <= PHOTO_BANK,
+        "high": np.abs(off) <= allowed,
+        "dark": _camera_on(requirements, line, position, along, ahead, axis.length),
+    }
+    return _Rows(axis, window, position, along, across, ahead, off, allowed, needed)
 
 
 def measure_line(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> LineMeasure | None:
     """Measure a photo line on a flown track; None where no row was flown between its neighbours."""
-    axis = _Axis(requirements.points, line)
-    window = _window(requirements, aligned, line)
-    if window.stop - window.start < 2 or not aligned.passed[line.begins]:
+    rows = _rows(requirements, aligned, survey, line)
+    if rows is None:
         return None
-    position = aligned.track.position[window]
-    along, across = axis.of(position)
-    course = math.atan2(axis.east, axis.north)
-    turned = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
-    ahead = turned <= PHOTO_COURSE
-    limit = allowed_aside(requirements, survey)
-    off, allowed = _heights_off(requirements, axis, position, along)
-    needed = {
-        "away": np.abs(across) <= limit,
-        "banked": np.abs(aligned.track.attitude[window, ROLL]) <= PHOTO_BANK,
-        "high": np.abs(off) <= allowed,
-        "dark": _camera_on(requirements, line, position, along, ahead, axis.length),
-    }
+    length, along, ahead = rows.axis.length, rows.along, rows.ahead
     good, state, lost = np.ones(0, dtype=np.bool_), ahead, {}
-    for name, fulfilled in needed.items():
+    for name, fulfilled in rows.needed.items():
         state = state & fulfilled
         before = float(good.mean()) if good.size else 1.0
-        good = _cells(along, state, axis.length)
+        good = _cells(along, state, length)
         lost[name] = before - float(good.mean())
     found = np.flatnonzero(good)
-    step = axis.length / len(good)
-    over = ahead & (along >= 0.0) & (along <= axis.length)
-    photos, missed = _photos(line, _cells(along, ahead & needed["away"] & needed["dark"], axis.length), axis.length)
+    step = length / len(good)
+    over = ahead & (along >= 0.0) & (along <= length)
+    photos, missed = _photos(line, _cells(along, ahead & rows.needed["away"] & rows.needed["dark"], length), length)
     return LineMeasure(
-        length=axis.length,
+        length=length,
         good=float(good.mean()),
         **lost,
-        late=float(found[0] * step) if found.size else axis.length,
-        early=float((len(good) - 1 - found[-1]) * step) if found.size else axis.length,
-        aside=float(np.abs(across[over]).max(initial=0.0)),
-        off=float(max(off[over], key=abs, default=0.0)),
+        late=float(found[0] * step) if found.size else length,
+        early=float((len(good) - 1 - found[-1]) * step) if found.size else length,
+        aside=float(np.abs(rows.across[over]).max(initial=0.0)),
+        off=float(max(rows.off[over], key=abs, default=0.0)),
         photos=photos,
         missed=missed,
-        allowed_aside=limit,
-        allowed_off=float(allowed.min(initial=math.inf)),
+        allowed_aside=allowed_aside(requirements, survey),
+        allowed_off=float(rows.allowed.min(initial=math.inf)),
         lost=_stretches(~good, step),
     )
 
@@ -146,21 +150,21 @@ def _window(requirements: RouteRequirements, aligned: AlignedTrack, line: PhotoL
 
 
 def _heights_off(
-    requirements: RouteRequirements, axis: _Axis, position: Floats, along: Floats
+    requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
-    """By how much each row is off the planned height over ground, m, and by how much it may be.
+    """By how much each row is off the planned height over ground, m, and by how much it may be."""
+    asked = over_ground(requirements, axis.at(along))
+    allowed = np.maximum(PHOTO_HEIGHT_LEAST, PHOTO_HEIGHT * asked)
+    return over_ground(requirements, position) - asked, allowed
 
-    Without terrain: off the planned height, with what is allowed of the height over home.
-    """
-    planned = axis.at(along)
-    ground = requirements.setup.scenario.terrain
-    if ground is None:
-        home = requirements.setup.mission.home
-        base = float(requirements.points[:, 2].min()) if home is None else home.alt
-        return position[:, 2] - planned[:, 2], np.maximum(PHOTO_HEIGHT_LEAST, PHOTO_HEIGHT * (planned[:, 2] - base))
-    asked = planned[:, 2] - ground.height(planned[:, 0], planned[:, 1])
-    flown = position[:, 2] - ground.height(position[:, 0], position[:, 1])
-    return flown - asked, np.maximum(PHOTO_HEIGHT_LEAST, PHOTO_HEIGHT * asked)
+
+def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
+    """Heights (n,) m of places (n, 3) above the ground; without terrain above home, or the route's lowest waypoint."""
+    ground, home = requirements.setup.scenario.terrain, requirements.setup.mission.home
+    if ground is not None:
+        heights: Floats = places[:, 2] - ground.height(places[:, 0], places[:, 1])
+        return heights
+    return places[:, 2] - (float(requirements.points[:, 2].min()) if home is None else home.alt)
 
 
 def _camera_on(
@@ -203,3 +207,132 @@ def _photos(line: PhotoLine, taken: Flags, length: float) -> tuple[int, int]:
     count = int(length / line.photo) + 1
     steps = np.minimum((np.arange(count) * line.photo / length * len(taken)).astype(int), len(taken) - 1)
     return count, int(np.count_nonzero(~taken[steps]))
+
+
+# ----------------------------------------------------------------------
+# How much photos overlap.  A photo is a rectangle on level ground below the aircraft, as high as it flies there: its
+# own tilt does not count.
+
+
+@dataclass(frozen=True, slots=True)
+class OverlapMeasure:
+    """The least overlap of a survey's photos, where they can be used, as shares of a photo.
+
+    camera: that takes them.
+    front: with the next on its line; None where nobody says how far apart they are taken, or none can be used.
+    line, apart, height, slow: where: the line's number from 0, m between photos, m above ground, and whether it is the
+    camera that cannot take them any sooner.
+    side: with those of the line beside; None where no two that can be used lie beside each other.
+    lines, between, heights: where: both lines' numbers, m between them, m above ground.
+    """
+
+    camera: Camera
+    front: float | None = None
+    line: int = -1
+    apart: float = math.nan
+    height: float = math.nan
+    slow: bool = False
+    side: float | None = None
+    lines: tuple[int, int] = (-1, -1)
+    between: float = math.nan
+    heights: float = math.nan
+
+
+class _Strip(NamedTuple):
+    """What of a line can be used: places (n, 3) m, heights over ground (n,) m, ground speeds (n,) m/s, and whether."""
+
+    places: Floats
+    heights: Floats
+    speeds: Floats
+    usable: Flags
+
+
+def measure_overlap(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey
+) -> OverlapMeasure | None:
+    """Measure how much a survey's photos overlap as they are flown, or planned where ``aligned`` is None.
+
+    None where no camera is known.
+    """
+    plan = survey_plan(requirements.setup.mission, survey)
+    if plan is None or plan.camera is None:
+        return None
+    strips = [_strip(requirements, aligned, survey, line) for line in survey.lines]
+    return _along(_beside(OverlapMeasure(plan.camera), requirements, survey, strips), survey, strips)
+
+
+def _strip(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine
+) -> _Strip | None:
+    """A line as flown, or as planned; None for one that was not flown."""
+    if aligned is None:
+        axis = LineAxis(requirements.points[line.first : line.last + 1])
+        along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP) + 1))
+        legs = np.clip(np.searchsorted(axis.along, along, "right") - 1, 0, len(axis.along) - 2) + line.first
+        places, speeds = axis.at(along), requirements.ground_speed[legs]
+        return _Strip(places, over_ground(requirements, places), speeds, np.ones(len(along), dtype=np.bool_))
+    rows = _rows(requirements, aligned, survey, line)
+    if rows is None:
+        return None
+    usable = rows.ahead & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
+    for fulfilled in rows.needed.values():
+        usable = usable & fulfilled
+    speeds = np.hypot(*aligned.track.velocity[rows.window, :2].T)
+    return _Strip(rows.position, over_ground(requirements, rows.position), speeds, usable)
+
+
+def _along(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
+    """With the least overlap along the lines."""
+    camera = measure.camera
+    for number, (line, strip) in enumerate(zip(survey.lines, strips, strict=True)):
+        if strip is None or line.photo <= 0.0 or not strip.usable.any():
+            continue
+        apart = np.maximum(line.photo, camera.interval * strip.speeds)[strip.usable]
+        heights = strip.heights[strip.usable]
+        shares = 1.0 - apart / (camera.along * np.maximum(heights, 1e-9))
+        k = int(np.argmin(shares))
+        if measure.front is None or shares[k] < measure.front:
+            metres, slow = float(apart[k]), bool(apart[k] > line.photo)
+            measure = replace(
+                measure, front=float(shares[k]), line=number, apart=metres, height=float(heights[k]), slow=slow
+            )
+    return measure
+
+
+def _beside(
+    measure: OverlapMeasure, requirements: RouteRequirements, survey: Survey, strips: Sequence[_Strip | None]
+) -> OverlapMeasure:
+    """With the least overlap across the lines, step by step along the first."""
+    corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
+    axis = LineAxis(corners[0])
+    ends = [axis.of(places)[0] for places in corners]
+    low = min(float(along.min()) for along in ends)
+    length = max(float(along.max()) for along in ends) - low
+    count = max(1, math.ceil(length / PHOTO_STEP))
+    middles = (np.arange(count) + 0.5) * length / count
+    last = np.full((4, count), np.nan)
+    for number in np.argsort(survey.offsets).tolist():
+        strip, along = strips[number], ends[number] - low
+        here = (middles >= along.min()) & (middles <= along.max())
+        now = np.full((4, count), np.nan)
+        now[3, here] = number
+        if strip is not None and strip.usable.any():
+            at, across, _ = axis.of(strip.places)
+            forth = along[-1] >= along[0]
+            cells = _cells((at - low) if forth else length - (at - low), strip.usable, length)
+            used = here & (cells if forth else cells[::-1])
+            order = np.argsort(at[strip.usable])
+            for row, values in enumerate((across, strip.heights)):
+                own = np.interp(middles, (at[strip.usable] - low)[order], values[strip.usable][order])
+                now[row] = np.where(used, own, np.nan)
+        gaps, heights = np.abs(now[0] - last[0]), 0.5 * (now[1] + last[1])
+        shares = 1.0 - gaps / (measure.camera.across * np.maximum(heights, 1e-9))
+        if np.isfinite(shares).any():
+            k = int(np.nanargmin(shares))
+            if measure.side is None or shares[k] < measure.side:
+                pair = (int(last[3, k]), number)
+                measure = replace(
+                    measure, side=float(shares[k]), lines=pair, between=float(gaps[k]), heights=float(heights[k])
+                )
+        last[:, here] = now[:, here]
+    return measure

@@ -372,14 +372,15 @@ def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
     asked = setup.scenario.limits.surveys
     if setup.plan is not None or asked == "path":
         return ()
-    found = find_surveys(setup.route, camera_spacing(setup.mission, setup.route))
+    beyond = [(one.photo, one.turn_around) for one in setup.mission.survey_plans if one.photo is not None]
+    found = find_surveys(setup.route, camera_spacing(setup.mission, setup.route), beyond)
     return tuple(one for one in found if asked == "lines" or one.takes_photos())
 
 
 @functools.lru_cache(maxsize=8)
 def _turned_around(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
-    """Waypoints and legs of all turn-arounds."""
-    ends = [pair for survey in surveys for pair in survey.turn_arounds()]
+    """Waypoints and legs of all turn-arounds, the ways onto the first line and off the last among them."""
+    ends = [pair for survey in surveys for pair in survey.ways_onto_lines()]
     return (
         frozenset(i for first, last in ends for i in range(first, last + 1)),
         frozenset(i for first, last in ends for i in range(first, last)),

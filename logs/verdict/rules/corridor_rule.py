@@ -15,13 +15,14 @@ def corridor_findings(
 ) -> list[Finding]:
     """Judge how far from the legs the flight of each leg got; ``geometric``: how far its planned turns lead.
 
-    In a survey only a corridor that somebody stated counts: how far from its lines a flight was the survey rule tells.
+    In a survey, and on the legs to it and from it, only a corridor that somebody stated counts: how far from its lines
+    a flight was the survey rule tells, and the turns onto the first and off the last are the autopilot's own.
     """
     stated = requirements.setup.scenario.limits.corridor_m is not None
     return [
         _corridor(requirements, aligned, leg, geometric)
         for leg in range(requirements.legs)
-        if stated or not any(survey.first <= leg < survey.last for survey in requirements.surveys)
+        if stated or not any(one.lines[0].begins - 1 <= leg <= one.lines[-1].ends for one in requirements.surveys)
     ]
 
 

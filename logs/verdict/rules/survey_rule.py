@@ -1,4 +1,4 @@
-"""The survey rule: how much of each photo line is flown so that its photos can be used.
+"""The survey rule: how much of each photo line is flown so that its photos can be used, and how much these overlap.
 
 A survey's turn-arounds are the autopilot's own business, as long as they keep ground, threats and zones: the rules of
 turns, slopes, waypoints and, unless somebody stated a corridor, of the corridor leave them alone.
@@ -11,17 +11,20 @@ import numpy as np
 from flight.mission.surveys import PhotoLine, Survey
 from logs.verdict.findings import UNKNOWN_WAY, Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.circle_reach import within_reach
-from logs.verdict.measures.photo_lines import LineMeasure, measure_line
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
-from logs.verdict.tolerances import PHOTO_BANK, PHOTO_SHARE, PLAN_TOLERANCE, TURN_AROUND_RADII
+from logs.verdict.tolerances import PHOTO_BANK, PHOTO_OVERLAP, PHOTO_SHARE, PLAN_TOLERANCE, TURN_AROUND_RADII
+
+# The checks of photos' overlap.
+FRONT, SIDE = "front overlap", "side overlap"
 
 
 def _lost(item: Finding) -> str:
-    """A photo line in a headline: how much of it can be used."""
-    return short_of_limit("photo line", item)
+    """A photo line in a headline: how much of it can be used; or how much photos overlap."""
+    return short_of_limit(item.check or "photo line", item)
 
 
 def survey_findings(
@@ -37,13 +40,72 @@ def survey_findings(
                 out.append(_flown(requirements, aligned, survey, line, number))
         if geometric:
             out += _turn_arounds(requirements, survey)
+        if geometric or aligned is not None:
+            out += _overlaps(requirements, None if geometric else aligned, survey)
     return out
 
 
-def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Turn-arounds too tight to be flown as drawn that have something within reach: only a flight tells their way."""
+def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
+    """Judge the least overlap of a survey's photos along its lines and across, where its camera is known."""
+    measure = measure_overlap(requirements, aligned, survey)
+    if measure is None:
+        return []
+    sides = (
+        (FRONT, measure.front, measure.camera.front, survey.lines[measure.line]),
+        (SIDE, measure.side, measure.camera.side, survey.lines[measure.lines[1]]),
+    )
     out = []
-    for number, (first, last) in enumerate(survey.turn_arounds(), 1):
+    for check, share, asked, line in sides:
+        if share is None or asked is None:
+            continue
+        limit = asked - PHOTO_OVERLAP
+        ok = share >= limit
+        text = overlap_text(measure, check)
+        faults = [] if ok else [message(text)]
+        out.append(
+            make_finding(
+                "survey",
+                _place(requirements, line),
+                ok=ok,
+                reason=reason_of(faults, [] if faults else [text]),
+                faults=faults,
+                planned=100.0 * share if aligned is None else 100.0 * asked,
+                flown=None if aligned is None else 100.0 * share,
+                limit=100.0 * limit,
+                source="mission",
+                margin=100.0 * (share - limit),
+                unit="%",
+                method="photos of level ground, taken straight down",
+                check=check,
+            )
+        )
+    return out
+
+
+def overlap_text(measure: OverlapMeasure, check: str) -> str:
+    """How much photos overlap along lines or across them at the least, where, and what was asked for."""
+    if check == FRONT:
+        share, asked = measure.front, measure.camera.front
+        soonest = f" apart, one each {measure.camera.interval:g} s" if measure.slow else " apart"
+        where = f"line {measure.line + 1}: photos {measure.apart:.0f} m{soonest}, {measure.height:.0f} m above ground"
+    else:
+        share, asked = measure.side, measure.camera.side
+        one, other = sorted(measure.lines)
+        where = f"lines {one + 1} and {other + 1}: {measure.between:.0f} m apart, {measure.heights:.0f} m above ground"
+    if share is None:
+        return ""
+    said = f"{check} {100.0 * share:.0f} % at the least ({where})"
+    return said if asked is None else f"{said}, {100.0 * asked:.0f} % asked for"
+
+
+def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
+    """Turn-arounds too tight to be flown as drawn that have something within reach: only a flight tells their way.
+
+    So are the turns onto the first line and off the last.
+    """
+    out = []
+    ways = survey.ways_onto_lines()
+    for number, (first, last) in enumerate(ways):
         if not any(_too_tight(requirements, i) for i in range(first, last + 1)):
             continue
         points, radii = requirements.points[first : last + 1], requirements.tightest[first : last + 1]
@@ -52,11 +114,12 @@ def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Findi
         reach = float(np.hypot(*(points[:, :2] - middle).T).max()) + TURN_AROUND_RADII * radius
         low, high = float(points[:, 2].min()), float(points[:, 2].max())
         if found := within_reach(requirements, middle, low, high, reach):
+            ends = {0: "the turn onto the first line", len(ways) - 1: "the turn off the last line"}
             reason = (
-                f"turn-around {number} is too tight to be flown as drawn, and within {reach:.0f} m of it"
-                f" {'; '.join(found)}: only a flight tells"
+                f"{ends.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
+                f" {reach:.0f} m of it {'; '.join(found)}: only a flight tells"
             )
-            place, method = requirements.leg(first), "what lies around it"
+            place, method = requirements.leg(min(first, requirements.legs - 1)), "what lies around it"
             out.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
     return out
 
@@ -193,7 +256,7 @@ RULE = Rule(
     margin=Margin("share of the photo line", "%", 5.0),
     tolerances=(
         *("PHOTO_SHARE", "PHOTO_ASIDE", "PHOTO_BANK", "PHOTO_HEIGHT", "PHOTO_HEIGHT_LEAST", "PHOTO_COURSE"),
-        *("PHOTO_STEP", "TURN_AROUND_RADII"),
+        *("PHOTO_STEP", "PHOTO_OVERLAP", "TURN_AROUND_RADII"),
     ),
     judge=survey_findings,
     phrase=_lost,

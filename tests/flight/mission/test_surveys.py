@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from flight.mission.items import Command, Mission
+from flight.mission.items import Command, Mission, SurveyPlan
 from flight.mission.route import Route, make_route
-from flight.mission.survey_layout import SurveyLayout, turn_around_of, with_layout
-from flight.mission.surveys import Survey, camera_spacing, find_surveys
+from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
+from flight.mission.surveys import LineAxis, Survey, camera_spacing, find_surveys, survey_plan
 from tests.mission_lines import ORIGIN, mission, wp
 
 Place = tuple[float, float]
@@ -89,6 +90,154 @@ def test_a_final_approach_beside_the_lines_is_none_of_them() -> None:
     # The same as waypoints is a line.
     [found] = surveys([*grid(count=3), (200.0, 900.0), (200.0, 0.0)])
     assert len(found.lines) == 4
+
+
+def test_a_link_that_is_almost_parallel_to_its_lines_is_none() -> None:
+    """A field whose edge is 9 degrees off the lines, 30 m apart: links of 192 m go back beside the line before."""
+    edge = 30.0 / math.tan(math.radians(9.0))
+    lines = [(0.0, 900.0), (0.0, 900.0 - edge), (0.0, 900.0 - 2 * edge), (0.0, 900.0 - 3 * edge)]
+    places = [
+        (30.0 * k, north) for k, ends in enumerate(lines) for north in (ends if k % 2 == 0 else tuple(reversed(ends)))
+    ]
+    [found] = surveys(places)
+    assert [(line.first, line.last) for line in found.lines] == [(0, 1), (2, 3), (4, 5), (6, 7)]
+    assert found.spacing == pytest.approx(30.0, abs=0.1)
+
+
+def test_spokes_of_a_hub_are_no_survey() -> None:
+    """Six degrees apart, as parallel as many a line drawn by hand, but they touch."""
+    tips = [(1000.0 * math.sin(math.radians(a)), 1000.0 * math.cos(math.radians(a))) for a in (0, 6, 12, 18)]
+    assert surveys([place for tip in tips for place in ((0.0, 0.0), tip)]) == ()
+
+
+def test_lines_drawn_by_hand_are_a_survey() -> None:
+    """While they are off parallel by no more than half of what their middles are apart: 22 m of 49, not 26 of 47."""
+
+    def leaning(metres: float) -> list[Place]:
+        return [(east + (metres if k % 4 == 1 else 0.0), north) for k, (east, north) in enumerate(grid())]
+
+    [found] = surveys(leaning(22.0))
+    assert len(found.lines) == 4
+    assert surveys(leaning(26.0)) == ()
+
+
+def test_lines_that_are_flown_twice_are_as_far_apart_as_the_others() -> None:
+    """Each a second time, 3 m beside: the gaps are 3 and 57 m in turn."""
+    east = [0.0, 60.0, 120.0, 123.0, 63.0, 3.0]
+    places = [(e, n) for k, e in enumerate(east) for n in ((0.0, 800.0) if k % 2 == 0 else (800.0, 0.0))]
+    [found] = surveys(places)
+    assert found.spacing == pytest.approx(57.0, abs=0.1)
+
+
+def test_a_grid_flown_across_another_is_a_survey_of_its_own() -> None:
+    """Its first turn-around lies beside the last line of the other, and is none of its lines."""
+    along, across = (
+        grid(count=3),
+        [(250.0, 0.0), (-150.0, 0.0), (-150.0, 60.0), (250.0, 60.0), (250.0, 120.0), (-150.0, 120.0)],
+    )
+    first, second = surveys([*along, *across])
+    assert [(line.first, line.last) for line in first.lines] == [(0, 1), (2, 3), (4, 5)]
+    assert [(line.first, line.last) for line in second.lines] == [(6, 7), (8, 9), (10, 11)]
+
+
+def test_the_way_to_a_first_line_may_lie_beside_the_second() -> None:
+    """From the first line's begin back to where its lead begins: as long a list, but of shorter lines."""
+    [found] = surveys([(0.0, 0.0), *grid(count=3, lead=150.0)])
+    assert [(line.begins, line.ends) for line in found.lines] == [(1, 4), (5, 8), (9, 12)]
+
+
+def test_a_turn_around_of_many_legs() -> None:
+    """Around a bulb, one leg of which is almost parallel to the lines and half as far from the last as it is long."""
+    bulb = [(40.0, 860.0), (120.0, 900.0), (200.0, 860.0), (200.0, 810.0), (130.0, 770.0)]
+    first = [(0.0, 0.0), (0.0, 800.0), *bulb, (60.0, 800.0), (60.0, 0.0), (120.0, 0.0), (120.0, 800.0)]
+    [found] = surveys(first)
+    assert [(line.first, line.last) for line in found.lines] == [(0, 1), (7, 8), (9, 10)]
+
+
+def bent(count: int = 3, apart: float = 60.0, lead: float = 0.0) -> list[Place]:
+    """A corridor: 600 m north, then 600 m at 45 degrees to the east, there and back, each line to the right."""
+    half = math.sqrt(0.5)
+    out: list[Place] = []
+    for k in range(count):
+        d = apart * k
+        # The bend of a line at this distance to the right lies on the bisector.
+        corner = (d, 600.0 - d * math.tan(math.radians(22.5)))
+        end = (600.0 * half + d * half, 600.0 + 600.0 * half - d * half)
+        line = [(d, 0.0), corner, end]
+        if lead:
+            line = [(d, -lead), *line, (end[0] + lead * half, end[1] + lead * half)]
+        out += line if k % 2 == 0 else reversed(line)
+    return out
+
+
+def test_lines_that_bend_are_lines_as_a_whole() -> None:
+    """Neither their straight parts, with the others for turn-arounds, nor nothing."""
+    [found] = surveys(bent())
+    assert [(line.first, line.last) for line in found.lines] == [(0, 2), (3, 5), (6, 8)]
+    assert found.offsets == pytest.approx([0.0, 60.0, 120.0], abs=0.5)
+    assert (found.spacing, math.degrees(found.course)) == pytest.approx((60.0, 0.0), abs=0.5)
+    assert found.turn_arounds() == [(2, 3), (5, 6)]
+    assert found.ways_onto_lines() == [(0, 0), (2, 3), (5, 6), (8, 8)]
+
+
+def test_places_along_and_beside_a_line_that_bends() -> None:
+    axis = LineAxis(np.array(bent(1)))
+    places = np.array([[10.0, 300.0], [-20.0, -50.0], [300.0, 900.0], [600.0, 1200.0]])
+    along, across, course = axis.of(places)
+    half = math.sqrt(0.5)
+    assert along == pytest.approx([300.0, -50.0, 600.0 + 600.0 * half, 600.0 + 1200.0 * half])
+    assert across == pytest.approx([10.0, -20.0, 0.0, 0.0], abs=1e-9)
+    assert np.degrees(course) == pytest.approx([0.0, 0.0, 45.0, 45.0])
+    assert axis.at(np.array([300.0, 1200.0])) == pytest.approx(np.array([[0.0, 300.0], bent(1)[-1]]))
+
+
+def test_two_lines_are_a_survey_with_the_camera_on() -> None:
+    read, route = with_camera(*grid(count=2))
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert found.spacing == pytest.approx(60.0, abs=0.1)
+    # A video is none.
+    read, route = flown(grid(count=2), "2 2500 0 0 0 0 0 0 0")
+    assert find_surveys(route, np.full(4, math.nan)) == ()
+
+
+@pytest.mark.parametrize(("length", "lines"), [(11.0, 3), (9.0, 0)])
+def test_a_line_has_ten_metres(length: float, lines: int) -> None:
+    assert sum(len(found.lines) for found in surveys(grid(count=3, length=length, apart=5.0))) == lines
+
+
+def on_all_along(places: Sequence[Place]) -> tuple[Mission, Route]:
+    """The camera is switched on once, as QGroundControl does that is to take photos in turn-arounds, too."""
+    (east, north), *others = places
+    items = [wp(east, north), "2 206 25 0 1 0 0 0 0", *(wp(*place) for place in others)]
+    read = mission(*items, home="36.5 -84.2 0")
+    return read, make_route(read, ORIGIN, None, 15.0, False)
+
+
+def test_leads_are_as_long_as_the_ground_station_says() -> None:
+    """Of lines with waypoints each 30 m nobody else could tell."""
+    lines = [[(60.0 * k, 30.0 * n) for n in range(-2, 12)] for k in range(3)]
+    places = [place for k, line in enumerate(lines) for place in (line if k % 2 == 0 else reversed(line))]
+    read, route = on_all_along(places)
+    camera = camera_spacing(read, route)
+    ends = {
+        beyond: [(line.first, line.last) for line in find_surveys(route, camera, [(25.0, beyond)])[0].lines]
+        for beyond in (60.0, 0.0, 45.0)
+    }
+    assert ends[60.0] == [(2, 11), (16, 25), (30, 39)]
+    # No waypoint is there: the mission was changed since.
+    assert ends[0.0] == ends[45.0] == [(0, 13), (14, 27), (28, 41)]
+    # Of another way between photos nothing is said.
+    assert find_surveys(route, camera, [(20.0, 60.0)])[0].lines[0].first == 0
+
+
+def test_a_plan_is_its_surveys_by_the_way_between_photos() -> None:
+    read, route = with_camera(*grid())
+    [found] = find_surveys(route, camera_spacing(read, route))
+    mine, other, any_ = SurveyPlan(25.0000004, 30.0), SurveyPlan(20.0, 10.0), SurveyPlan(None)
+    for plans, expected in (((other, mine), mine), ((other,), None), ((other, any_), any_), ((any_, mine), mine)):
+        assert survey_plan(replace(read, survey_plans=plans), found) == expected
+    # Two of one way between photos that differ are nobody's.
+    assert survey_plan(replace(read, survey_plans=(mine, replace(mine, turn_around=5.0))), found) is None
 
 
 def test_two_surveys_of_one_mission() -> None:
@@ -220,8 +369,75 @@ def test_nothing_but_waypoints_is_laid_out() -> None:
             assert with_layout(read, route, found, SurveyLayout(100.0), ORIGIN) is None
 
 
+@pytest.mark.parametrize(
+    ("place", "line", "why"),
+    [
+        (2, "2 178 0 15 -1 0 0 0 0", ""),
+        (4, "2 178 0 15 -1 0 0 0 0", "item 5, DO_CHANGE_SPEED, stands between two lines"),
+        (4, wp(30, 900, command=17), "item 5, NAV_LOITER_UNLIM, stands between two lines"),
+    ],
+)
+def test_why_a_layout_is_kept(place: int, line: str, why: str) -> None:
+    """What is behind a waypoint of a line goes with it."""
+    lines = [wp(east, north) for east, north in grid(lead=50.0)]
+    lines[place:place] = [line]
+    read, (_, route) = mission(*lines, home="36.5 -84.2 0"), flown(grid(lead=50.0))
+    [found] = find_surveys(route, np.zeros(16))
+    # The route of the plain grid, with the items of this mission: an endless loiter would end it.
+    items = [item.seq for item in read.items if item.command == 16]
+    route = replace(route, items=np.array(items))
+    assert kept_layout(read, route, found) == why
+
+
+def test_a_line_with_a_waypoint_of_another_kind_on_it_is_kept() -> None:
+    commands = [82 if k == 4 else 16 for k in range(9)]
+    places = [(60.0 * k, 400.0 * (n if k % 2 == 0 else 2 - n)) for k in range(3) for n in range(3)]
+    items = [wp(east, north, command=command) for (east, north), command in zip(places, commands, strict=True)]
+    read = mission(*items, home="36.5 -84.2 0")
+    route = make_route(read, ORIGIN, None, 15.0, False)
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert kept_layout(read, route, found) == "item 5, NAV_SPLINE_WAYPOINT, stands on a line"
+
+
+def test_a_take_off_where_the_first_line_begins_stays_before_it() -> None:
+    """Its place is the first line's begin, with a waypoint there or without."""
+    for more in ([], [wp(0, 0)]):
+        items = [wp(0, 0, command=22), *more, *(wp(*place) for place in grid(count=3)[1:])]
+        read = mission(*items, home="0 0 0")
+        route = make_route(read, ORIGIN, None, 15.0, False)
+        [found] = find_surveys(route, camera_spacing(read, route))
+        made = with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
+        assert made is not None
+        assert [item.command for item in made.items] == [22] + [16] * 12
+        assert places_of(made)[1:] == pytest.approx(np.array(grid(count=3, lead=100.0)), abs=0.05)
+
+
+def test_what_is_at_the_place_of_the_last_lead_goes_with_it() -> None:
+    """QGroundControl's survey over terrain ends each line twice."""
+    places = [place for k, place in enumerate(grid(count=3, lead=30.0)) for _ in range(2 if k % 4 == 3 else 1)]
+    read, route = flown([*places, (500.0, 500.0)])
+    [found] = find_surveys(route, camera_spacing(read, route))
+    made = with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
+    assert made is not None
+    assert places_of(made) == pytest.approx(np.array([*grid(count=3, lead=100.0), (500.0, 500.0)]), abs=0.05)
+
+
+def test_lines_that_bend_get_leads_along_their_ends() -> None:
+    read, route = flown(bent())
+    [found] = find_surveys(route, camera_spacing(read, route))
+    made = with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
+    assert made is not None
+    assert places_of(made) == pytest.approx(np.array(bent(lead=100.0)), abs=0.05)
+    turned = with_layout(read, route, found, SurveyLayout(0.0, backwards=True), ORIGIN)
+    assert turned is not None
+    assert places_of(turned)[:3] == pytest.approx(np.array(bent()[6:]), abs=0.05)
+    # They cannot be laid on another course.
+    assert with_layout(read, route, found, SurveyLayout(0.0, course=1.0), ORIGIN) is None
+
+
 def test_a_mission_that_jumps_keeps_its_layout() -> None:
     read, route = flown(grid(), "2 177 1 1 0 0 0 0 0")
     assert Command.DO_JUMP in {item.command for item in read.items}
     found = find_surveys(route, camera_spacing(read, route))
     assert with_layout(read, route, found[0], SurveyLayout(50.0), ORIGIN) is None
+    assert kept_layout(read, route, found[0]) == "the mission jumps"

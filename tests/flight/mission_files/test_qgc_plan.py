@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from flight.mission.items import Camera, Mission, SurveyPlan
 from flight.mission_files.formats import parse_mission, read_fence
 from tests.flight.mission_files.malformed_files import BAD_PLAN, plan_data, refused
 from world.errors import MissionError
@@ -32,6 +33,71 @@ def test_a_survey_is_its_items(name: str) -> None:
     assert [item.seq for item in mission.items] == [1, 2, 3, 4, 5]
     assert [item.x for item in mission.items] == [364_000_000, 365_000_000, 365_100_000, 365_200_000, 366_000_000]
     assert mission.warnings == (f"a.plan: mission.items.1: {name} taken as the 3 simple items that it stands for",)
+
+
+# QGroundControl's custom camera of 6.17 mm by 4.55 mm, 4,000 by 3,000 pixels, behind 4.5 mm.  From 50 m it writes
+# footprints of 15.425 m along and 20.5667 m across, which are the distances left by overlaps of 70 %.
+CALC = {
+    "AdjustedFootprintFrontal": 15.425, "AdjustedFootprintSide": 20.566666666666663, "CameraName": "Custom Camera",
+    "DistanceToSurface": 50, "FixedOrientation": False, "FocalLength": 4.5, "FrontalOverlap": 70, "ImageHeight": 3000,
+    "ImageWidth": 4000, "Landscape": True, "MinTriggerInterval": 0, "SensorHeight": 4.55, "SensorWidth": 6.17,
+    "SideOverlap": 70,
+}  # fmt: skip
+
+
+def trigger(number: int, metres: float) -> dict[str, Any]:
+    return simple(number, 0.0) | {"command": 206, "frame": 2, "params": [metres, 0, 1, 0, 0, 0, 0]}
+
+
+def plan_of_survey(calc: dict[str, Any], beyond: Any = 30, metres: float = 15.425000190734863) -> Mission:
+    held = [simple(1, 36.5), trigger(2, metres), simple(3, 36.51), trigger(4, 0.0)]
+    transects = {"Items": held, "CameraCalc": calc, "TurnAroundDistance": beyond}
+    survey = {"type": "ComplexItem", "complexItemType": "survey", "TransectStyleComplexItem": transects}
+    return parse_mission(plan_with(survey), "a.plan")
+
+
+def test_the_camera_of_a_survey_is_read() -> None:
+    [plan] = plan_of_survey(CALC).survey_plans
+    assert (plan.photo, plan.turn_around) == (pytest.approx(15.425), 30.0)
+    assert plan.camera is not None
+    # What QGroundControl itself worked out: 50 m up, 30 % of what a photo shows.
+    assert 0.3 * 50.0 * plan.camera.along == pytest.approx(CALC["AdjustedFootprintFrontal"])
+    assert 0.3 * 50.0 * plan.camera.across == pytest.approx(CALC["AdjustedFootprintSide"])
+    assert (plan.camera.front, plan.camera.side, plan.camera.interval) == (0.7, 0.7, 0.0)
+    [turned] = plan_of_survey(CALC | {"Landscape": False, "MinTriggerInterval": 1.5}).survey_plans
+    assert turned.camera == Camera(plan.camera.along, plan.camera.across, 0.7, 0.7, 1.5)
+    # Without pixels the sensor's own sides.
+    [plain] = plan_of_survey({key: value for key, value in CALC.items() if not key.startswith("Image")}).survey_plans
+    assert plain.camera == Camera(6.17 / 4.5, 4.55 / 4.5, 0.7, 0.7)
+
+
+def test_a_camera_of_distances_alone_is_none() -> None:
+    manual = {"AdjustedFootprintFrontal": 25, "AdjustedFootprintSide": 25, "CameraName": "Manual (no camera specs)"}
+    assert plan_of_survey(manual, metres=25.0).survey_plans == (SurveyPlan(25.0, 30.0),)
+    # Nor is one that takes no photos known by a way between them.
+    assert plan_of_survey(manual, metres=0.0).survey_plans == (SurveyPlan(0.0, 30.0),)
+    assert parse_mission(plan_with(simple(1, 36.4), simple(2, 36.5)), "a.plan").survey_plans == ()
+
+
+@pytest.mark.parametrize(
+    ("calc", "beyond", "text"),
+    [
+        ({"FocalLength": 0}, 30, "CameraCalc.FocalLength: 0"),
+        ({"SensorWidth": "wide"}, 30, 'CameraCalc.SensorWidth: "wide"'),
+        ({"SideOverlap": 100}, 30, "CameraCalc.SideOverlap: 100"),
+        ({}, "far", ""),
+        ({}, -1, ""),
+        ({}, True, ""),
+    ],
+)
+def test_a_camera_that_is_none_is_left_out_and_said_to_be(calc: dict[str, Any], beyond: Any, text: str) -> None:
+    mission = plan_of_survey(CALC | calc, beyond)
+    [plan] = mission.survey_plans
+    assert (plan.camera is None, plan.turn_around) == (bool(text), 30.0 if text else 0.0)
+    said = [one for one in mission.warnings if "CameraCalc" in one]
+    assert said == (
+        [f"a.plan: mission.items.0: {text}: its camera is left out, and no overlap is judged"] if text else []
+    )
 
 
 @pytest.mark.parametrize(

@@ -108,6 +108,23 @@ def test_items_whose_seq_jumps_are_counted_as_pymavlink_counts_them(tmp_path: Pa
     )
 
 
+def test_items_whose_seq_does_not_rise_are_counted_as_pymavlink_counts_them(tmp_path: Path) -> None:
+    """A ground station's own grids begin with two lines 1, and no home."""
+    file, text = tmp_path / "a.waypoints", JUMPING.replace("\n7 ", "\n3 ").replace("\n40 ", "\n2 ")
+    file.write_text(text, encoding="utf-8")
+    loader = MAVWPLoader()
+    loader.load(str(file))
+    mission = parse_waypoints(text, "a.waypoints")
+    assert [(item.seq, item.lat_deg) for item in mission.items] == [
+        (loader.wp(k).seq, pytest.approx(loader.wp(k).x)) for k in range(1, loader.count())
+    ]
+    assert [stop.item for stop in make_itinerary(mission).stops] == [1, 2, 2, 4]
+    assert [said for said in mission.warnings if "rise" in said] == [
+        "a.waypoints:4: seq 3 does not rise (2 in all): items are counted by their lines, as ground stations do, and"
+        " jumps go by that count"
+    ]
+
+
 @pytest.mark.parametrize("kind", ["waypoints", "plan"])
 def test_a_home_at_0_0_is_left_out_and_said(kind: str) -> None:
     """It is counted as home all the same: the first item is number 1."""

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flight.mission.items import Camera, SurveyPlan
 from flight.mission.return_path import ReturnCircle
+from logs.recording.setup_attachments import pack_setup, unpack_setup
 from logs.recording.setup_schema import EnvelopeTable, MissionTable, RouteTable, SetupModel
 from tests.logs.log_copies import same
 from tests.logs.made_flight import make_setup
@@ -38,6 +40,21 @@ def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
     same(MissionTable.model_validate(through_json(MissionTable.of(SETUP.mission))).mission(), SETUP.mission)
     same(RouteTable.model_validate(ROUTE).route("x"), SETUP.route)
     same(EnvelopeTable.model_validate(ENVELOPE).envelope("x"), SETUP.envelope)
+
+
+def test_what_is_kept_of_surveys_comes_back() -> None:
+    plans = (SurveyPlan(25.5, 30.0, Camera(1.5, 1.0, 0.7, None, 2.0)), SurveyPlan(None), SurveyPlan(0.0, 10.0))
+    with_surveys = replace(SETUP.mission, survey_plans=plans)
+    table = through_json(MissionTable.of(with_surveys))
+    assert table["survey_plans"][0] == {
+        "photo_m": 25.5, "turn_around_m": 30.0,
+        "camera": {"across_m_per_m": 1.5, "along_m_per_m": 1.0, "front": 0.7, "side": None, "interval_s": 2.0},
+    }  # fmt: skip
+    same(MissionTable.model_validate(table).mission(), with_surveys)
+    # A log of before there were any, and of a mission without a survey, says nothing of them.
+    assert "survey_plans" not in json.loads(pack_setup(SETUP)["setup.json"])["mission"]
+    packed = pack_setup(replace(SETUP, mission=with_surveys))
+    assert unpack_setup(packed, "x").setup.mission.survey_plans == plans
 
 
 def test_an_unknown_height_is_null() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters
+from flight.mission.items import Camera, SurveyPlan
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_geometry
@@ -40,17 +41,21 @@ def photo_lines(verdict: Verdict) -> list[Finding]:
 
 
 def test_lines_flown_as_drawn_are_whole_and_their_turn_arounds_are_nobodys_business() -> None:
-    """A corner of 90 degrees takes 110 m of the 200 m between lines at either end: too much for the turn rule."""
-    setup = survey()
+    """A corner of 90 degrees takes 110 m of the 200 m between lines at either end: too much for the turn rule.
+
+    So is the turn onto the first line, at waypoint 2, and off the last, at 13, whatever the legs 1 and 13 there have.
+    """
+    to, off = [[-900.0, -800.0, UP], [-600.0, -800.0, UP]], [[1300.0, 1300.0, UP], [1500.0, 1000.0, UP]]
+    setup = make_setup([*to, *lines(), *off], limits={"surveys": "lines"})
     verdict = judge(setup, fly_path(setup))
     assert [item.ok for item in photo_lines(verdict)] == [True] * 3
     assert [item.flown for item in photo_lines(verdict)] == pytest.approx([100.0] * 3, abs=0.2)
-    judged = {(item.rule, item.place.index) for item in verdict.findings if item.rule in ("turn", "waypoint", "slope")}
-    # Waypoints 2 to 5 and 6 to 9 are the turn-arounds, legs 2 to 4 and 6 to 8 theirs.
-    assert {i for rule, i in judged if rule == "turn"} == {1, 10}
-    assert {i for rule, i in judged if rule == "waypoint"} == {0, 1, 10, 11}
-    assert {i for rule, i in judged if rule == "slope"} == {0, 1, 5, 9, 10}
-    assert not [item for item in verdict.findings if item.rule == "corridor" and item.place.index not in (0, 10)]
+    judged = {(item.rule, item.place.index) for item in verdict.findings}
+    # Waypoints 5 to 8 and 9 to 12 are between its lines, legs 4 to 7 and 8 to 11 theirs.
+    assert {i for rule, i in judged if rule == "turn"} == {1, 14}
+    assert {i for rule, i in judged if rule == "waypoint"} == {0, 1, 14, 15}
+    assert {i for rule, i in judged if rule == "slope"} == {0, 1, 3, 7, 11, 13, 14}
+    assert {i for rule, i in judged if rule == "corridor"} == {0, 14}
 
 
 @pytest.mark.parametrize("limits", [{"surveys": "path"}, {}])
@@ -169,6 +174,112 @@ def test_photos_that_a_waypoint_counted_early_costs() -> None:
     first = photo_lines(judge(setup, fly_path(setup, radius=1.0)))[0]
     assert "2 of 21 photos missed" in first.reason
     assert "its first 0 m and last 91 m are lost" in first.reason
+
+
+# A camera that sees 5 m across and 2 m along for each of its height: of 500 m by 200 m from 100 m above ground.  Of it
+# 60 % beside, 200 m apart, and 75 % along, a photo each 50 m.
+CAMERA = Camera(across=5.0, along=2.0, front=0.75, side=0.6)
+
+
+# m.  Arcs that fit between lines 200 m apart, so that these are flown where they are drawn.
+FITS = 90.0
+
+
+def photographed(**changed: float) -> FlightSetup:
+    setup = with_camera(1, 2)
+    return replace(
+        setup, mission=replace(setup.mission, survey_plans=(SurveyPlan(50.0, LEAD, replace(CAMERA, **changed)),))
+    )
+
+
+def overlaps(verdict: Verdict) -> dict[str, Finding]:
+    return {item.check: item for item in verdict.findings if item.rule == "survey" and item.check}
+
+
+def test_overlap_as_drawn_is_what_was_asked_for() -> None:
+    setup = photographed()
+    for verdict in (judge(setup, fly_path(setup, radius=FITS)), judge_geometry(setup)):
+        found = overlaps(verdict)
+        front, side = found["front overlap"], found["side overlap"]
+        low = [item.planned if item.flown is None else item.flown for item in (front, side)]
+        assert low == pytest.approx([75.0, 60.0], abs=0.3)
+        assert (front.limit, side.limit) == pytest.approx((65.0, 50.0))
+        assert (front.ok, side.ok) == (True, True)
+    assert (
+        "front overlap 75 % at the least (line 1: photos 50 m apart, 100 m above ground), 75 % asked for"
+        in front.reason
+    )
+    # Without a camera nothing is said of it.
+    assert overlaps(judge(with_camera(1, 2), fly_path(with_camera(1, 2)))) == {}
+
+
+@pytest.mark.parametrize(("aside", "ok"), [(49.0, True), (51.0, False)])
+def test_lines_apart_overlap_less(aside: float, ok: bool) -> None:
+    """The first line so far to the left, 250 m from the second: 500 m of photo beside leave 50 % there.
+
+    50 m beside their line photos count: 45 m, and the rest the second line.
+    """
+    setup = photographed()
+    left = lambda s: np.where(s < LEAD + LENGTH + LEAD, -45.0, 0.0) + np.where(second(s), -(aside - 45.0), 0.0)  # noqa: E731
+    side = overlaps(judge(setup, fly_path(setup, radius=FITS, across=left)))["side overlap"]
+    assert side.flown == pytest.approx(100.0 * (1.0 - (200.0 + aside) / 500.0), abs=0.2)
+    assert side.ok is ok
+    assert f"lines 1 and 2: {200.0 + aside:.0f} m apart, 100 m above ground), 60 % asked for" in side.reason
+
+
+def second(s: np.ndarray) -> np.ndarray:
+    """Whether places along the path are on the second line, or near."""
+    arc = (0.5 * math.pi - 2.0) * FITS
+    begin = 2.0 * LEAD + LENGTH + APART + LEAD + 2.0 * arc
+    return (s > begin - 50.0) & (s < begin + LENGTH + 50.0)
+
+
+def test_photos_from_lower_show_less() -> None:
+    """9 m lower the first line's photos are 455 m by 182 m: the next follows after 50 m, those beside have 500 m."""
+    setup = photographed()
+    found = overlaps(
+        judge(setup, fly_path(setup, radius=FITS, up=lambda s: np.where(s < 2.0 * LEAD + LENGTH - 150.0, -9.0, 0.0)))
+    )
+    assert found["front overlap"].flown == pytest.approx(100.0 * (1.0 - 50.0 / 182.0), abs=0.2)
+    assert found["side overlap"].flown == pytest.approx(100.0 * (1.0 - 200.0 / (0.5 * (455.0 + 500.0))), abs=0.2)
+
+
+@pytest.mark.parametrize(("interval", "front", "ok"), [(1.9, 75.0, True), (2.75, 65.6, True), (2.85, 64.4, False)])
+def test_a_camera_takes_its_time(interval: float, front: float, ok: bool) -> None:
+    """At 25 m/s a photo each 50 m is one each 2 s."""
+    setup = photographed(interval=interval)
+    found = overlaps(judge(setup, fly_path(setup, radius=FITS)))["front overlap"]
+    assert found.flown == pytest.approx(front, abs=0.2)
+    assert found.ok is ok
+    assert ("apart, one each" in found.reason) is (interval > 2.0)
+
+
+def test_only_photos_that_can_be_used_overlap() -> None:
+    """What is flown 80 m beside its line is lost, and was said to be: nothing is asked of the lines beside it."""
+    setup = photographed()
+    side = overlaps(
+        judge(setup, fly_path(setup, radius=FITS, across=lambda s: np.where(s < LEAD + 0.5 * LENGTH, -80.0, 0.0)))
+    )
+    assert side["side overlap"].flown == pytest.approx(60.0, abs=0.3)
+
+
+def test_lines_that_bend_are_measured_along_their_bends() -> None:
+    """Three of 500 m and 500 m at 30 degrees, flown by arcs: 90 m * 30° of each are banked; rolling takes 17 m."""
+    half, points = math.radians(15.0), list[list[float]]()
+    for k in range(3):
+        d = APART * k
+        corner = [d, 500.0 - d * math.tan(half)]
+        end = [500.0 * 0.5 + d * math.cos(2 * half), 500.0 + 500.0 * math.cos(2 * half) - d * 0.5]
+        line = [[d, -LEAD], [d, 0.0], corner, end, [end[0] + LEAD * 0.5, end[1] + LEAD * math.cos(2 * half)]]
+        points += [[*place, UP] for place in (line if k % 2 == 0 else reversed(line))]
+    setup = make_setup(points, limits={"surveys": "lines"})
+    flown = photo_lines(judge(setup, fly_path(setup, radius=FITS)))
+    assert [item.place.index for item in flown] == [1, 6, 11]
+    arc = FITS * 2.0 * half
+    # A line 200 m to the right of another is 2 * 200 m * tan(15°) shorter.
+    for k, item in enumerate(flown):
+        length = 1000.0 - k * 2.0 * APART * math.tan(half)
+        assert 100.0 * (1.0 - (arc + 17.0) / length) <= item.flown <= 100.0 * (1.0 - arc / length)
 
 
 def test_two_lines_are_no_survey() -> None:

@@ -1,0 +1,115 @@
+"""What would help a survey, found among flights that pass or fail by a rule of the test's own."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from flight.mission.survey_layout import turn_around_of
+from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.measures.route_requirements import surveys_of
+from logs.verdict.places import FLIGHT, Place
+from planfly import survey_remedies as remedies
+from planfly.api.flying import opened_mission
+from planfly.api.planning import changed_scenario
+from planfly.open_mission import OpenedMission
+from planfly.survey_remedies import TriedRemedies
+
+FIELD = Path(__file__).with_name("commands") / "field.waypoints"
+# Whether lines can be used, and what else fails with what margin, of a flight with these turn-arounds, m.
+Answer = Callable[[float], tuple[bool, dict[str, float]]]
+
+
+def verdict_of(setup: FlightSetup, answer: Answer) -> Verdict:
+    [survey] = surveys_of(setup)
+    usable, failed = answer(turn_around_of(setup.route, survey))
+    findings: list[Finding] = [
+        make_finding("survey", Place("leg", line.first), ok=usable, reason="", flown=90.0, limit=95.0, margin=-5.0)
+        for line in survey.lines
+    ]
+    findings += [make_finding(rule, FLIGHT, ok=False, reason="", margin=margin) for rule, margin in failed.items()]
+    flyable = usable and not failed
+    return Verdict(
+        tuple(findings), flyable=flyable, complete=True, lines=(f"fails by {sorted(failed)}",), level="flown"
+    )
+
+
+@dataclass
+class Flights:
+    """Flies by a test, and keeps the turn-arounds that it flew."""
+
+    answer: Answer
+    flown: list[float] = field(default_factory=list)
+
+    def __call__(self, setup: FlightSetup, *_: Any, **__: Any) -> Any:
+        self.flown.append(round(turn_around_of(setup.route, surveys_of(setup)[0])))
+        return SimpleNamespace(verdict=verdict_of(setup, self.answer))
+
+
+def opened(path: Path) -> OpenedMission:
+    return opened_mission(
+        path, None, None, None, (), lambda world: changed_scenario(world, aircraft="x8", autopilot_law="ardupilot")
+    )
+
+
+def tried(monkeypatch: pytest.MonkeyPatch, answer: Answer, path: Path = FIELD) -> tuple[TriedRemedies, list[float]]:
+    flights, mission = Flights(answer), opened(path)
+    monkeypatch.setattr(remedies, "fly_and_judge", flights)
+    found = remedies.survey_remedies(mission.setup, mission.airframe, verdict_of(mission.setup, answer))
+    return found, flights.flown
+
+
+def test_the_least_turn_around_that_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, flown = tried(monkeypatch, lambda metres: (metres >= 130.0, {}))
+    [longer] = found.remedies
+    assert (longer.kind, longer.current, longer.value, longer.turn_around) == ("turn-around", 0.0, 150.0, 150.0)
+    # By halves of the twelve.
+    assert flown[:4] == [150.0, 75.0, 100.0, 125.0]
+    assert found.nearest is None
+
+
+def test_one_with_which_the_battery_does_not_last_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then lines are not flown at all: that says nothing against shorter ones."""
+
+    def answer(metres: float) -> tuple[bool, dict[str, float]]:
+        return 190.0 <= metres <= 225.0, {} if metres <= 225.0 else {"energy": -3.0, "completion": -9.0}
+
+    found, flown = tried(monkeypatch, answer)
+    assert [(one.kind, one.value) for one in found.remedies] == [("turn-around", 200.0)]
+    assert flown[:4] == [150.0, 250.0, 175.0, 200.0]
+
+
+def test_what_comes_nearest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, _ = tried(monkeypatch, lambda metres: (metres >= 180.0, {"energy": -3.0} if metres > 20.0 else {}))
+    assert found.remedies == ()
+    assert found.nearest is not None
+    assert (found.nearest.usable, found.nearest.lines) == (4, 4)
+    assert (found.nearest.what, found.nearest.verdict.headline) == ("turn-arounds of 250 m", "fails by ['energy']")
+
+
+@pytest.mark.parametrize(("margin", "passes"), [(-31.0, True), (-33.0, False)])
+def test_what_failed_before_may_fail_as_much(monkeypatch: pytest.MonkeyPatch, margin: float, passes: bool) -> None:
+    """By 22 m before; ten metres of a corridor are what a person would notice."""
+    found, _ = tried(monkeypatch, lambda metres: (metres > 0.0, {"corridor": margin if metres > 0.0 else -22.0}))
+    assert bool(found.remedies) is passes
+    # What did not fail before may not at all.
+    found, _ = tried(monkeypatch, lambda metres: (metres > 0.0, {"corridor": -0.1} if metres > 0.0 else {}))
+    assert found.remedies == ()
+
+
+def test_why_no_other_layout_was_tried(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A change of speed between two lines would be lost."""
+    rows = FIELD.read_text(encoding="ascii").splitlines()
+    speed = "6\t0\t2\t178\t0\t17\t-1\t0\t0\t0\t0\t1"
+    at = next(k for k, row in enumerate(rows) if row.startswith("6\t"))
+    # Behind a waypoint it goes with the line: between the two of a turn-around it is its own.
+    lead = rows[at].replace("6\t", "5\t", 1).replace("47.30449915415902", "47.3054")
+    path = tmp_path / "a.waypoints"
+    path.write_text("\n".join([*rows[:at], lead, speed, *rows[at:]]) + "\n", encoding="ascii")
+    found, flown = tried(monkeypatch, lambda metres: (False, {}), path)
+    assert found.kept == "item 7, DO_CHANGE_SPEED, stands between two lines"
+    assert set(flown) <= {0.0}
