@@ -67,7 +67,7 @@ class ImportOptions:
     fences: NamedFences = field(default_factory=NamedFences)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class ImportedFlight:
     """An imported flight, judged.
 
@@ -85,6 +85,13 @@ class ImportedFlight:
     def lossy(self) -> bool:
         """Whether some of the log could not be read."""
         return self.setup.source is not None and self.setup.source.damage.lossy
+
+    def __repr__(self) -> str:
+        return f"<ImportedFlight {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return self.verdict._repr_html_() + self.track._repr_html_()
 
 
 def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) -> ImportedFlight:

@@ -558,7 +558,7 @@ def at_time(scenario: Scenario, at: str | None) -> Scenario:
     try:
         parse_span(at)
     except ValueError as error:
-        raise ScenarioError.of_argument("at", at, str(error), shown="") from error
+        raise ScenarioError.of_argument("at", at, str(error)) from error
     spec = scenario.spec.model_copy(update={"at": at})
     zones = make_zones(_active_zones(spec), scenario.name, scenario.origin, scenario.terrain)
     return replace(scenario, spec=spec, zones=zones)

@@ -189,8 +189,10 @@ def _flown(
     with open_store(base, goal, place.folder, resume=place.resume) as store:
         with stage("flying") as advance:
             estimate = fly_campaign(base, goal, workers, store, advance)
-        if not keep:
-            return CampaignResult(summarise(base, goal, estimate, store), read_table(table))
+        brief = None if keep else summarise(base, goal, estimate, store)
+    # The store holds its table as long as it is open.
+    if brief is not None:
+        return CampaignResult(brief, read_table(table))
     with stage("reporting") as advance:
         summary = finish_campaign(base, goal, estimate, place.folder, line, advance)
     return CampaignResult(summary, read_table(table), table)

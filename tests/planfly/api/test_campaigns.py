@@ -12,12 +12,14 @@ from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
 from planfly.campaigns.find_winds import WindsFound, WindsGoal
 from planfly.campaigns.flight_row import FlightRow, fly_one
-from planfly.campaigns.fly_campaign import open_store
+from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report import OutputDirectory
-from planfly.campaigns.statistics.decision import Goal
+from planfly.campaigns.statistics.decision import Estimate, Goal
 from planfly.campaigns.statistics.wind_boundary import Direction
-from planfly.campaigns.tables import DATABASE, AskedFlight, WindsStore
-from tests.planfly.campaigns.made_campaigns import short_base, table, write_short
+from planfly.campaigns.tables import DATABASE, AskedFlight, Store, WindsStore
+from planfly.campaigns.worker_pool import Workers
+from planfly.stages import Advance
+from tests.planfly.campaigns.made_campaigns import all_fly, short_base, table, write_short
 from tests.planfly.campaigns.statistics.made_directions import no_numbers
 
 FLIGHTS = tuple((number, speed, speed < 8.0) for number in range(4) for speed in (2.0, 6.0, 7.5, 8.5, 10.0, 14.0))
@@ -143,3 +145,19 @@ def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path) -> None:
     assert found.columns["outcome"].tolist() == [fly_one(bases[1], k).outcome for k in (0, 1)]
     page = (tmp_path / "c" / "report.html").read_text(encoding="utf-8")
     assert f"planfly campaign {tmp_path / 'c' / 'plan.json'} --flights 2" in page
+
+
+def test_a_campaign_whose_folder_does_not_stay_gives_its_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the flights made up, which a pool would fly: the store holds its table as long as it is open."""
+
+    def fly(base: CampaignBase, goal: Goal, workers: Workers, store: Store, advance: Advance) -> Estimate:
+        for index in range(goal.flights):
+            store.add(all_fly(base, index))
+        return fly_campaign(base, goal, workers, store, advance)
+
+    monkeypatch.setattr(campaigns, "fly_campaign", fly)
+    plan = planfly.plan("paper-07", seed=1)
+    found = planfly.campaign(plan, flights=5, wind=(4.0, 90.0))
+    assert found.columns["outcome"].tolist() == ["flyable"] * 5
+    assert found.table is None
+    assert found.summary.estimate.tally.flown == 5
