@@ -254,7 +254,8 @@ def _found_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
     if not surveys:
         source = setup.mission.source
         raise MissionError(
-            f"{source}: no survey: at least three parallel lines beside each other are expected", file=source
+            f"{source}: no survey: at least three lines beside each other are expected, or two with photos along them",
+            file=source,
         )
     return surveys
 

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -36,20 +37,43 @@ def test_each_line_is_told_and_what_would_help_is_flown(
     assert "4 of 4 photo lines can be used" in capsys.readouterr().out
 
 
-def test_a_flight_and_its_log_say_the_same(tmp_path: Path) -> None:
+def test_a_flight_and_its_log_say_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     flown = planfly.fly(FIELD_SURVEY, aircraft="x8", autopilot_law="ardupilot", log=tmp_path / "f.mcap")
     assert [item.rule for item in flown.verdict.findings if item.ok is False] == ["survey"] * 4
     of_flight, of_log = planfly.survey(flown), planfly.survey(tmp_path / "f.mcap")
     assert of_flight.lines_of_lines == of_log.lines_of_lines
     assert repr(of_log) == f"<SurveyFound field.waypoints: {of_log.headline}>"
+    assert of_log.lines_of_lines[1] == "overlap not judged: the camera is not known (--camera)"
+    # 120 m up: 176 m by 117 m, a photo each 20 m; lines 60 m apart, each within 20 m of where it is drawn.
+    [seen] = planfly.survey(flown, camera=(23.5, 15.6, 16.0)).overlaps
+    assert seen is not None
+    assert seen.front == pytest.approx(1.0 - 20.0 / 117.0, abs=0.02)
+    assert 1.0 - 100.0 / 176.0 <= seen.side <= 1.0 - 60.0 / 176.0
+    # What was asked for is told beside it: 95 % along are 12 more than such photos give.
+    capsys.readouterr()
+    asked = ["survey", str(tmp_path / "f.mcap"), "--camera", "23.5x15.6,16,95,60", "--json", str(tmp_path / "a.json")]
+    assert main(asked) == 4
+    out = capsys.readouterr().out
+    assert "front overlap 8" in out
+    assert "95 % asked for" in out
+    [found] = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))["overlaps"]
+    assert (found["front"], found["front_asked"]) == (pytest.approx(seen.front, abs=1e-3), 0.95)
+    assert (found["side"], found["side_asked"]) == (pytest.approx(seen.side, abs=1e-3), 0.6)
+
+
+@pytest.mark.parametrize("camera", [(23.5, 15.6), (23.5, 0.0, 16.0), "23.5x15.6,16", (1.0, 1.0, 1.0, 70.0, 100.0), 5])
+def test_a_camera_that_is_none_is_one_line(camera: Any) -> None:
+    with pytest.raises(planfly.PlanflyError, match="the sensor across the way and along it and the focal length, mm"):
+        planfly.survey(FIELD_SURVEY, camera=camera)
 
 
 def test_what_is_no_survey_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = FIELD_SURVEY.read_text(encoding="ascii").splitlines()
     short = tmp_path / "short.waypoints"
-    short.write_text("\n".join(rows[:10]) + "\n", encoding="ascii")
+    # One line: two are a survey where photos are taken along them.
+    short.write_text("\n".join(rows[:7]) + "\n", encoding="ascii")
     assert main(["survey", str(short), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert "no survey: at least three parallel lines beside each other are expected" in said
+    assert "no survey: at least three lines beside each other are expected, or two with photos along them" in said
     assert said.count("\n") == 1
     assert not (tmp_path / "out").exists()
