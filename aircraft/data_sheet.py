@@ -513,8 +513,9 @@ def _meet(amiss: Callable[[Sequence[float]], list[float]], count: int, sheet: Da
     raise _no_propeller(sheet)
 
 
-# A step of the search, and where it ends, as logarithms of factors; amiss of what counts as met.
-_STEP, _BOUND, _MET = 1e-6, 2.5, 1e-7
+# A step for the slopes, the longest of the search, which is to find the nearest solution, and where it ends, as
+# logarithms of factors; amiss of what counts as met.
+_STEP, _LONGEST, _BOUND, _MET = 1e-6, 0.2, 2.5, 1e-7
 
 
 def _newton(amiss: Callable[[Floats], Floats], x: Floats) -> Floats | None:
@@ -525,7 +526,8 @@ def _newton(amiss: Callable[[Floats], Floats], x: Floats) -> Floats | None:
     off = amiss(x)
     for _ in range(100):
         slopes = np.array([(amiss(x + step) - amiss(x - step)) / (2.0 * _STEP) for step in _STEP * np.eye(x.size)]).T
-        whole, size = np.linalg.lstsq(slopes, -off, rcond=None)[0], 1.0
+        whole = np.linalg.lstsq(slopes, -off, rcond=None)[0]
+        size = min(1.0, _LONGEST / max(float(np.abs(whole).max()), 1e-12))
         while size > 1e-6:
             there = np.clip(x + size * whole, -_BOUND, _BOUND)
             if np.linalg.norm(left := amiss(there)) < np.linalg.norm(off):

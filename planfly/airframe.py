@@ -65,7 +65,7 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
     if parameters:
         # What a log stores is checked as a file is.
         autopilot = autopilot.restore(autopilot.with_parameters(**parameters).store())
-    airspeed = _airspeed(scenario, aircraft, autopilot)
+    airspeed = cruise_airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     limits = make_limits(scenario, envelope, airspeed, bank_limit(scenario, autopilot))
     return Airframe(aircraft, with_tracking(limits, autopilot, scenario), battery, autopilot)
@@ -101,8 +101,11 @@ def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
     return aircraft, aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
 
 
-def _airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:
-    """Airspeed until a mission sets one, m/s: the scenario's, that of a file of parameters, the aircraft's."""
+def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot) -> float:
+    """Airspeed until a mission sets one, m/s: the scenario's, that of a file of parameters, the aircraft's.
+
+    Raises ScenarioError for one that the aircraft cannot fly.
+    """
     stated, parameters = autopilot.stated_airspeed, autopilot.parameters
     if (airspeed := scenario.flight.airspeed_mps) is not None:
         file, field = scenario.name, "flight.airspeed_mps"

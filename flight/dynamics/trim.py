@@ -219,7 +219,13 @@ def straight(
     >>> 0.3 < level.throttle < 0.9, straight(model, 90.0, 500.0) is None
     (True, True)
     """
-    return trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
+    found = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
+    if found is None and near is None:
+        # With little power to spare the search fails from afar, and succeeds from the climb at the same airspeed.
+        steepest = full_throttle(simulator, airspeed, amsl)
+        if steepest is not None and steepest.climb >= climb:
+            found = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, steepest)
+    return found
 
 
 def full_throttle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:

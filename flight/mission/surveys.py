@@ -98,6 +98,14 @@ class Survey:
         """The waypoint at which it ends."""
         return self.lines[-1].last
 
+    def line(self, number: int) -> PhotoLine:
+        """One of its lines, in flying order."""
+        return self.lines[number]
+
+    def has_leg(self, leg: int) -> bool:
+        """Whether a leg belongs to it, its ways onto the first line and off the last included."""
+        return self.lines[0].begins - 1 <= leg <= self.lines[-1].ends
+
     def takes_photos(self) -> bool:
         """Whether items of the mission switch the camera on its lines."""
         return any(line.switched_on or line.switched_off or line.photo > 0.0 for line in self.lines)

@@ -6,13 +6,12 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from flight.autopilots.catalog import program_autopilot
-from logs.verdict.conditions import Conditions
-from planfly.airframe import choose_seed, load_airframe
+from flight.autopilots.catalog import load_autopilot, program_autopilot
+from logs.verdict.conditions import Conditions, conditions_of
+from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, load_airframe
 from planfly.arguments import check_arguments, is_wind
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import PLANNING
-from planfly.pipeline import planned_for
 from planfly.stages import stage
 from planfly.targets import file_target
 from planner.plan import Plan, plan_json, read_plan
@@ -312,7 +311,9 @@ def _stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> S
 
 def conditions_of_plan(plan: Plan) -> Conditions:
     """Aircraft, speed, weather, autopilot and ground that a plan is for."""
-    return planned_for(plan.scenario, load_airframe(plan.scenario))
+    aircraft, _ = find_airframe(plan.scenario)
+    autopilot = load_autopilot(plan.scenario, aircraft)
+    return conditions_of(plan.scenario, aircraft.name, cruise_airspeed(plan.scenario, aircraft, autopilot), autopilot)
 
 
 def what_blocks(plan: Plan) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import default_parameters as px4_parameters
+from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.verdict.findings import Fact, Finding, make_finding, verdict_json
@@ -204,7 +205,7 @@ def test_a_served_flight_tells_stations_which_parameter_decides(
     flown: tuple[JudgedFlight, Path], tmp_path: Path
 ) -> None:
     judged, _ = flown
-    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT)
+    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT, AUTO)
     served.write(judged.track)
     told = served.finish(judged.ended, lambda: False)
     deciding = judged.verdict.deciding
@@ -220,7 +221,7 @@ def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
     """At once, and after the airframe's flight of some 280 s: nothing is lost but what was not known yet."""
     judged, _ = flown
     asked = itertools.count()
-    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT)
+    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT, AUTO)
     served.write(judged.track)
     told = served.finish(judged.ended, lambda: next(asked) >= patience)
     assert not told.flyable

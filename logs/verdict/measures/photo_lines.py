@@ -223,7 +223,7 @@ class OverlapMeasure:
     line, apart, height, slow: where: the line's number from 0, m between photos, m above ground, and whether it is the
     camera that cannot take them any sooner.
     side: with those of the line beside; None where no two that can be used lie beside each other.
-    lines, between, heights: where: both lines' numbers, m between them, m above ground.
+    pair, between, heights: where: both lines' numbers, m between them, m above ground.
     """
 
     camera: Camera
@@ -233,7 +233,7 @@ class OverlapMeasure:
     height: float = math.nan
     slow: bool = False
     side: float | None = None
-    lines: tuple[int, int] = (-1, -1)
+    pair: tuple[int, int] = (-1, -1)
     between: float = math.nan
     heights: float = math.nan
 
@@ -332,7 +332,7 @@ def _beside(
             if measure.side is None or shares[k] < measure.side:
                 pair = (int(last[3, k]), number)
                 measure = replace(
-                    measure, side=float(shares[k]), lines=pair, between=float(gaps[k]), heights=float(heights[k])
+                    measure, side=float(shares[k]), pair=pair, between=float(gaps[k]), heights=float(heights[k])
                 )
         last[:, here] = now[:, here]
     return measure

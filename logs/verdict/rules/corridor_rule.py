@@ -22,7 +22,7 @@ def corridor_findings(
     return [
         _corridor(requirements, aligned, leg, geometric)
         for leg in range(requirements.legs)
-        if stated or not any(one.lines[0].begins - 1 <= leg <= one.lines[-1].ends for one in requirements.surveys)
+        if stated or not any(one.has_leg(leg) for one in requirements.surveys)
     ]
 
 

@@ -51,8 +51,8 @@ def _overlaps(requirements: RouteRequirements, aligned: AlignedTrack | None, sur
     if measure is None:
         return []
     sides = (
-        (FRONT, measure.front, measure.camera.front, survey.lines[measure.line]),
-        (SIDE, measure.side, measure.camera.side, survey.lines[measure.lines[1]]),
+        (FRONT, measure.front, measure.camera.front, survey.line(measure.line)),
+        (SIDE, measure.side, measure.camera.side, survey.line(measure.pair[1])),
     )
     out = []
     for check, share, asked, line in sides:
@@ -90,7 +90,7 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
         where = f"line {measure.line + 1}: photos {measure.apart:.0f} m{soonest}, {measure.height:.0f} m above ground"
     else:
         share, asked = measure.side, measure.camera.side
-        one, other = sorted(measure.lines)
+        one, other = sorted(measure.pair)
         where = f"lines {one + 1} and {other + 1}: {measure.between:.0f} m apart, {measure.heights:.0f} m above ground"
     if share is None:
         return ""

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live import link
 from logs.recording.reader import read_log
 from planfly.campaigns.tables import read_table
 from planfly.cli import main
@@ -26,6 +25,7 @@ from tests.planfly.conftest import FIELD, Served
 from tests.planfly.misuse.every_command import SHORT
 from tests.soak import SOAK
 from tests.stations import UdpStation, item
+from world import running_clock
 
 LAT, LON = 460_000_000, 80_000_000
 ROUTE = [
@@ -84,7 +84,7 @@ def test_a_replay_goes_on_where_it_was(
         now, waited = now + seconds + (3600.0 if waited == 0.0 else 0.0), waited + seconds
 
     monkeypatch.setattr(replay, "time", SimpleNamespace(sleep=sleep))
-    monkeypatch.setattr(link, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(running_clock, "time", SimpleNamespace(monotonic=lambda: now))
     assert main(["replay", str(tmp_path / "f.mcap"), "--speed", "4"]) == 0
     assert "s  end " in capsys.readouterr().out
     # The hour counts as a second of the 3.
