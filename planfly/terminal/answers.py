@@ -893,7 +893,7 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | Non
 
 def overlap_entry(one: OverlapMeasure) -> OverlapEntry:
     """A survey's overlap as an answer has it."""
-    low, high = sorted(one.lines)
+    low, high = sorted(one.pair)
     return OverlapEntry(
         front=None if one.front is None else round(one.front, 4),
         front_asked=one.camera.front,

@@ -177,7 +177,7 @@ def test_the_time_of_a_log_is_its_own(mission: Path, capsys: pytest.CaptureFixtu
     assert "f.mcap: --at 2026-05-03T10:00Z: a log is exported with the zones of its own time" in capsys.readouterr().err
     for command in (["export", str(mission), "map.kml"], ["serve", str(mission), "--bind", "127.0.0.1:0"]):
         assert main([*command, "--at", "tomorrow"]) == 2
-        assert "--at: 'tomorrow': a time by ISO 8601 is expected" in capsys.readouterr().err
+        assert "--at tomorrow: " in capsys.readouterr().err
 
 
 def test_a_file_that_holds_no_fence_is_named(mission: Path) -> None:
