@@ -156,6 +156,17 @@ def find_aircraft(name: str) -> Aircraft:
     return read_aircraft(Path(name)) if names_folder(name) else load_aircraft(name)
 
 
+def find_again(name: str, asked: str) -> Aircraft:
+    """The aircraft that a setup or a log calls by its name, where its scenario asks for it by name or by folder.
+
+    Raises FlightError as `load_aircraft`.
+
+    >>> find_again("c172x", "aerosonde").name
+    'c172x'
+    """
+    return find_aircraft(asked if names_folder(asked) and Path(asked).name == name else name)
+
+
 def read_aircraft(folder: Path) -> Aircraft:
     """The aircraft described by ``<folder>/<folder's name>.toml``.
 

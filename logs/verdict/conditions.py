@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.catalog import find_aircraft
+from aircraft.catalog import find_again
 from aircraft.tracking import CORRIDOR_RADII
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
@@ -70,7 +70,7 @@ def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot:
     mass = None
     # A log's aircraft need not be on this machine.
     with suppress(FlightError):
-        mass = find_aircraft(aircraft).mass
+        mass = find_again(aircraft, table.aircraft).mass
     return Conditions(
         aircraft=aircraft,
         mass_kg=mass,

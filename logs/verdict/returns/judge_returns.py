@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.catalog import Aircraft, find_aircraft
+from aircraft.catalog import Aircraft, find_again
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
@@ -370,7 +370,7 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         source = setup.mission.source
         message = f"{source}: home: none is stated, so there is nowhere to return to"
         raise MissionError(message, file=source, field="home")
-    aircraft: Aircraft = find_aircraft(setup.aircraft)
+    aircraft: Aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
     own = setup.autopilot.law.parameters
     parameters = own if isinstance(own, ArduPilotParameters) else load_parameters(aircraft)
     return ReturnWorld(

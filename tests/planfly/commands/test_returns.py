@@ -8,6 +8,7 @@ import pytest
 import planfly
 from planfly.cli import main
 from tests.logs.verdict.returns.hill import SCENARIO, mission_text
+from tests.own_aircraft import change_model
 
 
 @pytest.fixture
@@ -56,6 +57,15 @@ def test_without_terrain_nothing_is_known(hill: Path, capsys: pytest.CaptureFixt
     assert "fly where the ground is not known" in out
     assert "--terrain names an elevation file" in out
     assert "engine out: not judged: there is no elevation file" in out
+
+
+def test_an_aircraft_in_a_folder_returns_too(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    change_model(hill, "aerosonde", "own")
+    asked = ["hill.waypoints", "--scenario", "hill.toml", "--aircraft", "./own"]
+    assert main(["returns", *asked, "--every", "50"]) in (0, 4)
+    assert "it returns: the pilot's RTL" in capsys.readouterr().out
+    assert main(["check", *asked]) == 0
+    assert "Aircraft: own, 11 kg" in capsys.readouterr().out
 
 
 def test_parameters_make_it_safe(hill: Path) -> None:
