@@ -39,7 +39,7 @@ class SurveyRemedy:
     verdict: of the flight.
     mission: as it was flown.
     length: of its route, m.
-    turn_around: m, of a layout; NaN where it stays as it is.
+    turn_around: m, of a layout; NaN where it stays as it is.  lead_in: m before its first line, where that is more.
     """
 
     kind: RemedyKind
@@ -51,6 +51,7 @@ class SurveyRemedy:
     mission: Mission
     length: float
     turn_around: float = math.nan
+    lead_in: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +203,7 @@ class _Trials:
 
     def turn_around(self) -> SurveyRemedy | None:
         """The least turn-around that passes, of those longer than the survey's."""
-        found = self._least(1, [one for one in TURN_AROUNDS if one > self._now + 1.0])
+        found = self._least(1, [one for one in TURN_AROUNDS if one > self._now + 1.0], 0.0)
         return None if found is None else SurveyRemedy("turn-around", "", self._now, found[0], "m", *found[1], found[0])
 
     def side(self) -> SurveyRemedy | None:
@@ -213,17 +214,21 @@ class _Trials:
         return None if passed is None else SurveyRemedy("side", "", 0.0, 1.0, "", *passed, self._now)
 
     def every(self, at_most: float) -> SurveyRemedy | None:
-        """The least number of lines to go on by, with turn-arounds shorter than these (m) that pass with it."""
+        """The least number of lines to go on by, with turn-arounds shorter than these (m) that pass with it.
+
+        Onto the first line leads what passes between all of them.
+        """
+        lead_in = at_most if math.isfinite(at_most) else 0.0
         tried = [self._now, *(one for one in TURN_AROUNDS if self._now + 1.0 < one < at_most)]
         for every in EVERY:
             if 2 * every > max(len(survey.lines) for survey in self._surveys):
                 break
-            found = self._least(every, tried)
+            found = self._least(every, tried, lead_in)
             if found is not None:
-                return SurveyRemedy("every", "", 1.0, float(every), "lines", *found[1], found[0])
+                return SurveyRemedy("every", "", 1.0, float(every), "lines", *found[1], found[0], lead_in)
         return None
 
-    def _least(self, every: int, tried: Sequence[float]) -> tuple[float, _Laid] | None:
+    def _least(self, every: int, tried: Sequence[float], lead_in: float) -> tuple[float, _Laid] | None:
         """The least of some rising turn-arounds (m) with which all lines can be used, by halves, where it passes.
 
         One with which the flight does not get to its end is too long: the store of energy does not last.
@@ -233,7 +238,7 @@ class _Trials:
         while high - low > 1:
             middle = (low + high) // 2
             metres = tried[middle]
-            layout = SurveyLayout(metres, every)
+            layout = SurveyLayout(metres, every, lead_in=lead_in)
             laid = self._laid(layout, f"{order}turn-arounds of {metres:.0f} m")
             if laid is None:
                 return None

@@ -62,7 +62,9 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
     texts = [overlap_text(measure, check) for check in (FRONT, SIDE)]
     if measure.front is None:
         texts[0] = "front overlap not judged: how far apart photos are taken is not stated, or none can be used"
-    return tuple(text for text in texts if text)
+    if measure.side is None:
+        texts[1] = "side overlap not judged: no photos that can be used lie beside each other"
+    return tuple(texts)
 
 
 def kept_overlap(measure: OverlapMeasure | None) -> bool:
@@ -102,7 +104,9 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
         case "turn-around":
             change = f"turn-arounds of {remedy.value:.0f} m instead of {remedy.current:.0f} m"
         case "every":
-            change = f"every {nth(round(remedy.value))} line first, with turn-arounds of {remedy.turn_around:.0f} m"
+            first = f" and {remedy.lead_in:.0f} m onto the first" if remedy.lead_in > remedy.turn_around else ""
+            order = f"every {nth(round(remedy.value))} line first"
+            change = f"{order}, with turn-arounds of {remedy.turn_around:.0f} m{first}"
         case "course":
             change = f"lines on course {remedy.value:.0f}° instead of {remedy.current:.0f}°"
         case "parameter":

@@ -33,12 +33,14 @@ class SurveyLayout(NamedTuple):
     every: 2 for every second line first and then the others, from the same side on; 3 for every third, and so on.
     course: of the lines, rad; None for the one they have.
     backwards: whether to begin with the line on the other side.
+    lead_in: m straight on before the first line, where that is more: one comes to it from anywhere.
     """
 
     turn_around: float
     every: int = 1
     course: float | None = None
     backwards: bool = False
+    lead_in: float = 0.0
 
 
 class _Line(NamedTuple):
@@ -119,8 +121,8 @@ def with_layout(
     (first, _), (_, end) = items.lines[0], items.lines[-1]
     made = [*mission.items[: items.before]]
     made += _without_leads(mission, route, mission.items[items.before : first], survey.lines[0].first, longest)
-    for line in _ordered(lines, layout):
-        made += _with_ends(line, layout.turn_around, origin)
+    for number, line in enumerate(_ordered(lines, layout)):
+        made += _with_ends(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
     made += _without_leads(mission, route, mission.items[end : items.behind], survey.lines[-1].last, longest)
     # Two items of one number cannot be told apart: all are numbered anew.
     numbered = [replace(item, seq=k) for k, item in enumerate([*made, *mission.items[items.behind :]], 1)]
@@ -210,18 +212,15 @@ def _reversed(line: _Line) -> _Line:
     )
 
 
-def _with_ends(line: _Line, turn_around: float, origin: GeoOrigin) -> list[MissionItem]:
-    """A line's items between the waypoints at which its turn-arounds end and begin."""
-    if turn_around <= 0.0:
-        return list(line.items)
+def _with_ends(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
+    """A line's items between the waypoints at which its turn-arounds end and begin, and that of a longer lead."""
     steps = [item for item in line.items if is_navigation(item.command)]
     into, out = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
-    before, behind = (turn_around * way / max(float(np.hypot(*way)), 1e-9) for way in (into, out))
-    return [
-        _waypoint(steps[0], line.corners[0] + before, origin),
-        *line.items,
-        _waypoint(steps[-1], line.corners[-1] + behind, origin),
-    ]
+    into, out = (way / max(float(np.hypot(*way)), 1e-9) for way in (into, out))
+    leads = sorted({turn_around, max(turn_around, lead_in)} - {0.0}, reverse=True)
+    made = [_waypoint(steps[0], line.corners[0] + metres * into, origin) for metres in leads]
+    made += line.items
+    return made if turn_around <= 0.0 else [*made, _waypoint(steps[-1], line.corners[-1] + turn_around * out, origin)]
 
 
 def _waypoint(like: MissionItem, place: Floats, origin: GeoOrigin) -> MissionItem:

@@ -406,16 +406,28 @@ def _without_leads(
             if shorter != lines:
                 return shorter
     lengths = leg_runs(points)
-    if any(line.last - line.first < _LEGS_WITH_LEADS for line in lines):
+    if any(line.ends - line.begins < _LEGS_WITH_LEADS for line in lines):
         return lines
     # Waypoints at equal distances along a line are no leads.
     if all(abs(float(lengths[line.first] - lengths[line.first + 1])) <= _SAME_LEAD for line in lines):
         return lines
-    for end in ([line.first for line in lines], [line.last - 1 for line in lines]):
-        leads = lengths[end]
-        if float(np.ptp(leads)) > _SAME_LEAD:
-            return lines
-    return tuple(line._replace(first=line.first + 1, last=line.last - 1) for line in lines)
+    into, *_, out = lines
+    leads = [lengths[line.first] for line in lines[1:]] + [lengths[line.last - 1] for line in lines[:-1]]
+    if float(np.ptp(leads)) > _SAME_LEAD:
+        return lines
+    # The way onto the first line and off the last may be longer, so that a lead like the others is looked for; or the
+    # camera tells, which goes on with the first line's photos and off with the last's.
+    alike = np.abs(lengths - np.median(leads)) <= _SAME_LEAD
+    begins = np.flatnonzero(alike[into.first : into.last - 1]) + into.first + 1
+    ends = np.flatnonzero(alike[out.first + 1 : out.last]) + out.first + 1
+    first = [into.first] if into.first > into.begins else begins.tolist()
+    last = [out.last] if out.last < out.ends else ends.tolist()
+    if not (first and last):
+        return lines
+    shorter = [line._replace(first=line.first + 1, last=line.last - 1) for line in lines]
+    shorter[0] = shorter[0]._replace(first=first[0])
+    shorter[-1] = shorter[-1]._replace(last=last[-1])
+    return tuple(shorter)
 
 
 def _without_lead(points: Floats, line: PhotoLine, lead: float) -> PhotoLine:

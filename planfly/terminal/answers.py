@@ -820,6 +820,10 @@ class SurveyRemedyEntry:
     current: float
     value: float
     unit: str
+    turn_around_m: float | None
+    """Of another layout."""
+    lead_in_m: float
+    """Before its first line, where that is more."""
     length_m: float
     """Of the way."""
 
@@ -913,6 +917,7 @@ def survey_remedy_entry(one: SurveyRemedy) -> SurveyRemedyEntry:
     """What would help as an answer has it."""
     return SurveyRemedyEntry(
         kind=one.kind, name=one.name, current=round(one.current, 3), value=round(one.value, 3), unit=one.unit,
+        turn_around_m=None if math.isnan(one.turn_around) else round(one.turn_around, 1), lead_in_m=one.lead_in,
         length_m=round(one.length, 1),
     )  # fmt: skip
 

@@ -1,5 +1,6 @@
 """What would help a survey, found among flights that pass or fail by a rule of the test's own."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,7 @@ from planfly.api.flying import opened_mission
 from planfly.api.planning import changed_scenario
 from planfly.open_mission import OpenedMission
 from planfly.survey_remedies import TriedRemedies
+from planfly.survey_text import remedy_text
 
 FIELD = Path(__file__).with_name("commands") / "field.waypoints"
 # Whether lines can be used, and what else fails with what margin, of a flight with these turn-arounds, m.
@@ -70,6 +72,34 @@ def test_the_least_turn_around_that_is_enough(monkeypatch: pytest.MonkeyPatch) -
     # By halves of the twelve.
     assert flown[:4] == [150.0, 75.0, 100.0, 125.0]
     assert found.nearest is None
+
+
+def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first line needs 130 m whatever the others need, which lie further from each other."""
+
+    def answer(metres: float) -> tuple[bool, dict[str, float]]:
+        return metres >= 130.0, {}
+
+    flights, mission = Flights(answer), opened(FIELD)
+
+    def fly(setup: FlightSetup, *rest: Any, **more: Any) -> Any:
+        [survey] = surveys_of(setup)
+        first = survey.lines[0]
+        lead_in = math.dist(setup.route.waypoints[first.begins], setup.route.waypoints[first.first])
+        if abs(survey.offsets[1]) > 100.0 and lead_in >= 130.0:
+            flights.answer = lambda metres: (metres >= 45.0, {})
+        found = flights(setup, *rest, **more)
+        flights.answer = answer
+        return found
+
+    monkeypatch.setattr(remedies, "fly_and_judge", fly)
+    found = remedies.survey_remedies(mission.setup, mission.airframe, verdict_of(mission.setup, answer))
+    longer, second = found.remedies
+    assert (longer.kind, longer.value, longer.lead_in) == ("turn-around", 150.0, 0.0)
+    assert (second.kind, second.value, second.turn_around, second.lead_in) == ("every", 2.0, 50.0, 150.0)
+    assert remedy_text(second, 5000.0).startswith(
+        "every second line first, with turn-arounds of 50 m and 150 m onto the first: flown, and all lines can be used"
+    )
 
 
 def test_one_with_which_the_battery_does_not_last_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:

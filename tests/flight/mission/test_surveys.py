@@ -230,6 +230,16 @@ def test_leads_are_as_long_as_the_ground_station_says() -> None:
     assert find_surveys(route, camera, [(20.0, 60.0)])[0].lines[0].first == 0
 
 
+def test_leads_between_a_camera_that_goes_on_with_the_first_line_and_off_with_the_last() -> None:
+    """QGroundControl's camera for photos in turn-arounds, too, and leads laid out beyond its first line and last."""
+    items = [wp(*place) for place in grid(count=3, lead=100.0)]
+    items[2:2], items[12:12] = ["2 206 25 0 1 0 0 0 0"], ["2 206 0 0 1 0 0 0 0"]
+    read = mission(*items, home="36.5 -84.2 0")
+    route = make_route(read, ORIGIN, None, 15.0, False)
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert [(line.first, line.last) for line in found.lines] == [(1, 2), (5, 6), (9, 10)]
+
+
 def test_a_plan_is_its_surveys_by_the_way_between_photos() -> None:
     read, route = with_camera(*grid())
     [found] = find_surveys(route, camera_spacing(read, route))
@@ -308,7 +318,25 @@ def test_turn_arounds_are_laid_out_and_each_line_keeps_its_camera() -> None:
     assert places_of(longer) == pytest.approx(np.array(grid(count=3, lead=150.0)), abs=0.05)
 
 
-def test_every_second_line_goes_there_and_the_others_come_back() -> None:
+def test_a_longer_lead_onto_the_first_line() -> None:
+    """And what was laid out so is read as it was meant: leads of 100 m, and a way of 250 m onto the first."""
+    read, route = flown(grid(count=3))
+    [found] = find_surveys(route, camera_spacing(read, route))
+    made = with_layout(read, route, found, SurveyLayout(100.0, lead_in=250.0), ORIGIN)
+    assert made is not None
+    assert places_of(made) == pytest.approx(np.array([(0.0, -250.0), *grid(count=3, lead=100.0)]), abs=0.05)
+    again = make_route(made, ORIGIN, None, 15.0, False)
+    [laid] = find_surveys(again, camera_spacing(made, again))
+    assert [(line.first, line.last, line.begins, line.ends) for line in laid.lines] == [
+        (2, 3, 0, 4), (6, 7, 5, 8), (10, 11, 9, 12)
+    ]  # fmt: skip
+    assert turn_around_of(again, laid) == pytest.approx(100.0, abs=0.1)
+    # A shorter one is none.
+    same = with_layout(read, route, found, SurveyLayout(100.0, lead_in=60.0), ORIGIN)
+    assert same == with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
+
+
+def test_every_second_line_goes_first_and_the_others_follow() -> None:
     read, route = flown(grid(count=5))
     [found] = find_surveys(route, camera_spacing(read, route))
     made = with_layout(read, route, found, SurveyLayout(0.0, every=2), ORIGIN)
