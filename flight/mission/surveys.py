@@ -424,10 +424,10 @@ def _without_leads(
     last = [out.last] if out.last < out.ends else ends.tolist()
     if not (first and last):
         return lines
-    shorter = [line._replace(first=line.first + 1, last=line.last - 1) for line in lines]
-    shorter[0] = shorter[0]._replace(first=first[0])
-    shorter[-1] = shorter[-1]._replace(last=last[-1])
-    return tuple(shorter)
+    inner = [line._replace(first=line.first + 1, last=line.last - 1) for line in lines]
+    inner[0] = inner[0]._replace(first=first[0])
+    inner[-1] = inner[-1]._replace(last=last[-1])
+    return tuple(inner)
 
 
 def _without_lead(points: Floats, line: PhotoLine, lead: float) -> PhotoLine:
