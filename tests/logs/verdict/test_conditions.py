@@ -54,10 +54,10 @@ def test_weather_and_ground() -> None:
 
 
 def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> None:
+    def missing(name: str, _asked: str) -> None:
         raise FlightError(f"{name}: no such folder")
 
-    monkeypatch.setattr("logs.verdict.conditions.find_aircraft", missing)
+    monkeypatch.setattr("logs.verdict.conditions.find_again", missing)
     line, _ = lines_of(make_setup())
     assert " kg" not in line
 
