@@ -4,6 +4,7 @@ import contextlib
 import errno
 import os
 import re
+import shutil
 import stat
 import tempfile
 import tomllib
@@ -224,6 +225,21 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
     with unfinished(folder):
         folder.mkdir(mode=0o700)
         yield folder
+
+
+def remove_temporary_folders(process: int) -> bool:
+    """Remove the folders that a process which was killed has left from `temporary_folder`; whether none was there.
+
+    >>> with temporary_folder("planfly-") as folder:
+    ...     remove_temporary_folders(os.getpid()), folder.exists()
+    (False, False)
+    """
+    # As `temporary_folder` names them.
+    there = Path(tempfile.gettempdir()).glob("planfly-*-*")
+    left = [folder for folder in there if folder.name.split("-")[-2] == str(process)]
+    for folder in left:
+        shutil.rmtree(folder, ignore_errors=True)
+    return not left
 
 
 @contextlib.contextmanager

@@ -10,11 +10,13 @@ import shutil
 import signal
 import socket
 import sys
+import tempfile
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
 from planfly.process_setup import PARENT, prepare_child
+from world.interruption import remove_unfinished
 
 # s between two looks at whether the parent is there.
 _LOOK = 0.1
@@ -53,6 +55,7 @@ def socket_folders() -> list[Path]:
 
 def end(folders: list[Path]) -> None:
     """End at once, instead of taking apart all that was imported, and remove what a killed campaign leaves."""
+    remove_unfinished()
     for folder in folders:
         shutil.rmtree(folder, ignore_errors=True)
     os._exit(0)
@@ -86,5 +89,7 @@ if "multiprocessing.forkserver" in " ".join(sys.orig_argv):
         ):
             import_module(needed)
         load_kernels()
+    # The flight above has looked it up; each process that is forked has a TMPDIR of its own.
+    tempfile.tempdir = None
     # The processes that are forked from this one forget it.
     atexit.register(end, socket_folders())

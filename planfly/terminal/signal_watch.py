@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import NoReturn
 
+from world.files import remove_temporary_folders
 from world.interruption import Interrupted, interrupt, remove_unfinished
 
 ENDING = (signal.SIGINT, signal.SIGTERM)
@@ -124,10 +125,12 @@ def _leave(code: int) -> NoReturn:
     # Not imported here: there are no children where nobody has, and an import could wait for one under way.
     multiprocessing = sys.modules.get("multiprocessing")
     until = time.monotonic() + _REMOVING
+    killed = set[int]()
     while True:
         for child in multiprocessing.active_children() if multiprocessing is not None else ():
             child.kill()
+            killed.add(child.pid)
         # A killed child that was in the middle of making a file makes it yet, and its folder stays at first.
-        if remove_unfinished() or time.monotonic() > until:
+        if all([remove_unfinished(), *map(remove_temporary_folders, killed)]) or time.monotonic() > until:
             os._exit(code)
         time.sleep(_AGAIN)

@@ -233,6 +233,9 @@ def test_our_own_workers_listen_on_loopback_alone() -> None:
         # They have imported what takes long before a flight waits for it.
         for name in ("planfly.campaigns.flight_row", "scipy.stats"):
             assert list(client.run(imported, name).values()) == [True]
+        # What a killed one leaves among temporary files goes with the cluster's own folder.
+        (folder,) = client.run(tempfile.gettempdir).values()
+        assert Path(folder).name.startswith("planfly-workers-")
         if sys.platform == "linux":
             # And they do not hear Ctrl-C, which reaches all of a terminal's processes, from their first moment on.
             assert [hears_interrupt(number) for number in spawned_processes()] == [False]

@@ -134,6 +134,8 @@ def test_what_a_killed_child_makes_yet_is_removed_too(
             really(path, **how)
 
     class Child:
+        pid = 0
+
         def kill(self) -> None:
             killed.append(1)
 
@@ -151,3 +153,25 @@ def test_what_a_killed_child_makes_yet_is_removed_too(
         # Its children again, too: another may have been started.
         assert len(killed) == len(asked)
         assert watch.seconds < (0.8 if left else 0.3)
+
+
+def test_a_killed_childs_temporary_folder_goes_with_it(tmp_path: Path) -> None:
+    program = """
+import multiprocessing, time
+from planfly.terminal.signal_watch import end_process
+from world.files import temporary_folder
+def work():
+    with temporary_folder("planfly-model-") as folder:
+        (folder / "model.xml").write_text("half")
+        ready.release()
+        time.sleep(60)
+if __name__ == "__main__":
+    context = multiprocessing.get_context("fork")
+    ready = context.Semaphore(0)
+    context.Process(target=work).start()
+    ready.acquire()
+    end_process(5)
+"""
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    assert subprocess.run([sys.executable, "-c", program], env=environment, check=False).returncode == 5
+    assert list(tmp_path.iterdir()) == []
