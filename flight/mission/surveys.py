@@ -277,7 +277,7 @@ def _follow(points: Floats, runs: Sequence[tuple[int, int]], start: int) -> list
         first, here = chain[-1]
         for after in _next_runs(points, runs, here):
             bends = 0
-            while (len(chain) == 1 or here - bends > first) and _mirrored(points, runs, here, after, -1 - bends):
+            while (len(chain) == 1 or here - bends > first) and _go_on(points, runs, here, after, bends + 1):
                 bends += 1
             if len(chain) == 1:
                 chain = [(here - bends, here)]
@@ -299,9 +299,7 @@ def _next_runs(points: Floats, runs: Sequence[tuple[int, int]], here: int) -> li
         apart = _apart(points, runs[here], runs[after])
         if apart is None or between > max(_LONGEST_BETWEEN * max(own, length), _SHORT_BETWEEN):
             continue
-        # Of lines that bend here the other parts lie between.
-        if after - here <= 2 or not _mirrored(points, runs, here, after, 1):
-            found.append((after, apart, length))
+        found.append((after, apart, length))
     # A leg of a turn-around may lie beside lines, too: far beside them, and short.
     return [
         after
@@ -310,16 +308,10 @@ def _next_runs(points: Floats, runs: Sequence[tuple[int, int]], here: int) -> li
     ]
 
 
-def _mirrored(points: Floats, runs: Sequence[tuple[int, int]], here: int, after: int, by: int) -> bool:
-    """Whether the runs so many beyond one and before the other lie beside each other as those two do, and join them.
-
-    by: negative for the runs before the one and beyond the other.
-    """
-    one, other, step = here + by, after - by, 1 if by > 0 else -1
-    if not (0 <= one < len(runs) and 0 <= other < len(runs)):
-        return False
-    joints = (sorted((one, one - step)), sorted((other, other + step)))
-    if any(runs[before][1] != runs[behind][0] for before, behind in joints):
+def _go_on(points: Floats, runs: Sequence[tuple[int, int]], here: int, after: int, bends: int) -> bool:
+    """Whether two lines that turn around between two runs go on beside each other, so many bends away from there."""
+    one, other = here - bends, after + bends
+    if one < 0 or other >= len(runs) or runs[one][1] != runs[one + 1][0] or runs[other - 1][1] != runs[other][0]:
         return False
     wide, own = _apart(points, runs[here], runs[after]), _apart(points, runs[one], runs[other])
     lengths = [_line(points, runs[k])[2] for k in (one, other)]
@@ -409,7 +401,7 @@ def _without_leads(
     if any(line.ends - line.begins < _LEGS_WITH_LEADS for line in lines):
         return lines
     # Waypoints at equal distances along a line are no leads.
-    if all(abs(float(lengths[line.first] - lengths[line.first + 1])) <= _SAME_LEAD for line in lines):
+    if all(line.last - line.first > 1 and np.ptp(lengths[line.first :][:2]) <= _SAME_LEAD for line in lines):
         return lines
     into, *_, out = lines
     leads = [lengths[line.first] for line in lines[1:]] + [lengths[line.last - 1] for line in lines[:-1]]

@@ -154,15 +154,42 @@ def test_a_turn_around_of_many_legs() -> None:
     assert [(line.first, line.last) for line in found.lines] == [(0, 1), (7, 8), (9, 10)]
 
 
-def bent(count: int = 3, apart: float = 60.0, lead: float = 0.0) -> list[Place]:
-    """A corridor: 600 m north, then 600 m at 45 degrees to the east, there and back, each line to the right."""
+def test_a_short_leg_of_a_turn_around_far_beside_the_lines_is_none() -> None:
+    """Of 80 m, 250 m from the last line and 190 m from the next."""
+    bulb = [(120.0, 900.0), (250.0, 780.0), (252.0, 700.0), (150.0, 830.0)]
+    [found] = surveys([(0.0, 0.0), (0.0, 800.0), *bulb, (60.0, 800.0), (60.0, 0.0), (120.0, 0.0), (120.0, 800.0)])
+    assert [(line.first, line.last) for line in found.lines] == [(0, 1), (6, 7), (8, 9)]
+
+
+def test_lines_at_the_tip_of_a_field_are_short() -> None:
+    """Of 15, 30 and 45 m, 25 m apart, with 108 m and 122 m of turn-around between."""
+    tip = [(0.0, 0.0), (0.0, 15.0), (12.0, 75.0), (25.0, 30.0), (25.0, 0.0), (37.0, -60.0), (50.0, 0.0), (50.0, 45.0)]
+    [found] = surveys(tip)
+    assert [(line.first, line.last) for line in found.lines] == [(0, 1), (3, 4), (6, 7)]
+
+
+def test_a_line_between_long_ways_across_is_a_line() -> None:
+    """Every second of eleven lines of 500 m, 250 m apart, then the others: links of 500 m, and 2,250 m back."""
+    east = [500.0 * k for k in range(6)] + [250.0 + 500.0 * k for k in range(5)]
+    places = [(e, n) for k, e in enumerate(east) for n in ((0.0, 500.0) if k % 2 == 0 else (500.0, 0.0))]
+    assert [len(found.lines) for found in surveys(places)] == [6, 5]
+
+
+def test_the_way_to_a_line_is_no_part_of_it_where_the_next_link_lies_beside_it() -> None:
+    """600 m, 30 m beside a link of 60 m, is no bend of the first line."""
+    [found] = surveys([(600.0, -30.0), (0.0, -30.0), *grid(count=3)[1:]])
+    assert [(line.first, line.last) for line in found.lines] == [(1, 2), (3, 4), (5, 6)]
+
+
+def bent(count: int = 3, apart: float = 60.0, lead: float = 0.0, second: float = 600.0) -> list[Place]:
+    """A corridor: 600 m north, then as far again at 45 degrees to the east, there and back, each line to the right."""
     half = math.sqrt(0.5)
     out: list[Place] = []
     for k in range(count):
         d = apart * k
         # The bend of a line at this distance to the right lies on the bisector.
         corner = (d, 600.0 - d * math.tan(math.radians(22.5)))
-        end = (600.0 * half + d * half, 600.0 + 600.0 * half - d * half)
+        end = (second * half + d * half, 600.0 + second * half - d * half)
         line = [(d, 0.0), corner, end]
         if lead:
             line = [(d, -lead), *line, (end[0] + lead * half, end[1] + lead * half)]
@@ -172,8 +199,9 @@ def bent(count: int = 3, apart: float = 60.0, lead: float = 0.0) -> list[Place]:
 
 def test_lines_that_bend_are_lines_as_a_whole() -> None:
     """Neither their straight parts, with the others for turn-arounds, nor nothing."""
-    [found] = surveys(bent())
-    assert [(line.first, line.last) for line in found.lines] == [(0, 2), (3, 5), (6, 8)]
+    for second in (300.0, 600.0):
+        [found] = surveys(bent(second=second))
+        assert [(line.first, line.last) for line in found.lines] == [(0, 2), (3, 5), (6, 8)]
     assert found.offsets == pytest.approx([0.0, 60.0, 120.0], abs=0.5)
     assert (found.spacing, math.degrees(found.course)) == pytest.approx((60.0, 0.0), abs=0.5)
     assert found.turn_arounds() == [(2, 3), (5, 6)]
@@ -226,7 +254,11 @@ def test_leads_are_as_long_as_the_ground_station_says() -> None:
     assert ends[60.0] == [(2, 11), (16, 25), (30, 39)]
     # No waypoint is there: the mission was changed since.
     assert ends[0.0] == ends[45.0] == [(0, 13), (14, 27), (28, 41)]
+    read, route = on_all_along(grid(count=3, lead=100.0))
+    [found] = find_surveys(route, camera_spacing(read, route), [(25.0, 30.0)])
+    assert [(line.first, line.last) for line in found.lines] == [(1, 2), (5, 6), (9, 10)]
     # Of another way between photos nothing is said.
+    read, route = on_all_along(places)
     assert find_surveys(route, camera, [(20.0, 60.0)])[0].lines[0].first == 0
 
 
@@ -448,6 +480,20 @@ def test_what_is_at_the_place_of_the_last_lead_goes_with_it() -> None:
     made = with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
     assert made is not None
     assert places_of(made) == pytest.approx(np.array([*grid(count=3, lead=100.0), (500.0, 500.0)]), abs=0.05)
+
+
+def test_leads_of_the_first_line_and_the_last_go_though_another_has_none() -> None:
+    lines: list[str] = []
+    for k, place in enumerate(grid(count=3, lead=30.0)):
+        camera = [f"2 206 {25 if k % 4 == 1 else 0} 0 1 0 0 0 0"] if k % 4 in (1, 2) else []
+        lines += [] if k == 4 else [wp(*place), *camera]
+    read = mission(*lines, home="36.5 -84.2 0")
+    route = make_route(read, ORIGIN, None, 15.0, False)
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert turn_around_of(route, found) == 0.0
+    made = with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
+    assert made is not None
+    assert places_of(made) == pytest.approx(np.array(grid(count=3, lead=100.0)), abs=0.05)
 
 
 def test_lines_that_bend_get_leads_along_their_ends() -> None:
