@@ -7,7 +7,7 @@ do, as those of QGroundControl's corridor scan.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
@@ -206,14 +206,14 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
     >>> [(line.first, line.last) for line in survey.lines], survey.offsets, survey.spacing
     ([(0, 1), (2, 3), (4, 5)], (0.0, 60.0, 120.0), 60.0)
     """
-    runs, surveys, at = _straight_runs(route), [], 0
+    found, surveys, at = _straight_runs(route), list[Survey](), 0
     if camera.any():
         # Where items switch the camera, a line is where it is on.
-        runs = [(first, last) for first, last in runs if (camera[first:last] != 0.0).any()]
-    while at < len(runs):
-        chain = _chain(route.waypoints, runs, at)
-        lines = [(runs[first][0], runs[last][1]) for first, last in chain]
-        survey = _survey(route.waypoints, lines, camera, turn_arounds)
+        found = [(first, last) for first, last in found if (camera[first:last] != 0.0).any()]
+    runs = _Runs(route.waypoints, found)
+    while at < len(found):
+        chain = _chain(runs, at)
+        survey = _survey(runs, chain, camera, turn_arounds)
         if survey is None:
             at += 1
             continue
@@ -243,41 +243,106 @@ def _straight_runs(route: Route) -> list[tuple[int, int]]:
 # Which runs are lines of one survey.  A line is one straight run, or several that follow each other.
 
 
-def _chain(points: Floats, runs: Sequence[tuple[int, int]], start: int) -> list[tuple[int, int]]:
-    """First and last run of each line of a survey that begins with a run, or a little before or behind it."""
-    sofar = np.concatenate([[0.0], np.cumsum(leg_runs(points))])
+# First and last run of a line.
+_Line = tuple[int, int]
 
-    def length(line: tuple[int, int]) -> float:
-        return float(sofar[runs[line[1]][1]] - sofar[runs[line[0]][0]])
 
-    chain = _follow(points, runs, start)
+class _Runs:
+    """The straight runs of a route, in flying order, by their numbers.
+
+    What is asked of two of them is kept: each is asked again from wherever a survey may begin, and a mission whose
+    items are flown a hundred times has as many places for that.
+    """
+
+    def __init__(self, points: Floats, runs: Sequence[tuple[int, int]]) -> None:
+        """Points: (w, 3) m.  Runs: their first and last waypoints."""
+        self.points, self.runs = points, runs
+        self._sofar = np.concatenate([[0.0], np.cumsum(leg_runs(points))]).tolist()
+        self._aparts = dict[tuple[int, int], float | None]()
+        self._following = dict[int, list[int]]()
+        self._middles = dict[_Line, Floats]()
+
+    def ends(self, line: _Line) -> tuple[int, int]:
+        """First and last waypoint of a line."""
+        return self.runs[line[0]][0], self.runs[line[1]][1]
+
+    def length(self, line: _Line) -> float:
+        """Way along a line, m."""
+        first, last = self.ends(line)
+        return float(self._sofar[last] - self._sofar[first])
+
+    def middle(self, line: _Line) -> Floats:
+        """The place (2 or 3,) m half way along a line."""
+        if line not in self._middles:
+            first, last = self.ends(line)
+            axis = LineAxis(self.points[first : last + 1])
+            self._middles[line] = axis.at(np.array([0.5 * axis.length]))[0]
+        return self._middles[line]
+
+    def touch(self, run: int) -> bool:
+        """Whether a run begins where the one before it ends."""
+        return self.runs[run - 1][1] == self.runs[run][0]
+
+    def apart(self, one: int, other: int) -> float | None:
+        """How far two runs are apart, m; None where they do not lie beside each other."""
+        if (one, other) not in self._aparts:
+            self._aparts[one, other] = _apart(self.points, self.runs[one], self.runs[other])
+        return self._aparts[one, other]
+
+    def following(self, here: int) -> list[int]:
+        """Runs that may be, or begin, the line after one, in flying order."""
+        if here not in self._following:
+            self._following[here] = self._find_following(here)
+        return self._following[here]
+
+    def _find_following(self, here: int) -> list[int]:
+        found, own = list[tuple[int, float, float]](), self.length((here, here))
+        for after in range(here + 1, min(len(self.runs), here + 2 + _RUNS_BETWEEN)):
+            between = self._sofar[self.runs[after][0]] - self._sofar[self.runs[here][1]]
+            length = self.length((after, after))
+            apart = self.apart(here, after)
+            if apart is None or between > max(_LONGEST_BETWEEN * max(own, length), _SHORT_BETWEEN):
+                continue
+            found.append((after, apart, length))
+        # A leg of a turn-around may lie beside lines, too: far beside them, and short.
+        return [
+            after
+            for after, apart, length in found
+            if not any(k > after and near < _NEARER * apart and length < _STUB * long for k, near, long in found)
+        ]
+
+
+def _chain(runs: _Runs, start: int) -> list[_Line]:
+    """The lines of a survey that begins with a run, or a little before or behind it."""
+    chain = _follow(runs, start)
     if len(chain) > 1:
         # The way to a first line may lie beside the second.
-        others = (_follow(points, runs, other) for other in range(start, chain[1][0]))
-        chain = max(others, key=lambda one: (len(one), sum(length(line) for line in one)))
+        others = (_follow(runs, other) for other in range(start, chain[1][0]))
+        chain = max(others, key=lambda one: (len(one), sum(map(runs.length, one))))
     while len(chain) > _FEWEST_WITH_PHOTOS:
         # The last may be a turn-around of the next survey, whose lines lie across.
         (_, before), last = chain[-2:]
-        across = (_follow(points, runs, other) for other in range(before + 1, last[0]))
-        if not any(_turns(one, last, length) for one in across):
+        if not any(_turns(_follow(runs, other), last, runs) for other in range(before + 1, last[0])):
             break
         chain.pop()
     return chain
 
 
-def _turns(chain: Sequence[tuple[int, int]], line: tuple[int, int], length: Callable[[tuple[int, int]], float]) -> bool:
+def _turns(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
     """Whether a line is but a turn-around between two longer ones of a survey."""
     between = [pair for pair in pairwise(chain) if pair[0][1] < line[0] and line[1] < pair[1][0]]
-    return len(chain) >= _FEWEST and any(length(line) < _STUB_TURN * min(map(length, pair)) for pair in between)
+    own = runs.length(line)
+    return len(chain) >= _FEWEST and any(own < _STUB_TURN * min(map(runs.length, pair)) for pair in between)
 
 
-def _follow(points: Floats, runs: Sequence[tuple[int, int]], start: int) -> list[tuple[int, int]]:
+def _follow(runs: _Runs, start: int) -> list[_Line]:
+    """The lines that follow each other from a run on, the first of which may begin before it."""
     chain = [(start, start)]
     while True:
         first, here = chain[-1]
-        for after in _next_runs(points, runs, here):
+        for after in runs.following(here):
             bends = 0
-            while (len(chain) == 1 or here - bends > first) and _go_on(points, runs, here, after, bends + 1):
+            while (len(chain) == 1 or here - bends > first) and _go_on(runs, here, after, bends + 1):
                 bends += 1
             if len(chain) == 1:
                 chain = [(here - bends, here)]
@@ -289,32 +354,13 @@ def _follow(points: Floats, runs: Sequence[tuple[int, int]], start: int) -> list
             return chain
 
 
-def _next_runs(points: Floats, runs: Sequence[tuple[int, int]], here: int) -> list[int]:
-    """Runs that may be, or begin, the line after one, in flying order."""
-    sofar, found = np.concatenate([[0.0], np.cumsum(leg_runs(points))]), list[tuple[int, float, float]]()
-    own = float(sofar[runs[here][1]] - sofar[runs[here][0]])
-    for after in range(here + 1, min(len(runs), here + 2 + _RUNS_BETWEEN)):
-        between = float(sofar[runs[after][0]] - sofar[runs[here][1]])
-        length = float(sofar[runs[after][1]] - sofar[runs[after][0]])
-        apart = _apart(points, runs[here], runs[after])
-        if apart is None or between > max(_LONGEST_BETWEEN * max(own, length), _SHORT_BETWEEN):
-            continue
-        found.append((after, apart, length))
-    # A leg of a turn-around may lie beside lines, too: far beside them, and short.
-    return [
-        after
-        for after, apart, length in found
-        if not any(k > after and near < _NEARER * apart and length < _STUB * long for k, near, long in found)
-    ]
-
-
-def _go_on(points: Floats, runs: Sequence[tuple[int, int]], here: int, after: int, bends: int) -> bool:
+def _go_on(runs: _Runs, here: int, after: int, bends: int) -> bool:
     """Whether two lines that turn around between two runs go on beside each other, so many bends away from there."""
     one, other = here - bends, after + bends
-    if one < 0 or other >= len(runs) or runs[one][1] != runs[one + 1][0] or runs[other - 1][1] != runs[other][0]:
+    if one < 0 or other >= len(runs.runs) or not (runs.touch(one + 1) and runs.touch(other)):
         return False
-    wide, own = _apart(points, runs[here], runs[after]), _apart(points, runs[one], runs[other])
-    lengths = [_line(points, runs[k])[2] for k in (one, other)]
+    wide, own = runs.apart(here, after), runs.apart(one, other)
+    lengths = [_line(runs.points, runs.runs[k])[2] for k in (one, other)]
     return (
         wide is not None
         and own is not None
@@ -342,26 +388,23 @@ def _apart(points: Floats, one: tuple[int, int], other: tuple[int, int]) -> floa
 
 
 def _survey(
-    points: Floats, runs: Sequence[tuple[int, int]], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
+    runs: _Runs, chain: Sequence[_Line], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
 ) -> Survey | None:
     """The survey of some lines; None where too few of them are at places of their own."""
-    axis = LineAxis(points[runs[0][0] : runs[0][1] + 1])
-    middles = []
-    for first, last in runs:
-        other = LineAxis(points[first : last + 1])
-        middles.append(other.at(np.array([0.5 * other.length]))[0])
-    offsets = axis.of(np.array(middles))[1]
-    lines = tuple(_photo_line(run, camera) for run in runs)
+    points, (begins, ends) = runs.points, runs.ends(chain[0])
+    offsets = LineAxis(points[begins : ends + 1]).of(np.array([runs.middle(line) for line in chain]))[1]
     gaps = _gaps(np.sort(offsets))
-    fewest = _FEWEST_WITH_PHOTOS if all(line.photo > 0.0 for line in lines) else _FEWEST
-    if len(gaps) + 1 < fewest:
+    if len(gaps) + 1 < (_FEWEST_WITH_PHOTOS if camera.any() else _FEWEST):
+        return None
+    lines = tuple(_photo_line(runs.ends(line), camera) for line in chain)
+    if len(gaps) + 1 < _FEWEST and not all(line.photo > 0.0 for line in lines):
         return None
     # A camera that is off between lines tells where they begin.
     on = any((camera[line.first : line.last] != 0.0).any() for line in lines)
     between = pairwise(lines)
     if not on or all((camera[one.last : other.first] != 0.0).all() for one, other in between):
         lines = _without_leads(points, lines, turn_arounds)
-    course = _line(points, (runs[0][0], runs[0][0] + 1))[1]
+    course = _line(points, (begins, begins + 1))[1]
     return Survey(lines, course, tuple((offsets - offsets[0]).tolist()), float(np.median(gaps)))
 
 

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from flight.mission import surveys as survey_module
 from flight.mission.items import Command, Mission, SurveyPlan
 from flight.mission.route import Route, make_route
 from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
@@ -78,6 +80,19 @@ def test_lines_in_any_order_are_one_survey() -> None:
 )
 def test_what_is_no_survey(places: list[Place]) -> None:
     assert surveys(places) == ()
+
+
+def test_rounds_flown_many_times_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each run is laid beside the 13 that follow it, once, though a survey might begin at each of 240 of them."""
+    asked, really = list[tuple[int, ...]](), survey_module._apart
+
+    def count(points: NDArray[np.float64], one: tuple[int, int], other: tuple[int, int]) -> float | None:
+        asked.append((*one, *other))
+        return really(points, one, other)
+
+    monkeypatch.setattr(survey_module, "_apart", count)
+    assert surveys([(0, 0), (0, 1500), (1500, 1500), (1500, 0)] * 60) == ()
+    assert len(asked) == len(set(asked)) <= 240 * 13
 
 
 def test_a_final_approach_beside_the_lines_is_none_of_them() -> None:
