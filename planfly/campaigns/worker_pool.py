@@ -541,23 +541,27 @@ class WorkerPool:
                 self._client.cancel(list(done.futures), force=True)
 
     def _result(self, future: Any, request: FlightRequest) -> FlightRow | None:
-        """What came of a flight; None where dask gave it up, as workers died on it."""
-        from distributed import KilledWorker
+        """What came of a flight; None where dask gave it up, as workers died on it.
+
+        Raises OSError where the scheduler is lost.
+        """
+        from distributed import CancelledError, KilledWorker
 
         if future.status == "finished":
             # A result goes with its worker until it is fetched, and is made anew: that may be given up, too.
-            with contextlib.suppress(KilledWorker):
+            with contextlib.suppress(KilledWorker, CancelledError):
                 row: FlightRow = future.result()
                 return row
-            return None
-        if future.status == "error":
+        elif future.status == "error":
             error = future.exception()
-            if isinstance(error, KilledWorker):
-                return None
             if isinstance(error, PlanflyError):
                 raise error
-            raise RuntimeError(f"flight {request.index}: {type(error).__name__}: {error}") from error
-        raise OSError(0, "the scheduler was lost; the flights before are kept, --resume goes on", "--scheduler")
+            if not isinstance(error, KilledWorker):
+                raise RuntimeError(f"flight {request.index}: {type(error).__name__}: {error}") from error
+        # On a loaded machine dask was seen to cancel a flight whose worker was killed.
+        if self._client.status != "running":
+            raise OSError(0, "the scheduler was lost; the flights before are kept, --resume goes on", "--scheduler")
+        return None
 
 
 @contextlib.contextmanager

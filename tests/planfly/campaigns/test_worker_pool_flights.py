@@ -5,7 +5,7 @@ from contextlib import nullcontext
 from itertools import pairwise
 
 import pytest
-from distributed import KilledWorker
+from distributed import CancelledError, KilledWorker
 
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.campaign_worker import CampaignPlugin
@@ -117,7 +117,7 @@ class GivenUp:
         return self._row
 
     def exception(self) -> Exception:
-        return KilledWorker("x", None, 2)
+        return CancelledError("x") if self.status == "cancelled" else KilledWorker("x", None, 2)
 
     def release(self) -> None:
         pass
@@ -126,7 +126,7 @@ class GivenUp:
 class OneWorker:
     """A client whose worker dies on flight 1 so many times."""
 
-    loop = None
+    loop, status = None, "running"
 
     def __init__(self, base: CampaignBase, times: int, status: str) -> None:
         self._base, self._left, self._status = base, times, status
@@ -200,7 +200,7 @@ def test_dask_flies_what_comes_under_a_name_that_was_flown(base: CampaignBase, m
     assert all(same_flight(row, made_flight(base, request.index)) for request, row in flown)
 
 
-@pytest.mark.parametrize("status", ["error", "finished"])
+@pytest.mark.parametrize("status", ["error", "finished", "cancelled"])
 @pytest.mark.parametrize("times", [0, 1, 2, 3])
 def test_a_flight_is_lost_that_is_given_up_three_times(
     base: CampaignBase, monkeypatch: pytest.MonkeyPatch, times: int, status: str
@@ -212,6 +212,21 @@ def test_a_flight_is_lost_that_is_given_up_three_times(
     assert client.sent == [0, *[1] * (1 + min(times, 2)), 2]
     assert [one.request.index for one in flown] == [0, 1, 2]
     assert flown[1].row == (made_flight(base, 1) if times < 3 else lost_row(base, 1, LOST))
+
+
+def test_a_flight_that_is_cancelled_as_the_scheduler_went_ends_the_campaign(
+    base: CampaignBase, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("distributed.as_completed", lambda loop: InTurn())
+    client, orders, flown = OneWorker(base, 1, "cancelled"), iter(range(3)), list[int]()
+    client.status = "connecting"
+    monkeypatch.setattr(client, "cancel", lambda *_, **__: None, raising=False)
+    with pytest.raises(OSError, match="the scheduler was lost"):
+        flown.extend(
+            one.request.index for one in WorkerPool(client, base).fly(lambda: next(map(FlightRequest, orders), None))
+        )
+    assert flown == [0]
+    assert client.sent == [0, 1]
 
 
 @pytest.mark.parametrize(
