@@ -3,8 +3,8 @@
 First what a first start compiles, in the same two processes; then the planner's other kernels in one process, and those
 of other flights, verdicts and reports in another: they are not each other's.  Beside them all tests are read, so that
 Python's own bytecode of them is kept too.  At last tests run that call kernels with types, or in parts, that no command
-has: whether they pass is seen later.  All stay in the caches for all later processes; where they are there already this
-takes seconds.
+has: whether they pass is seen later.  All stay in the cache for all later processes, with a note of the sources that they
+were compiled for: with the same sources nothing is done a second time.
 """
 
 import os
@@ -13,6 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from planfly.campaigns.worker_pool import code_hash
 from planfly.first_start import compile_units
 from planfly.kernel_units.ready_kernels import MISSION
 from planfly.kernel_units.unit_kernels import BOTH
@@ -106,6 +107,9 @@ def main() -> int:
     """Run them; 1 where a command fails otherwise than by its verdict."""
     if len(sys.argv) > 1:
         return _run(PROCESSES[int(sys.argv[1])])
+    done = cache_folder() / f"compiled-for-tests-{code_hash()}"
+    if done.exists():
+        return 0
     with tempfile.TemporaryDirectory(prefix="planfly-kernels-") as name:
         folder = Path(name)
         (folder / "field.toml").write_text(FIELD, encoding="utf-8")
@@ -119,6 +123,8 @@ def main() -> int:
     chosen = [str(TESTS_FOLDER / one) for one in TESTS]
     subprocess.run([*PYTEST, "-n", "2", *chosen], cwd=TESTS_FOLDER.parent, check=False)
     reading.wait()
+    if not failed:
+        done.touch()
     return failed
 
 

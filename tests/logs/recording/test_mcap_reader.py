@@ -104,7 +104,7 @@ def chunk_record(data: bytes, size: int, crc: int) -> bytes:
 
 @pytest.mark.parametrize("declared", [2**30, 1000])
 def test_a_chunk_bomb_is_refused_before_it_grows(tmp_path: Path, declared: int) -> None:
-    compressor = zstandard.ZstdCompressor(level=19).compressobj(size=2**30)
+    compressor = zstandard.ZstdCompressor(level=1).compressobj(size=2**30)
     block = bytes(2**22)
     bomb = b"".join(compressor.compress(block) for _ in range(256)) + compressor.flush()
     assert len(bomb) < 120_000
