@@ -3,8 +3,8 @@
 First what a first start compiles, in the same two processes; then the planner's other kernels in one process, and those
 of other flights, verdicts and reports in another: they are not each other's.  Beside them all tests are read, so that
 Python's own bytecode of them is kept too.  At last tests run that call kernels with types, or in parts, that no command
-has: whether they pass is seen later.  All stay in the cache for all later processes, with a note of the sources that they
-were compiled for: with the same sources nothing is done a second time.
+has: whether they pass is seen later.  All stay in the cache for all later processes, with a note of the sources that
+they were compiled for: with the same sources nothing is done a second time.
 """
 
 import os
