@@ -205,3 +205,10 @@ def test_a_flight_that_failed_nothing_but_is_not_whole_names_completion() -> Non
 
 def test_a_lost_flight_keeps_its_draw(base: CampaignBase) -> None:
     assert lost_row(base, 4, "died").draw == fly_one(base, 4).draw
+
+
+@pytest.mark.parametrize(("corridor", "energy"), [(-6.0, -25.0), (-6.0, -35.0), (6.0, 25.0), (6.0, 35.0)])
+def test_ten_metres_of_a_corridor_are_as_far_as_50_wh(base: CampaignBase, corridor: float, energy: float) -> None:
+    findings = (finding("corridor", corridor, ok=corridor > 0.0), finding("energy", energy, ok=energy > 0.0))
+    row = replace(lost_row(base, 0, ""), margins=least_margins(findings))
+    assert row.closeness == pytest.approx(min(corridor / 10.0, energy / 50.0))

@@ -1,11 +1,17 @@
 """A photo line flown just within what a photo bears, and just outside it."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from logs.verdict.measures.photo_lines import _cells
+from flight.mission.items import Home
+from logs.verdict.measures.photo_lines import LineMeasure, _cells, over_ground
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.rules.survey_rule import _too_tight, lost_text
 from tests.logs.verdict.judging import judge
-from tests.synthetic import fly_path, make_setup
+from tests.synthetic import bank_radius, fly_path, make_setup
 
 
 @pytest.mark.parametrize(("off", "lost"), [(4.9, 0.0), (5.1, 20.0), (-4.9, 0.0), (-5.1, 20.0)])
@@ -24,3 +30,26 @@ def test_a_line_is_looked_at_metre_by_metre() -> None:
     along = np.arange(0.0, 12.25, 0.25)
     taken = _cells(along, along <= 7.0, 12.0)
     assert (len(taken), np.count_nonzero(taken)) == (12, 7)
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.0049, ""), (0.0051, "1 % with the camera off")])
+def test_half_a_percent_of_a_line_is_told(share: float, told: str) -> None:
+    measure = LineMeasure(1000.0, 1.0 - share, 0.0, 0.0, 0.0, share, 0.0, 0.0, 0.0, 0.0, 0, 0, 50.0, 10.0)
+    assert lost_text(measure) == told
+
+
+@pytest.mark.parametrize(("over", "tight"), [(0.009, False), (0.011, True)])
+def test_a_corner_may_be_a_hundredth_of_a_degree_too_sharp(over: float, tight: bool) -> None:
+    """Flown by with an arc of radius R that takes R tan(turn / 2) of each leg: of legs of 300 m, all of them."""
+    turn = 2.0 * math.atan(300.0 / bank_radius()) + math.radians(over)
+    ends = [[0.0, 0.0], [0.0, 300.0], [300.0 * math.sin(turn), 300.0 + 300.0 * math.cos(turn)]]
+    setup = make_setup([[*place, 100.0] for place in ends])
+    assert _too_tight(route_requirements(setup), 1) is tight
+
+
+@pytest.mark.parametrize(("home", "up"), [(None, [0.0, 20.0]), (70.0, [10.0, 30.0])])
+def test_without_terrain_heights_are_over_home_or_the_lowest_waypoint(home: float | None, up: list[float]) -> None:
+    setup = make_setup([[0.0, 0.0, 80.0], [0.0, 900.0, 100.0]])
+    place = None if home is None else Home(46.0, 8.0, home)
+    bare = replace(setup, scenario=replace(setup.scenario, terrain=None), mission=replace(setup.mission, home=place))
+    assert over_ground(route_requirements(bare), setup.route.waypoints).tolist() == up
