@@ -47,7 +47,7 @@ from flight.dynamics.jsbsim_properties import (
 )
 from flight.dynamics.model_check import check_model, try_model
 from flight.dynamics.state import STATE
-from flight.dynamics.trim import Engine, Floats, Trim, air_velocity, body_axes, euler, first_guess, from_vector, solve
+from flight.dynamics.trim import Engine, Floats, Trim, air_velocity, body_axes, euler, first_guess, straight
 from world.errors import FlightError
 from world.files import temporary_folder
 from world.kernels import Record, field_names
@@ -291,17 +291,16 @@ class Fdm:
         self._at = (lat_deg, lon_deg, terrain_amsl)
         self._wind = wind
         self._heading = math.atan2(velocity[1], velocity[0])
-        self.move_to(amsl)
-        values = solve(self.balance, {"airspeed": airspeed, "climb": climb}, self.surface_limits(), self.first_guess())
-        if values is None:
+        found = straight(self, airspeed, amsl, climb)
+        if found is None:
             raise FlightError(
                 f"{self.aircraft.name} holds no steady flight at {airspeed:.1f} m/s,"
                 f" {math.degrees(climb):+.1f} degrees to the air and {amsl:.0f} m above sea level",
                 file=self.aircraft.name, field="airspeed", value=airspeed,
             )  # fmt: skip
-        self.balance(values)
+        self.balance(found.vector())
         self._let_go()
-        return from_vector(values, amsl)
+        return found
 
     def begin_at(
         self,

@@ -177,6 +177,23 @@ def test_two_flights_are_equal_to_the_last_bit() -> None:
     assert ends[0].tobytes() == ends[1].tobytes()
 
 
+def test_a_start_with_little_power_to_spare_is_found() -> None:
+    """Newton's method finds no trim from afar there; the climb at full throttle at this airspeed leads to it."""
+    fdm = Fdm(load_aircraft("zagi"))
+    trim = fdm.start(45.0, 0.0, 2355.4, 0.7, 16.8433, 0.0016)
+    assert 0.9 < trim.throttle < 1.0
+    assert np.abs(fdm.balance(trim.vector())).max() < 1e-7
+    # It does hold it: in a second nothing has moved.
+    again = Fdm(load_aircraft("zagi"))
+    again.write(again.start(45.0, 0.0, 2355.4, 0.7, 16.8433, 0.0).commands())
+    again.step(120)
+    state = again.read()
+    assert (state.airspeed, state.amsl) == pytest.approx((16.8433, 2355.4), abs=0.05)
+    # Its fastest level flight at this height is 17.6 m/s.
+    with pytest.raises(FlightError, match=r"holds no steady flight at 18\.5 m/s"):
+        fdm.start(45.0, 0.0, 2355.4, 0.7, 18.5)
+
+
 @pytest.mark.parametrize(
     "start",
     [
