@@ -152,14 +152,18 @@ def fly_as_px4(
 def _end_mission(
     estimated: Record, b: Record, memory: Record, parameters: Record, own: Record, dt: float
 ) -> None:  # pragma: no cover - compiled
-    """End the flight at the last waypoint, where its height is reached, or not for as long as is waited for it."""
+    """End the flight past the last waypoint, where its height is reached, or not for as long as is waited for it.
+
+    A circle that is begun before the waypoint, and left at once because the height is there, does not end it.
+    """
     here = own.waited > 0.0 or memory.done or own.circling
     if not here or b.circle != 0.0:
         return
     own.waited += dt
     # What circles at the end has not missed it.
     memory.returning = True
-    memory.done = abs(estimated.up - b.up) <= parameters.height_acceptance or own.waited > LONGEST_WAIT
+    at_height = abs(estimated.up - b.up) <= parameters.height_acceptance
+    memory.done = (memory.done and at_height) or own.waited > LONGEST_WAIT
 
 
 @inner

@@ -39,6 +39,24 @@ def test_the_circle_at_the_gate_has_the_radius_of_loiters(make_setup: MakeSetup,
     assert np.ptp(away) < 8.0
 
 
+def test_a_circle_begun_before_the_last_waypoint_does_not_end_the_flight(
+    make_setup: MakeSetup, aerosonde: Aircraft
+) -> None:
+    # 56 m before the end it is some 12 m too low, for it climbs at its 3 m/s all the way, 3.5 s late, and circles; a
+    # second later it is within 10 m, and flies on.
+    setup = make_setup([[0, 0, 500.0], [0, 1500, 673.0]])
+    law = Px4(load_parameters(aerosonde))
+    result = simulate(replace(setup, autopilot=law), aerosonde)
+    track = result.track
+    assert result.ended == "completed"
+    low = 673.0 - track.position[:, 2]
+    assert low[np.argmax(track.position[:, 1] > 1444.0)] > 10.0
+    assert track.position[-1, 1] == pytest.approx(1500.0, abs=1.0)
+    assert abs(low[-1]) < 10.0
+    # Nowhere around a circle of 80 m.
+    assert track.position[:, 1].max() < 1501.0
+
+
 @pytest.mark.parametrize("radius", [100, 200])
 def test_a_loiter_to_a_height_is_flown_to_level_and_left_at_that_height(aerosonde: Aircraft, radius: int) -> None:
     setup, result = flown(
