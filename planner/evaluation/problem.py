@@ -383,11 +383,12 @@ def _max_buffer(certified: ProblemArrays) -> float:
 
 
 def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Performance of the aircraft, reduced in turbulence and limited to the rates that its autopilot demands."""
-    table = derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence])
-    if limits.tracking is not None:
-        table = within_rates(table, limits.tracking.climb_rate, limits.tracking.sink_rate)
-    return table
+    """Performance of the aircraft, reduced in turbulence and for its autopilot, and within the rates that one demands."""
+    share, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
+    if tracking is None:
+        return derated(limits.performance(), share)
+    table = derated(limits.performance(), min(share, tracking.slope_share))
+    return within_rates(table, tracking.climb_rate, tracking.sink_rate)
 
 
 def _edges(bounds: Floats) -> dict[str, float]:

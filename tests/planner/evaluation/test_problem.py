@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
+from aircraft.tracking import TrackingError
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.problem import (
     ANGLE_MARGIN,
@@ -125,6 +127,24 @@ def test_turbulence_leaves_a_share_of_climb_and_descent(
             angle = TURBULENCE_SHARE[turbulence] * steepest - ANGLE_MARGIN + beyond
             path = np.array([[0.0, -2500.0, 200.0], [1.0, -2500.0, 200.0 + math.copysign(math.tan(angle), rise)]])
             assert violations_of(data, path, Violation.SLOPE)[0] == more
+
+
+@pytest.mark.parametrize(
+    ("turbulence", "asked", "share"), [("none", 0.7, 0.7), ("light", 0.95, 0.9), ("light", 0.7, 0.7)]
+)
+def test_an_autopilot_leaves_a_share_of_climb_and_descent(
+    make_limits: Make, small: Small, turbulence: str, asked: float, share: float
+) -> None:
+    """The smaller of its own and that of the turbulence, not their product."""
+    scenario = small(wind={"speed_mps": 0, "from_deg": 0, "turbulence": turbulence})
+    limits = make_limits(scenario)
+    tables = {name: np.zeros((11, 4)) for name in ("acceptance", "excursion", "before", "after")}
+    tracking = TrackingError(airspeed=25.0, **tables, across=0.0, up=0.0, lag=0.0, step=0.0, slope_share=asked)
+    made = make_problem(scenario, replace(limits, tracking=tracking)).certified.aircraft
+    # At sea level true and equivalent airspeed are the same.
+    assert (made.climb[0], made.descent[0]) == pytest.approx(
+        tuple(share * angle for angle in limits.envelope.air_angles(25.0, 0.0))
+    )
 
 
 @pytest.mark.parametrize(("most", "kept"), [(200.0, SEARCH_BUFFER), (60.0 + 2.0 * CERTIFIED_BUFFER + 8.0, 7.0)])

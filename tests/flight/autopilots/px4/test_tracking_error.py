@@ -47,14 +47,17 @@ def test_a_straight_leg_takes_none(aerosonde: Aircraft) -> None:
     assert (error.excursion[3] > 0.0).all()
 
 
-@pytest.mark.parametrize(("turbulence", "share"), [("none", 0.8), ("light", 0.7), ("moderate", 0.6)])
+@pytest.mark.parametrize(
+    ("turbulence", "share", "of_aircraft"), [("none", 0.8, 1.0), ("light", 0.7, 0.7), ("moderate", 0.6, 0.6)]
+)
 def test_slopes_are_those_of_the_reference_and_late_by_its_lag(
-    turbulence: str, share: float, aerosonde: Aircraft
+    turbulence: str, share: float, of_aircraft: float, aerosonde: Aircraft
 ) -> None:
     made = load_parameters(aerosonde).changed(FW_T_CLMB_R_SP=5.0, FW_T_HRATE_FF=0.5, FW_T_ALT_TC=4.0)
     error = tracking_error(made, 25.0, "gnss", turbulence=turbulence)  # type: ignore[arg-type]  # a name of the table
     assert (error.climb_rate, error.sink_rate, error.lag, error.step) == pytest.approx(
         (share * 5.0, share * 2.0, 2.0, 0.0)
     )
+    assert error.slope_share == of_aircraft
     # Three standard deviations of 1.5 m beside 2 and 3 m.
     assert (error.across, error.up) == pytest.approx((math.hypot(2.0, 4.5), math.hypot(3.0, 4.5)))
