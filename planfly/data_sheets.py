@@ -36,7 +36,7 @@ from flight.autopilots.arduplane.parameters import DEFINITIONS
 from flight.autopilots.parameter_files import Entry, read_parameter_file
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Simulator, Trim, fastest, full_throttle, idle, linearise, slowest, straight
-from flight.guidance.model_gains import AMSL, gains_of_model, gains_text
+from flight.guidance.model_gains import AMSL, gains_of_model, gains_text, idle_throttle
 from world.errors import FlightError
 from world.files import temporary_folder, write_folder
 
@@ -255,7 +255,6 @@ def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
 
 # Least airspeed that guidance may use, by the stall's, and the largest by level flight's fastest.
 LEAST_SPEED, MOST_SPEED = 1.12, 0.95
-_CURRENT = 0.02
 _MAX_PITCH_DEG = 25.0
 
 
@@ -402,14 +401,6 @@ def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, state
     roll, pitch = (min(3.0, max(0.05, math.radians(45.0) / rate)) for rate in (roll_rate, pitch_rate))
     climb, sink = cruise * math.sin(flown.climb.climb), -cruise * math.sin(flown.idle.climb)
     radius = turn_radius(cruise, bank)
-    # Below this the motor gives no thrust at cruise: the throttle at which its current begins to flow.
-    fdm.move_to(AMSL)
-    least = 0.0
-    for throttle in np.arange(0.0, flown.level.throttle, _CURRENT).tolist():
-        fdm.balance(replace(flown.level, throttle=throttle).vector())
-        if float(fdm.read().power) > 0.0 and aircraft.battery_voltage:
-            least = max(0.0, throttle - _CURRENT)
-            break
     values = {
         "AIRSPEED_CRUISE": round(cruise, 1),
         "AIRSPEED_MIN": round(aircraft.airspeed_min, 1),
@@ -422,7 +413,7 @@ def arduplane_parameters(aircraft: Aircraft, flown: Performance, fdm: Fdm, state
         "WP_RADIUS": max(15, 5 * round(0.8 * radius / 5.0)),
         "WP_LOITER_RAD": max(40, 5 * round(1.3 * radius / 5.0)),
         "TRIM_THROTTLE": round(100.0 * flown.level.throttle),
-        "THR_MIN": math.floor(100.0 * least),
+        "THR_MIN": math.floor(100.0 * idle_throttle(aircraft, fdm, flown.level)),
         "THR_MAX": 100,
         "TECS_CLMB_MAX": round(max(0.5, 0.95 * climb), 1),
         "TECS_SINK_MIN": round(max(0.3, sink), 1),

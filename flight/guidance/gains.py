@@ -31,6 +31,7 @@ class Gains:
 
     speed_gain, speed_integral: throttle per m/s.
     throttle_per_slope: throttle per rad of climb.
+    throttle_idle: at which the motor begins to give thrust at the reference airspeed; the integral is not led below it.
     slow_margin: below command less this, height gives way to speed.
     arc_slowing_time, arc_slowing_max: so long before an arc, and by so much, the airspeed gives way to a ground speed
     that the arc can be flown with.
@@ -118,6 +119,7 @@ class Gains:
     aside_frequency: float = 1.0
     push_lead: float = 0.0
     push_smoothing: float = 0.1
+    throttle_idle: float = 0.0
 
     def record(self) -> Record:
         """The gains for compiled code, as a record of `GAINS`."""

@@ -5,13 +5,13 @@ are placed by its control power, as fast as its servos and its airspeed allow.
 """
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import Floats, linearise, straight
+from flight.dynamics.trim import Floats, Trim, linearise, straight
 from flight.guidance.gains import Gains
 from world.errors import FlightError
 
@@ -50,6 +50,8 @@ ROUND_FIGURES = {
 _POWERS = {"frequency": -1, "lead": 1, "smoothing": 1, "lag": 1, "cross_track_integral": -3, "height_integral": -3}
 # A loop about roll closes at this phase of the servo's lag, rad; its damping.
 _SERVO_PHASE, _DAMPING = 0.4, 0.8
+# Step of the throttle by which it is looked for where the motor's current begins to flow.
+_CURRENT = 0.02
 # What does not follow from the model.
 _LIMITS = {
     "intercept": math.radians(35.0),
@@ -75,16 +77,16 @@ def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, floa
 
     Raises FlightError for an aircraft that holds no level flight at cruise.
     """
-    return _airframe_gains(aircraft, *_linear(aircraft, fdm))
-
-
-def _linear(aircraft: Aircraft, fdm: Fdm | None) -> tuple[Floats, Floats]:
     fdm = Fdm(aircraft) if fdm is None else fdm
+    return _airframe_gains(aircraft, *linearise(fdm, _level(aircraft, fdm)))
+
+
+def _level(aircraft: Aircraft, fdm: Fdm) -> Trim:
     level = straight(fdm, aircraft.airspeed, AMSL)
     if level is None:
         message = f"{aircraft.name} holds no level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
         raise FlightError(message, file=aircraft.model_file, field="airspeed", value=aircraft.airspeed)
-    return linearise(fdm, level)
+    return level
 
 
 def _airframe_gains(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
@@ -107,15 +109,30 @@ def _airframe_gains(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float
     }
 
 
+def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
+    """Throttle (0..1) below which an electric motor gives no thrust in this level flight, to 0.02; 0 without one.
+
+    Its current does not flow yet there.
+    """
+    fdm.move_to(level.amsl)
+    for throttle in np.arange(0.0, level.throttle, _CURRENT).tolist():
+        fdm.balance(replace(level, throttle=throttle).vector())
+        if float(fdm.read().power) > 0.0 and aircraft.battery_voltage:
+            return float(max(0.0, throttle - _CURRENT))
+    return 0.0
+
+
 def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     """All gains of an aircraft, by the rule of this file.
 
     fdm: of the aircraft, with an engine at rest; None makes one.
     Raises FlightError as `airframe_gains` does.
     """
-    a, b = _linear(aircraft, fdm)
+    fdm = Fdm(aircraft) if fdm is None else fdm
+    level = _level(aircraft, fdm)
+    a, b = linearise(fdm, level)
     own = _airframe_gains(aircraft, a, b)
-    placed = at_airspeed(aircraft.airspeed) | own | _LIMITS
+    placed = at_airspeed(aircraft.airspeed) | own | _LIMITS | {"throttle_idle": idle_throttle(aircraft, fdm, level)}
     _, _, _, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
     # Roll: two poles as fast as the servo lets them be.

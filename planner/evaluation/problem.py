@@ -383,7 +383,7 @@ def _max_buffer(certified: ProblemArrays) -> float:
 
 
 def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Performance of the aircraft, reduced in turbulence and for its autopilot, and within the rates that one demands."""
+    """Performance of the aircraft, reduced in turbulence and for its autopilot, within the rates that this demands."""
     share, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
         return derated(limits.performance(), share)

@@ -333,7 +333,9 @@ def _set_throttle(
     wanted = steady + gains.speed_gain * slow + gains.speed_integral * memory.speed_sum
     commands.throttle = min(1.0, max(0.0, wanted))
     memory.full_throttle = memory.full_throttle + dt if wanted >= 1.0 else 0.0
-    if (wanted < 1.0 or slow < 0.0) and (wanted > 0.0 or slow > 0.0):
+    # Below the throttle that gives thrust, which grows with the airspeed, the integral would wind up on nothing.
+    idle = gains.throttle_idle * airspeed / gains.reference_airspeed
+    if (wanted < 1.0 or slow < 0.0) and (wanted > idle or slow > 0.0):
         memory.speed_sum = min(60.0, max(-60.0, memory.speed_sum + slow * dt))
 
 

@@ -81,6 +81,23 @@ def test_on_the_path_at_its_speed_the_trim_is_kept() -> None:
     assert commands.throttle == pytest.approx(TRIM["trim_throttle"])
 
 
+@pytest.mark.parametrize(
+    ("idle", "over", "after"),
+    [
+        # 0.6 - 0.02 x 1 is above 0.4 x 26/25, at which the integral stops: 0.164 below the trim.
+        (0.4, 1.0, 0.436),
+        # 0.6 - 0.02 x 2 is below 0.55 x 27/25 from the beginning.
+        (0.55, 2.0, 0.6),
+    ],
+)
+def test_the_throttle_does_not_wind_up_below_what_gives_thrust(idle: float, over: float, after: float) -> None:
+    gains = replace(GAINS, reference_airspeed=25.0, speed_gain=0.02, speed_integral=0.01, throttle_idle=idle)
+    channel = Channel(gains)
+    for _ in range(60 * 60):
+        channel.height(airspeed=25.0 + over)
+    assert channel.height(airspeed=25.0).throttle == pytest.approx(after, abs=0.001)
+
+
 @pytest.mark.parametrize("error", [-3.0, -0.1, 0.1, 3.0])
 def test_above_the_path_the_nose_goes_down_and_below_it_up(error: float) -> None:
     channel = Channel()

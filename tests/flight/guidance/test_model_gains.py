@@ -42,6 +42,12 @@ def test_roll_poles_are_where_they_are_placed() -> None:
     assert gains_of_model(replace(AEROSONDE, surface_lag=0.2)).roll_frequency == 2.0
 
 
+def test_the_idle_throttle_is_where_the_motor_begins_to_push() -> None:
+    """The book's disc leaves with 20 m/s times the throttle: at 15 m/s it pushes from 0.75 on."""
+    assert 0.73 <= gains_of_model(load_aircraft("zagi")).throttle_idle <= 0.75
+    assert load_gains(load_aircraft("zagi")).throttle_idle == 0.74
+
+
 def test_the_file_is_read_as_written(tmp_path: Path) -> None:
     gains = gains_of_model(AEROSONDE)
     (tmp_path / "gains.toml").write_text(gains_text(gains), encoding="utf-8")
