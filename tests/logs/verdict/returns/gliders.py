@@ -1,11 +1,13 @@
 """A glider whose sink is the same at every airspeed, and grounds for it: what it reaches can be summed up."""
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.point_mass import POINT_MASS, PointMass
+from logs.verdict.returns.glide_map import GlideMap, glide_map
 from world.kernels import Record
 from world.terrain import Terrain, gridded
 
@@ -56,3 +58,23 @@ def ground(function: "np.ufunc | object", half: float = 6000.0, pitch: float = 5
     line = np.arange(-half, half + 0.5 * pitch, pitch) + shift
     heights = np.asarray(function(line[None, :], line[:, None]) + np.zeros((line.size, line.size)))  # type: ignore[operator]
     return gridded(heights, line, line, source="made", sha256="", datum="mean sea level")
+
+
+@cache
+def plane() -> Terrain:
+    """Ground at 0 m."""
+    return ground(lambda east, _north: 0.0 * east)
+
+
+_maps: dict[float, GlideMap] = {}
+
+
+def map_of(terrain: Terrain, margin: float = 30.0) -> GlideMap:
+    """The map of the ways to the middle of a ground; the plane's, which most of them ask for, is made once."""
+    made = _maps.get(margin) if terrain is plane() else None
+    if made is None:
+        made = glide_map(terrain, np.zeros((1, 2)), margin, NO_SPHERES, NO_RADII, 5900.0)
+        assert made is not None
+        if terrain is plane():
+            _maps[margin] = made
+    return made

@@ -20,6 +20,8 @@ from tests.logs.verdict.returns.gliders import (
     glider,
     ground,
     height_needed,
+    map_of,
+    plane,
     true_airspeed,
 )
 from world.kernels import Records
@@ -38,7 +40,7 @@ def left_of(
 ) -> tuple[float, tuple[float, float, float]]:  # fmt: skip
     """What is left of a start's height to reach a place 3 km north of the middle, and which place that is."""
     spheres, radii = (np.array([sphere[:3]]), np.array([sphere[3]])) if sphere else (NO_SPHERES, NO_RADII)
-    made = glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0)
+    made = glide_map(terrain, np.zeros((1, 2)), MARGIN, spheres, radii, 5900.0) if sphere else map_of(terrain)
     assert made is not None
     aircraft = glider(wind, blows_to, fast_sink, induced, growth)
     needs = least_heights(made, np.array([made.cell_of(0.0, 3000.0)]), glide_slopes(aircraft, AIRSPEED, 0.0, TOP), TOP)
@@ -50,10 +52,6 @@ def left_of(
     around = Surroundings(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
     left, reached = heights_left(start, needs, aircraft, around, AIRSPEED, bank)
     return float(left[0]), place_of(made, int(reached[0])) if reached[0] >= 0 else (math.nan,) * 3
-
-
-def plane() -> Terrain:
-    return ground(lambda east, _north: 0.0 * east)
 
 
 def test_straight_ahead_it_costs_the_way_alone() -> None:
