@@ -69,6 +69,11 @@ def flight_text(setup: FlightSetup) -> str:
     return f"{setup.path.length / 1000.0:.1f} km, about {time} in the air"
 
 
+def flight_kind(setup: FlightSetup) -> str:
+    """What flights that take about as long a kilometre have in common: their autopilot."""
+    return f"flying by {setup.autopilot.name}"
+
+
 # How a flight ended that was still under way.
 INTERRUPTED = "interrupted"
 

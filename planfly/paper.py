@@ -159,6 +159,8 @@ def plan_section(
     tasks = [(threats, name, seed) for threats in problems for name in names for seed in range(1, seeds + 1)]
     count = min(len(tasks), jobs or usable_cores())
     done: list[SeededPlan] = []
+    if advance is not None:
+        advance(0, len(tasks), f"0 of {len(tasks)} plans")
     for item in _results(tasks, count):
         done.append(item)
         if advance is not None:
@@ -395,7 +397,7 @@ def paper_tables(
     folder = None if out is None else Path(out)
     if folder is not None:
         refuse_folder(folder, overwrite)
-    with stage("planning") as advance:
+    with stage("planning", "planning the paper's problems") as advance:
         plans = plan_section(problems, runs, algorithm, jobs, advance)
     rows = table(plans)
     if folder is not None:
@@ -403,6 +405,6 @@ def paper_tables(
         with hold(folder):
             prepare_folder(folder, tuple(file_names(PROBLEMS)))
             write_tables(folder, rows, plans)
-            with stage("drawing"):
+            with stage("drawing", "drawing the paper's figures"):
                 write_figures(folder, plans)
     return PaperTables(tuple(rows), tuple(plans))

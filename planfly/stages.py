@@ -18,11 +18,11 @@ Advance = Callable[[float, float, str], None]
 class Receiver(NamedTuple):
     """Where progress goes.
 
-    stage: begins a stage by its title, and gives what takes how far it is.
+    stage: begins a stage by its title and its kind, and gives what takes how far it is.
     say: takes a line that stands for itself.
     """
 
-    stage: Callable[[str], AbstractContextManager[Advance]]
+    stage: Callable[[str, str], AbstractContextManager[Advance]]
     say: Callable[[str], None]
 
 
@@ -39,14 +39,16 @@ def received_by(receiver: Receiver) -> Iterator[None]:
         _receiver.reset(token)
 
 
-def stage(title: str) -> AbstractContextManager[Advance]:
+def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
     """Begin a stage of work; its context gives a function that takes done, total and a remark.
+
+    kind: what stages have in common that go at the same pace, where the title says more ("planning" of any scenario).
 
     >>> with stage("flying") as advance:
     ...     advance(1.0, 2.0, "half")
     """
     receiver = _receiver.get()
-    return contextlib.nullcontext(_ignore) if receiver is None else receiver.stage(title)
+    return contextlib.nullcontext(_ignore) if receiver is None else receiver.stage(title, kind or title)
 
 
 def say(line: str) -> None:
@@ -94,7 +96,7 @@ def progress(callback: Callable[[str, float, float, str], None]) -> AbstractCont
     """
 
     @contextmanager
-    def begin(title: str) -> Iterator[Advance]:
+    def begin(title: str, _kind: str) -> Iterator[Advance]:
         yield lambda done, total, remark: callback(title, done, total, remark)
 
     return received_by(Receiver(begin, lambda line: callback(line, 0.0, 0.0, "")))

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import settings
 
 from planfly.process_setup import prepare_process
+from planfly.terminal import output
 from tests.shared import remove_made
 from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files
 
@@ -19,6 +20,16 @@ prepare_process()
 # The first example of a test may compile kernels, or share its core with another test: neither is the kernel's fault.
 settings.register_profile("planfly", deadline=None)
 settings.load_profile("planfly")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_estimates_of_other_runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test's progress depends on what this machine did before, or on how quick it is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(output, "_times_file", lambda: tmp_path_factory.getbasetemp() / "none" / "durations.json")
+        patch.setattr(output, "_keep_time", lambda *_: None)
+        patch.setattr(output, "_LOOKS_EVERY", 86_400.0)
+        yield
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

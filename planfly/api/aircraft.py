@@ -123,7 +123,7 @@ def new_aircraft(
     from planfly.data_sheets import make_data_sheet_folder, parse_sheet
 
     sheet = parse_sheet(numbers, battery=battery, prop=prop, layout=layout)
-    with stage(f"making {Path(folder).name}"):
+    with stage(f"making {Path(folder).name}", "making"):
         return make_data_sheet_folder(Path(folder), sheet, None if params is None else Path(params))
 
 
@@ -151,7 +151,7 @@ def describe_aircraft(
     if folder is not None:
         refuse_folder(folder, overwrite)
     # Everything is worked out before anything is written.
-    with stage(f"trimming {chosen.name}"):
+    with stage(f"trimming {chosen.name}", "trimming"):
         envelope = load_envelope(chosen, motor_braking=motor_braking)
         trims = trim_table(chosen)
         modes = {row.trim.airspeed: modes_at(chosen, row.trim.airspeed) for row in trims}
@@ -188,7 +188,7 @@ def _draw(
     from logs.views.aircraft import draw_envelope, draw_steps, draw_trims
     from logs.views.drawing import png_bytes
 
-    with stage("drawing"):
+    with stage("drawing", "drawing an aircraft"):
         return {
             "envelope.png": png_bytes(draw_envelope(chosen, envelope)),
             "trims.png": png_bytes(draw_trims(chosen, trims, modes)),

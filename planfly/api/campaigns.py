@@ -187,7 +187,7 @@ def _flown(
     """Fly a campaign, or the rest of it, and sum it up.  keep: whether its folder stays, and gets its files."""
     table = place.folder / DATABASE
     with open_store(base, goal, place.folder, resume=place.resume) as store:
-        with stage("flying") as advance:
+        with stage("flying", "flying a campaign") as advance:
             estimate = fly_campaign(base, goal, workers, store, advance)
         brief = None if keep else summarise(base, goal, estimate, store)
     # The store holds its table as long as it is open.
@@ -313,7 +313,10 @@ def winds(
         folder = place.folder
         goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
         base = asked.open(_dispersions(spread).without(ASKED), place)
-        with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying") as advance:
+        with (
+            open_winds_store(base, goal, folder, resume=resume) as store,
+            stage("flying", "flying in winds") as advance,
+        ):
             found = find_winds(base, goal, Workers(workers, scheduler), store, advance)
         if out is not None:
             write_winds(folder, base, found, winds_line(asked.name(place.folder), goal, asked.options(base, spread)))

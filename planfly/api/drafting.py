@@ -57,7 +57,7 @@ def new_scenario(
     ground = None if terrain is None else _whole(terrain, is_name=terrain in EMBEDDED)
     model = _whole(aircraft, is_name=isinstance(aircraft, str) and not names_folder(aircraft))
     airspeed = find_aircraft(model).airspeed
-    with stage(f"laying out {name}"):
+    with stage(f"laying out {name}", "laying out"):
         raster = None if ground is None else open_raster(ground)
         draft = make_draft(
             name, ends[0], ends[1], height, raster=raster, terrain=ground, aircraft=model,

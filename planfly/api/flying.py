@@ -17,7 +17,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly import pipeline
 from planfly.api.planning import Wind, changed_scenario, opened_scenario
 from planfly.arguments import check_arguments
-from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_text
+from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_kind, flight_text
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH, FLYING
 from planfly.open_mission import (
@@ -216,7 +216,7 @@ def fly(
     opened = opened_mission(mission, scenario, terrain, seed, fence, change)
     target = None if log is None else _log_target(log, opened, mission, program, overwrite)
     limits = FlightLimits(max_hours, max_log)
-    with stage(f"flying {flight_text(opened.setup)}") as advance:
+    with stage(f"flying {flight_text(opened.setup)}", flight_kind(opened.setup)) as advance:
         flown = fly_and_judge(
             opened.setup, opened.airframe, target, advance, every=60 // log_hz, autopilot=program, limits=limits
         )

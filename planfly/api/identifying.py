@@ -121,7 +121,7 @@ def identify_aircraft(
         volts, energy = sheet.volts, sheet.energy
     numbers = scaled(base_model(prior), stated["mass"], stated["span"], stated["area"], volts)
     check_base(prior)
-    with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}"):
+    with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}", "reading logs"):
         motions = [read_motion(path) for path in paths]
         motion = None if check is None else read_motion(Path(check))
         _refuse_equal([*motions, *([] if motion is None else [motion])])
@@ -136,7 +136,7 @@ def identify_aircraft(
         found = make_identified(prior, numbers, estimate, [one for one, _, _ in read], outputs)
         files = folder_files(found, target.name, (volts, energy))
     replays = () if checked is None else _replay(found, files, target.name, checked)
-    with stage("drawing"):
+    with stage("drawing", "drawing an identification"):
         files["identify.html"] = _page(found, replays, None if check is None else Path(check).name, target.name)
     write_folder(target, {name: text.encode() for name, text in files.items()})
     slow = slow_logs([one for one, _, _ in read])

@@ -181,7 +181,7 @@ def refly(
     files: list[Path] = []
     if out is not None:
         folder = clean_folder(out, REFLY_FILES, overwrite=True)
-        with stage("drawing"):
+        with stage("drawing", "drawing a flight again"):
             for number, again in enumerate(agains, 1):
                 ending = "" if number == 1 else f"-{number}"
                 files += [*_draw(folder, again, ending), _record(folder, again, found, ending)]

@@ -285,7 +285,7 @@ def _planned(
         read = None if isinstance(source, Scenario) else Path(source)
         target = file_target(out, world.name, number, overwrite=overwrite, source=read)
     limits, ends = load_airframe(world).limits.surely(), _stop_condition(seconds, stop)
-    with stage(f"planning {world.name}") as advance:
+    with stage(f"planning {world.name}", "planning") as advance:
         if flown is None:
             made = plan_path(world, limits, seed=number, algorithm=algorithm, progress=advance, stop=ends)
         else:

@@ -100,7 +100,7 @@ def report(
 
     shown = _shown(source)
     folder = clean_folder(out, LOG_FIGURES, overwrite=overwrite)
-    with stage("drawing"):
+    with stage("drawing", "drawing a report"):
         files = write_report(
             folder, shown.setup, shown.track, shown.verdict, ended=shown.ended, events=shown.events, svg=svg,
             versions=shown.versions or package_versions(), command=command,
@@ -150,7 +150,7 @@ def compare(
     found = compare_logs(*logs, names=(Path(logs[0].source).name, Path(logs[1].source).name))
     if out is not None:
         folder = clean_folder(out, COMPARE_FILES, overwrite=overwrite)
-        with stage("drawing"):
+        with stage("drawing", "drawing a comparison"):
             write_comparison(folder, found, svg=svg)
     return found
 

@@ -218,7 +218,7 @@ def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
 def _judged(setup: FlightSetup, track: Track | None, every: float, suggest: bool) -> ReturnsFound:
     world = return_world(setup)
     starts = return_starts(setup, track, every)
-    with stage(f"flying {len(starts)} returns"):
+    with stage(f"flying {len(starts)} returns", "flying returns"):
         judged = judge_returns(world, starts, every, fly_return)
     with stage("gliding from there without the engine"):
         found = ReturnsFound(setup, judged, judge_glides(world, starts))
@@ -228,6 +228,6 @@ def _judged(setup: FlightSetup, track: Track | None, every: float, suggest: bool
         remedies = suggest_parameters(world, starts)
         rally = suggest_rally(world, starts)
     remedies += [] if rally is None else [rally]
-    with stage(f"flying the returns of {len(remedies)} suggestions"):
+    with stage(f"flying the returns of {len(remedies)} suggestions", "flying suggested returns"):
         proved = [Suggested(one, judge_returns(one.on(world), starts, every, fly_return)) for one in remedies]
     return replace(found, suggested=tuple(one for one in proved if helps(found.returns, one.returns)))

@@ -18,7 +18,7 @@ from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_air
 from planfly.api.flying import named_program
 from planfly.api.planning import Wind, changed_scenario, opened_scenario
 from planfly.arguments import check_arguments
-from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_text
+from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_kind, flight_text
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
 from planfly.pipeline import autopilot_log, fly_and_judge, make_plan, make_setup, planned_for
@@ -190,7 +190,7 @@ def _rounds(
 
     def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
         planned_with = airframe if planned_in is scenario else tightened_airframe(airframe, planned_in)
-        with stage(f"planning {scenario.name}") as advance:
+        with stage(f"planning {scenario.name}", "planning") as advance:
             plan = make_plan(planned_in, planned_with, task.seed, advance=advance)
         if not flown:
             folder.mkdir(parents=True, exist_ok=True)
@@ -227,13 +227,13 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
         write_whole(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
-    with stage(f"flying {flight_text(setup)}") as advance:
+    with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
             setup, airframe, folder / "flight.mcap", advance, every=task.every, autopilot=task.program,
             limits=task.limits,
         )  # fmt: skip
     write_whole(folder / "verdict.json", verdict_json(flown.verdict))
-    with stage("drawing"):
+    with stage("drawing", "drawing a report"):
         write_report(
             folder, flown.setup, flown.track, flown.verdict, ended=flown.ended, versions=package_versions(),
             command=task.command, events=flown.events,

@@ -208,7 +208,7 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
 def _flown(opened: OpenedMission, suggest: bool) -> SurveyFound:
     """Fly a mission, measure its lines, and look for what would help."""
     _found_surveys(opened.setup)
-    with stage(f"flying {flight_text(opened.setup)}") as advance:
+    with stage(f"flying {flight_text(opened.setup)}", "flying a survey") as advance:
         flown = fly_and_judge(opened.setup, opened.airframe, None, advance, reference=False)
     found = _measured(flown.setup, flown.track, flown.verdict)
     if not suggest or found.usable:

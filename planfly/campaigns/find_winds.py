@@ -109,6 +109,9 @@ def find_winds(
         pool: WorkerPool | None = None
         while asked := search.next_round():
             if missing := known.missing(asked):
+                if pool is None:
+                    # Before the workers are there, which takes seconds.
+                    pace.begin(len(known.flown))
                 pool = pool or stack.enter_context(worker_pool(workers, base, fly))
                 _fly_round(pool, search, missing, known, pace)
             for one in asked:
@@ -229,6 +232,13 @@ class _Pace:
 
     def __init__(self, search: _Search, known: int, advance: Advance | None) -> None:
         self._search, self._advance, self._rate = search, advance, FlightRate(known)
+
+    def begin(self, flights: int) -> None:
+        """How much there is to do, at least, before the first flight."""
+        if self._advance is not None:
+            total = max(len(self._search.flown) + self._search.at_least(), flights + 1)
+            remark = f"{flights} of {total} flights at least"
+            self._advance(float(flights), float(total), remark)
 
     def tell(self, flights: int, last: bool = False) -> None:
         """How far it is: directions settled, flights, flights a minute, and time left while flights are known to come.

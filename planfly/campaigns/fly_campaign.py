@@ -95,13 +95,15 @@ def fly_campaign(
         if index < goal.flights:
             book.add(index, outcome)
     if not book.decided and book.tally.flown < goal.flights:
+        pace = _Pace(goal, estimator, book.tally, advance)
         with worker_pool(workers, base, fly) as pool:
-            _fly_rest(pool, book, store, _Pace(goal, estimator, book.tally, advance))
+            _fly_rest(pool, book, store, pace)
     store.drop_from(book.tally.flown)
     return estimator.estimate(store.tally())
 
 
 def _fly_rest(pool: WorkerPool, book: _Book, store: Store, pace: "_Pace") -> None:
+    pace.start(book.tally)
     for _, row in pool.fly(book.following):
         _take(row, book, store)
         pace.tell(book.tally)
@@ -120,7 +122,20 @@ class _Pace:
 
     def __init__(self, goal: Goal, estimator: Estimator, known: Tally, advance: Advance | None) -> None:
         self._goal, self._estimator, self._advance = goal, estimator, advance
+        self.start(known)
+        if advance is not None:
+            # Before the workers are there, which takes seconds.
+            total = self._total(known)
+            remark = f"{known.flown} of {total} flights" + (" at least" if goal.stops else "")
+            advance(float(known.flown), float(total), remark)
+
+    def start(self, known: Tally) -> None:
+        """Count the time from here: the workers are there."""
         self._rate = FlightRate(known.flown)
+
+    def _total(self, tally: Tally) -> int:
+        """How many flights there will be, at least."""
+        return max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
 
     def tell(self, tally: Tally, last: bool = False) -> None:
         """How far it is: flights, P with its bounds, flights a minute, time left.  last: whether or not it is due."""
@@ -128,7 +143,7 @@ class _Pace:
             return
         found = self._estimator.estimate(tally)
         rate = self._rate.a_second(tally.flown)
-        total = max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
+        total = self._total(tally)
         left = (total - tally.flown) / rate if rate > 0.0 else 0.0
         remark = (
             f"{tally.flown} flights, P {tally.share:.4f} ({found.lower:.4f} to {found.upper:.4f}),"

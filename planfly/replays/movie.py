@@ -60,7 +60,7 @@ def write_movie(
 
 
 def _shown(film: MovieFrames) -> Iterator[Image.Image]:
-    with stage("drawing") as advance:
+    with stage("drawing", "drawing frames") as advance:
         for number, frame in enumerate(film.frames(), 1):
             yield Image.fromarray(frame)
             advance(number, len(film), f"frame {number} of {len(film)}")
@@ -148,7 +148,7 @@ def _mp4(film: MovieFrames, program: str) -> bytes:
             "-r", str(RATE), "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(out),
         ]  # fmt: skip
         with (
-            stage("drawing") as advance,
+            stage("drawing", "drawing frames") as advance,
             subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages) as encoder,
         ):
             entry = encoder.stdin

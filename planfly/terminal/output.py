@@ -3,19 +3,23 @@
 import argparse
 import contextlib
 import io
+import itertools
+import json
+import math
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from planfly.stages import Advance, Receiver, received_by
 from planfly.targets import refuse_existing
 from world.errors import PlanflyError
-from world.files import write_whole
+from world.files import read_at_most, write_whole
 
 if TYPE_CHECKING:
     from logs.verdict.findings import Verdict
@@ -116,6 +120,50 @@ def tolerate_closed_output() -> Iterator[None]:
 
 
 # ----------------------------------------------------------------------
+# What stages took the last time, by their kind: what there is to say of one before anything of it is measured.
+
+# Kinds are a few dozen; what is longer is none of ours.
+_MAX_BYTES = 20_000
+
+
+class _LastTime(NamedTuple):
+    """What a stage of a kind took.
+
+    each: s for each unit that it counts, 0 where it counts none.  whole: s of all of it.
+    """
+
+    each: float
+    whole: float
+
+
+def _times_file() -> Path:
+    # Imported here: who asks for help has no need of it.
+    from platformdirs import user_cache_dir
+
+    return Path(user_cache_dir("planfly")) / "durations.json"
+
+
+def _last_times() -> dict[str, _LastTime]:
+    """By kind of stage; none where the file is not there, or no such file."""
+    found = {}
+    with contextlib.suppress(OSError, ValueError, RecursionError):
+        read = json.loads(read_at_most(_times_file(), _MAX_BYTES, "durations"))
+        for kind, taken in read.items() if isinstance(read, dict) else ():
+            numbers = taken if isinstance(taken, list) and len(taken) == 2 else [math.nan]
+            if all(isinstance(one, int | float) and 0.0 <= one < math.inf for one in numbers):
+                found[str(kind)] = _LastTime(*map(float, numbers))
+    return found
+
+
+def _keep_time(kind: str, taken: _LastTime) -> None:
+    """Remember what a stage of a kind took; nothing is said where that cannot be written."""
+    text = json.dumps(_last_times() | {kind: tuple(float(f"{one:.4g}") for one in taken)}, indent=1)
+    with contextlib.suppress(OSError):
+        _times_file().parent.mkdir(parents=True, exist_ok=True)
+        write_whole(_times_file(), text)
+
+
+# ----------------------------------------------------------------------
 # Progress: a bar on a terminal, plain lines elsewhere; on standard error, so that results can be piped.
 
 
@@ -124,28 +172,43 @@ def _say(line: str) -> None:
 
 
 # s.  Where no terminal is, an estimate is told this long after the first report, and again when four times as long has
-# passed, at least once a minute.
+# passed, at least once a minute; and a stage that reports nothing is named after the first second, and once a minute.
 _FIRST_TOLD, _TOLD_AGAIN, _TOLD_EVERY = 2.0, 4.0, 60.0
+_LOOKS_EVERY = 1.0
+# Stages that have begun in this process: one within another makes the outer one's time none that comes again.
+_begun = itertools.count()
 
 
 class _TimeLeft:
-    """How long a stage of work will still take, if it goes on as it went since its first report.
+    """How long a stage of work will still take: once it has reported twice, if it goes on as since its first report.
 
-    What comes before that is not the work: kernels may have been compiled.
+    Until then there is what such a stage took the last time.
+    What comes before the first report is not the work: kernels may have been compiled.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, kind: str) -> None:
+        self._kind, self._number = kind, next(_begun)
+        self._started = time.monotonic()
         self._first: tuple[float, float] | None = None
-        self._due = _FIRST_TOLD
+        self._done, self._due = 0.0, _FIRST_TOLD
 
     def estimate(self, done: float, total: float) -> str:
         """In words; "" where nothing has been done since the first report, or all, or where the total is not known."""
         if self._first is None:
             self._first = time.monotonic(), done
-        more = done - self._first[1]
+        self._done, more = done, done - self._first[1]
         if not (more > 0.0 and done < total):
             return ""
         return f"{_duration(self._passed() * (total - done) / more)} left"
+
+    def at_first(self, to_do: float) -> str:
+        """In words, before anything is measured.  to_do: units that are to be done, 0 where nobody knows."""
+        last = _last_times().get(self._kind)
+        if last is not None and to_do > 0.0 and last.each > 0.0:
+            return f"about {_duration(last.each * to_do)}, at the pace of the last time here"
+        if last is not None:
+            return f"{_duration(last.whole)} the last time here"
+        return "no estimate yet" if to_do > 0.0 else "no estimate"
 
     def is_due(self) -> bool:
         """Whether it is time to tell again; asked by what then tells."""
@@ -154,6 +217,16 @@ class _TimeLeft:
             return False
         self._due = min(_TOLD_AGAIN * passed, passed + _TOLD_EVERY)
         return True
+
+    def elapsed(self) -> float:
+        """Seconds since it began."""
+        return time.monotonic() - self._started
+
+    def keep(self) -> None:
+        """Remember what all of it took for the next time, unless it had another stage within, such as a compilation."""
+        if next(_begun) == self._number + 1:
+            units = 0.0 if self._first is None else self._done - self._first[1]
+            _keep_time(self._kind, _LastTime(self._passed() / units if units > 0.0 else 0.0, self.elapsed()))
 
     def _passed(self) -> float:
         return 0.0 if self._first is None else time.monotonic() - self._first[0]
@@ -171,31 +244,42 @@ def _duration(seconds: float) -> str:
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Advance]:
+def progress(title: str, kind: str = "") -> Iterator[Advance]:
     """Show a stage of work; the work reports how much of how much is done, and a remark.
 
-    Beside the remark stands how long it will still take, where the remark does not say.  A total of 0 is one that
-    nobody knows.
+    kind: see `planfly.stages.stage`.
+    Beside the remark stands how long it will still take, where the remark does not say; at first, what such a stage
+    took the last time on this machine, or that there is no estimate.  A total of 0 is one that nobody knows.
     """
-    if not sys.stderr.isatty():
-        yield from _lines(title)
-        return
-    from tqdm import tqdm
-
-    left = _TimeLeft()
-    with tqdm(total=100, desc=title, bar_format="{desc:<22} {bar:30} {percentage:3.0f} %{postfix}", leave=True) as bar:
-
-        def advance(done: float, total: float, remark: str = "") -> None:
-            share = 100.0 * done / total if total > 0 else 0.0
-            bar.update(max(0.0, min(100.0, share) - bar.n))
-            bar.set_postfix_str(_with_estimate(remark, left.estimate(done, total)))
-
-        yield advance
-        bar.update(100 - bar.n)
+    left = _TimeLeft(kind or title)
+    shown = _Bar(title, left) if sys.stderr.isatty() else _Lines(title, left)
+    with shown, _looked_at(shown):
+        yield shown.advance
+    left.keep()
 
 
-def _with_estimate(remark: str, estimate: str) -> str:
-    return ", ".join(filter(None, [remark, "" if _says_left(remark) else estimate]))
+@contextmanager
+def _looked_at(shown: "_Bar | _Lines") -> Iterator[None]:
+    """Have a stage look at the clock now and then, whatever its work is at; without a thread where there is no room."""
+    over = threading.Event()
+
+    def look() -> None:
+        # Whoever read it may be gone: the work itself meets that.
+        with contextlib.suppress(OSError, ValueError):
+            while not over.wait(_LOOKS_EVERY):
+                shown.look()
+
+    watcher = threading.Thread(target=look, name="progress", daemon=True)
+    with contextlib.suppress(RuntimeError):
+        watcher.start()
+    try:
+        yield
+    finally:
+        over.set()
+
+
+def _joined(*parts: str) -> str:
+    return ", ".join(filter(None, parts))
 
 
 def _says_left(remark: str) -> bool:
@@ -203,23 +287,102 @@ def _says_left(remark: str) -> bool:
     return " left" in remark
 
 
-def _lines(title: str) -> Iterator[Advance]:
-    """A line when work begins, one now and then, and one when it is done; none for input that is refused before."""
-    left, last, begun = _TimeLeft(), "", False
-    started = time.monotonic()
+class _Bar:
+    """A stage on a terminal.  Its estimate of the last time stands until there is one of this time."""
 
-    def remember(done: float, total: float, remark: str = "") -> None:
-        nonlocal last, begun
-        estimate = left.estimate(done, total)
-        if not begun:
-            _say(f"{title} ...")
-        elif estimate and left.is_due():
-            _say(f"{title}: {_with_estimate(remark, estimate)}")
-        last, begun = remark, True
+    def __init__(self, title: str, left: _TimeLeft) -> None:
+        from tqdm import tqdm
 
-    yield remember
-    end = f": {last}" if last else ""
-    _say(f"{title}: done in {time.monotonic() - started:.1f} s{end}")
+        self._left, self._lock = left, threading.Lock()
+        self._remark, self._measured = "", False
+        self._at_first = left.at_first(0.0)
+        form = "{desc:<22} {bar:30} {percentage:3.0f} %{postfix}"
+        self._bar = tqdm(total=100, desc=title, bar_format=form, leave=True)
+
+    def __enter__(self) -> None:
+        self.look()
+
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        with self._lock:
+            if error is None:
+                self._bar.set_postfix_str(self._remark, refresh=False)
+                self._bar.update(100 - self._bar.n)
+            self._bar.close()
+
+    def advance(self, done: float, total: float, remark: str = "") -> None:
+        """Take how far it is."""
+        with self._lock:
+            share = 100.0 * done / total if total > 0 else 0.0
+            self._bar.update(max(0.0, min(100.0, share) - self._bar.n))
+            estimate = self._left.estimate(done, total)
+            self._remark = remark
+            if estimate or _says_left(remark) or 0.0 < total <= done:
+                self._measured = True
+            if not self._measured:
+                self._at_first = self._left.at_first(max(0.0, total - done))
+                estimate = self._at_first
+            self._bar.set_postfix_str(_joined(remark, "" if _says_left(remark) else estimate))
+
+    def look(self) -> None:
+        """Show how long it has taken so far, as long as nothing is measured."""
+        with self._lock:
+            if not self._measured and not self._bar.disable:
+                self._bar.set_postfix_str(_joined(self._remark, self._at_first, f"{self._left.elapsed():.0f} s so far"))
+
+
+class _Lines:
+    """A stage where no terminal is: a line when work begins, one now and then, and one when it is done.
+
+    None for input that is refused before, within the first second.
+    """
+
+    def __init__(self, title: str, left: _TimeLeft) -> None:
+        self._title, self._left, self._lock = title, left, threading.Lock()
+        self._remark, self._told = "", 0.0
+        self._begun = self._counted = self._over = False
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        with self._lock:
+            self._over = True
+            if error is None:
+                end = f": {self._remark}" if self._remark else ""
+                _say(f"{self._title}: done in {self._left.elapsed():.1f} s{end}")
+
+    def advance(self, done: float, total: float, remark: str = "") -> None:
+        """Take how far it is."""
+        with self._lock:
+            self._remark = remark
+            estimate = self._left.estimate(done, total)
+            counted, self._counted = self._counted, self._counted or total > 0.0
+            at_first = "" if counted else remark if _says_left(remark) else self._left.at_first(max(0.0, total - done))
+            if not self._begun:
+                self._begin(at_first)
+            elif total > 0.0 and not counted:
+                # It had been named before it knew how much there is.
+                self._tell(f"{self._title}: {_joined('' if _says_left(remark) else remark, at_first)}")
+            elif estimate and self._left.is_due():
+                self._tell(f"{self._title}: {_joined(remark, '' if _says_left(remark) else estimate)}")
+
+    def look(self) -> None:
+        """Name a stage that reports nothing, and say now and then how long it has taken so far."""
+        with self._lock:
+            if self._over:
+                return
+            if not self._begun:
+                self._begin(self._left.at_first(0.0))
+            elif self._left.elapsed() - self._told >= _TOLD_EVERY:
+                self._tell(f"{self._title}: {_joined(self._remark, f'{self._left.elapsed():.0f} s so far')}")
+
+    def _begin(self, estimate: str) -> None:
+        self._begun = True
+        self._tell(f"{self._title} ... ({estimate})")
+
+    def _tell(self, line: str) -> None:
+        self._told = self._left.elapsed()
+        _say(line)
 
 
 def _ignore(*_: object) -> None:
@@ -227,7 +390,7 @@ def _ignore(*_: object) -> None:
 
 
 ON_STANDARD_ERROR = Receiver(progress, _say)
-SILENT = Receiver(lambda _title: contextlib.nullcontext(_ignore), _ignore)
+SILENT = Receiver(lambda *_: contextlib.nullcontext(_ignore), _ignore)
 
 
 # ----------------------------------------------------------------------

@@ -55,7 +55,7 @@ def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], caps
         assert numba.njit(lambda a: a + 1)(1) == 2
         begun, done = capsys.readouterr().err.splitlines()
         kernel_is_compiled()
-    assert begun == f"{SAID} ..."
+    assert begun == f"{SAID} ... (no estimate yet)"
     assert done.startswith(f"{SAID}: done in ")
     assert done.endswith(f" s: 2 of {whole}")
     assert capsys.readouterr().err == ""

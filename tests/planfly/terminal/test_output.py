@@ -1,12 +1,17 @@
 """Standard output that outlives its reader: what is printed after it has gone is dropped, and no error is left."""
 
+import contextlib
 import io
+import json
 import re
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
+from planfly.terminal import output
 from planfly.terminal.output import progress
 
 CODE = """
@@ -52,7 +57,7 @@ def test_a_line_when_work_begins_and_one_when_it_is_done(capsys: pytest.CaptureF
     with progress("flying") as advance:
         assert capsys.readouterr().err == ""
         advance(1.0, 4.0, "1 of 4 km")
-        assert capsys.readouterr().err == "flying ...\n"
+        assert capsys.readouterr().err == "flying ... (no estimate yet)\n"
         advance(4.0, 4.0, "4 of 4 km")
         assert capsys.readouterr().err == ""
     printed = capsys.readouterr()
@@ -81,7 +86,7 @@ def test_how_long_it_will_still_take_is_told_now_and_then(
             advance(second, 200.0, f"{second} flights")
             said += [(second, line) for line in capsys.readouterr().err.splitlines()]
     assert said == [
-        (0, "flying ..."),
+        (0, "flying ... (no estimate yet)"),
         (2, "flying: 2 flights, 3 min left"),
         (8, "flying: 8 flights, 3 min left"),
         (32, "flying: 32 flights, 3 min left"),
@@ -103,7 +108,11 @@ def test_an_estimate_of_the_works_own_goes_before(
         clock.now += 50.0
         advance(70.0, 0.0, "a fresh one")
     told = capsys.readouterr().err.splitlines()
-    assert told == ["flying ...", "flying: 50 flights, 7 s left at least", "flying: done in 100.0 s: a fresh one"]
+    assert told == [
+        "flying ... (no estimate)",
+        "flying: 50 flights, 7 s left at least",
+        "flying: done in 100.0 s: a fresh one",
+    ]
 
 
 def test_a_bar_has_the_estimate_from_the_second_report(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,7 +120,9 @@ def test_a_bar_has_the_estimate_from_the_second_report(monkeypatch: pytest.Monke
     monkeypatch.setattr(terminal, "isatty", lambda: True)
     monkeypatch.setattr("sys.stderr", terminal)
     with progress("flying") as advance:
+        assert "0 %, no estimate, 0 s so far" in terminal.getvalue()
         advance(0.0, 10.0, "0 of 10 km")
+        assert terminal.getvalue().rstrip().endswith("0 %, 0 of 10 km, no estimate yet")
         clock.now += 1.0
         advance(1.0, 10.0, "1 of 10 km")
         assert "10 %, 1 of 10 km, 9 s left" in terminal.getvalue()
@@ -123,3 +134,132 @@ def test_input_that_is_refused_first_has_no_line(capsys: pytest.CaptureFixture[s
     with pytest.raises(ValueError, match="refused"), progress("flying"):
         raise ValueError("refused")
     assert capsys.readouterr().err == ""
+
+
+# ----------------------------------------------------------------------
+# Before anything is measured: what such a stage took the last time on this machine.
+
+REMEMBER = output._keep_time
+
+
+@pytest.fixture
+def times(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """The file of what stages took, which is not there yet."""
+    file = tmp_path / "cache" / "durations.json"
+    monkeypatch.setattr(output, "_times_file", lambda: file)
+    monkeypatch.setattr(output, "_keep_time", REMEMBER)
+    return file
+
+
+def run(clock: Clock, title: str, kind: str, units: int, seconds: float) -> None:
+    with progress(title, kind) as advance:
+        # Kernels are loaded first.
+        clock.now += 7.0
+        for done in range(units + 1):
+            advance(float(done), float(units), "")
+            clock.now += seconds if done < units else 0.0
+
+
+def test_a_first_estimate_is_the_last_ones_pace(
+    times: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """20 units of 0.5 s each were counted: 60 of another of this kind are about 30 s; other kinds are unknown."""
+    clock = Clock(monkeypatch)
+    run(clock, "planning a", "planning", 20, 0.5)
+    assert capsys.readouterr().err.splitlines()[0] == "planning a ... (no estimate yet)"
+    run(clock, "planning b", "planning", 60, 1.0)
+    assert capsys.readouterr().err.splitlines()[0] == "planning b ... (about 30 s, at the pace of the last time here)"
+    run(clock, "planning c", "planning", 60, 1.0)
+    assert capsys.readouterr().err.splitlines()[0] == "planning c ... (about 60 s, at the pace of the last time here)"
+    with progress("flying") as advance:
+        advance(0.0, 60.0, "")
+    assert capsys.readouterr().err.splitlines()[0] == "flying ... (no estimate yet)"
+
+
+def test_work_that_counted_nothing_the_last_time_is_said_to_take_as_long(
+    times: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A search that finds its path among its seeds has no generations."""
+    clock = Clock(monkeypatch)
+    run(clock, "planning", "planning", 0, 0.5)
+    run(clock, "planning", "planning", 20, 0.5)
+    assert capsys.readouterr().err.splitlines()[2] == "planning ... (7 s the last time here)"
+
+
+def test_what_failed_or_had_a_stage_within_is_no_measure(times: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Clock(monkeypatch)
+    with contextlib.suppress(ValueError), progress("planning") as advance:
+        advance(0.0, 10.0, "")
+        clock.now += 1.0
+        advance(1.0, 10.0, "")
+        raise ValueError("refused")
+    assert not times.exists()
+    with progress("planning"):
+        run(clock, "compiling", "compiling", 2, 30.0)
+    assert list(json.loads(times.read_text())) == ["compiling"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "nonsense", '{"flying": 3}', '{"flying": [1, "x"]}', '{"flying": [NaN, 1]}', "{" + " " * 20_000 + "}"],
+)
+def test_a_damaged_file_of_times_is_none(
+    text: str, times: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times.parent.mkdir()
+    times.write_text(text)
+    run(Clock(monkeypatch), "flying", "flying", 2, 1.0)
+    assert capsys.readouterr().err.splitlines()[0] == "flying ... (no estimate yet)"
+    assert json.loads(times.read_text())["flying"] == [1.0, 9.0]
+
+
+def test_no_place_to_remember_is_no_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(output, "_keep_time", REMEMBER)
+    monkeypatch.setattr(output, "_times_file", lambda: tmp_path / "file" / "durations.json")
+    run(Clock(monkeypatch), "flying", "flying", 2, 1.0)
+
+
+def test_a_stage_that_reports_nothing_is_named_and_timed(
+    times: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """After the first second, and each minute after; the next one says what this one took."""
+    clock, lines = Clock(monkeypatch), []
+    for _ in range(2):
+        left = output._TimeLeft("drawing a map")
+        shown = output._Lines("drawing", left)
+        with shown:
+            for _ in range(130):
+                clock.now += 1.0
+                shown.look()
+        left.keep()
+        lines.append(capsys.readouterr().err.splitlines())
+    told = ["drawing: 61 s so far", "drawing: 121 s so far", "drawing: done in 130.0 s"]
+    assert lines == [["drawing ... (no estimate)", *told], ["drawing ... (2 min the last time here)", *told]]
+
+
+def test_what_is_counted_late_has_its_estimate_then(
+    times: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = Clock(monkeypatch)
+    run(clock, "flying", "flying", 2, 3.0)
+    capsys.readouterr()
+    shown = output._Lines("flying", output._TimeLeft("flying"))
+    shown.look()
+    shown.advance(0.0, 4.0, "0 of 4 flights")
+    shown.advance(0.0, 4.0, "0 of 4 flights")
+    assert capsys.readouterr().err.splitlines() == [
+        "flying ... (13 s the last time here)",
+        "flying: 0 of 4 flights, about 12 s, at the pace of the last time here",
+    ]
+
+
+def test_the_clock_is_looked_at_whatever_the_work_is_at(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(output, "_LOOKS_EVERY", 0.001)
+    with progress("drawing"):
+        until, said = time.monotonic() + 60.0, ""
+        while not said and time.monotonic() < until:
+            said = capsys.readouterr().err
+    assert said == "drawing ... (no estimate)\n"
