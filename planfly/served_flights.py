@@ -45,6 +45,7 @@ from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.rules.registry import rule_word
 from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.open_mission import NamedFences, open_mission
@@ -323,4 +324,5 @@ def _failed_texts(failed: list[Finding]) -> list[StatusText]:
 
 def _heading(item: Finding) -> str:
     """Rule and place, the place once."""
-    return item.rule if item.placed else f"{item.rule} at {place_text(item.place)}"
+    word = rule_word(item.rule)
+    return word if item.placed else f"{word} at {place_text(item.place)}"

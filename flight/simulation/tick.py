@@ -188,10 +188,10 @@ NEAR, WIDER, AT_HEIGHT = 300.0, 1.3, 20.0
 MOST_CIRCLES, _SLOW = 5.0, 10.0
 ENDS = {
     COMPLETED: "completed",
-    NOT_A_NUMBER: "departure: the state is not a number",
+    NOT_A_NUMBER: "loss of control: the state is not a number",
     GROUND: "ground contact",
-    BANKED: "departure: bank beyond 75 degrees",
-    STALLED: "departure: airspeed below the stall",
+    BANKED: "loss of control: bank beyond 75 degrees",
+    STALLED: "loss of control: airspeed below the stall",
     MISSED: "missed: passed the end of the route more than 100 m from it",
     EMPTY: "nothing is left in the battery or the tank",
 }

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from xml.etree import ElementTree
 
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.rules.registry import rule_word
 from logs.verdict.wording import place_text, suggestions_text
 
 
@@ -50,7 +51,8 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
         name = place if number == 1 else f"{place} ({number})"
         case = ElementTree.Element("testcase", classname=f"planfly.{finding.rule}", name=name)
         if finding.ok is False:
-            failure = ElementTree.SubElement(case, "failure", message=_plain(f"{finding.rule}: {finding.reason}"))
+            said = _plain(f"{rule_word(finding.rule)}: {finding.reason}")
+            failure = ElementTree.SubElement(case, "failure", message=said)
             if finding.suggestions:
                 failure.text = _plain(f"would pass: {suggestions_text(finding.suggestions)}")
         elif finding.ok is None:

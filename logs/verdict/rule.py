@@ -119,6 +119,11 @@ class Rule:
     explained: bool = False
 
     @property
+    def word(self) -> str:
+        """What a person calls it, within a sentence as in a table; `name` is what data calls it."""
+        return self.noun or self.name
+
+    @property
     def scale(self) -> float | None:
         """The margin's scale, in the margin's unit; None where the margin ranks no flights."""
         return None if self.margin is None else self.margin.scale

@@ -155,7 +155,7 @@ def _most_telling(failed: list[Finding]) -> list[Finding]:
 def _phrase(item: Finding) -> str:
     """One failed finding in a few words."""
     rule = RULES[item.rule]
-    return (rule.phrase(item) if rule.phrase is not None else "") or beyond_limit(rule.noun or rule.name, item)
+    return (rule.phrase(item) if rule.phrase is not None else "") or beyond_limit(rule.word, item)
 
 
 def summary_lines(

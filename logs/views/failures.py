@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Place, PlaceKind
+from logs.verdict.rules.registry import rule_word
 from logs.verdict.wording import place_text
 from logs.views.charts import Floats, Label
 from world.geometry import leg_runs
@@ -70,8 +71,9 @@ def _rules_at(failed: list[Finding], kind: PlaceKind, count: int) -> dict[int, t
         place = finding.place
         if place.kind == kind and place.index is not None and place.index < count:
             rules = found.setdefault(place.index, [])
-            if finding.rule not in rules:
-                rules.append(finding.rule)
+            word = rule_word(finding.rule)
+            if word not in rules:
+                rules.append(word)
     return {number: tuple(rules) for number, rules in sorted(found.items())}
 
 

@@ -14,7 +14,7 @@ from flight.live.telemetry import AUTO, CRITICAL, INFO, LOITER, WARNING
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from logs.recording.reader import read_log
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.places import DecidingParameter, Place
+from logs.verdict.places import FLIGHT, DecidingParameter, Place
 from planfly import served_flights
 from planfly.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
 from tests.logs.made_flight import make_track
@@ -39,6 +39,12 @@ def test_of_a_verdict_the_worst_comes_first_and_the_rest_is_counted() -> None:
     assert decided[2:] == texts[1:]
     clean = Verdict((), True, True, ("flyable",), "flown")
     assert verdict_texts("flown", clean) == (("verdict (flown): FLYABLE", INFO),)
+
+
+def test_a_station_reads_the_words_of_the_terminal() -> None:
+    lost = Finding("departure", FLIGHT, 0.0, 80.0, 75.0, "check", 0.0, -5.0, "deg", "every row", False, "bank 80°")
+    verdict = Verdict((lost,), False, True, ("not flyable",), "flown")
+    assert verdict_texts("flown", verdict)[1] == ("loss of control at flight: bank 80°", WARNING)
 
 
 @pytest.fixture

@@ -52,3 +52,12 @@ RULES: dict[str, Rule] = {
         completion_rule.RULE,
     )
 }
+
+
+def rule_word(name: str) -> str:
+    """What a person calls a rule by its name in data; that name of one that is none of `RULES`.
+
+    >>> rule_word("departure"), rule_word("slope")
+    ('loss of control', 'slope')
+    """
+    return RULES[name].word if name in RULES else name

@@ -144,11 +144,11 @@ def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]])
 def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
     """How many findings fail, and each rule's margin closest to its limit; NaN for one that fails without a number."""
     found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
-    for rule in RULES:
-        closest = closest_to_limit(one for one in verdict.findings if one.rule == rule)
+    for name, rule in RULES.items():
+        closest = closest_to_limit(one for one in verdict.findings if one.rule == name)
         if closest is not None:
             margin = math.nan if closest.margin is None else closest.margin
-            found[f"smallest margin: {rule}", closest.unit] = margin
+            found[f"smallest margin: {rule.word}", closest.unit] = margin
     return found
 
 

@@ -10,7 +10,7 @@ from flight.simulation.setup import MissionStretch
 from logs.verdict.findings import Finding, Verdict, closest_to_limit, left_open
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.places import DecidingParameter, Suggestion
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rules.registry import RULES, rule_word
 from logs.verdict.summary import failed_by_rule
 from logs.verdict.wording import place_text, suggestions_text
 
@@ -254,7 +254,7 @@ def failed_groups(verdict: Verdict) -> list[FailedGroup]:
         rule = group[0].rule
         judged = sum(finding.rule == rule and finding.ok is not None for finding in verdict.findings)
         worst, *others = (_row(finding, verdict.deciding) for finding in group)
-        groups.append(FailedGroup(rule, judged, worst, tuple(map(_in_short, others))))
+        groups.append(FailedGroup(rule_word(rule), judged, worst, tuple(map(_in_short, others))))
     return groups
 
 
@@ -306,7 +306,7 @@ def _row(finding: Finding, deciding: DecidingParameter | None = None) -> Finding
     return FindingRow(
         state=state,
         sign=f"{_SIGNS[state]} {_WORDS[state]}",
-        rule=finding.rule,
+        rule=rule_word(finding.rule),
         where=place_text(finding.place),
         planned=number(planned),
         flown=number(flown),
@@ -355,10 +355,10 @@ def _rule_row(rule: str, group: list[Finding]) -> RuleRow:
     sign = f"{_SIGNS[state]} {_WORDS[state]}"
     if closest is None:
         why = "" if judged else group[0].reason
-        return RuleRow(state, sign, rule, ", ".join(parts), why, NOTHING, NOTHING, NOTHING, NOTHING, "")
+        return RuleRow(state, sign, rule_word(rule), ", ".join(parts), why, NOTHING, NOTHING, NOTHING, NOTHING, "")
     row = _row(closest)
     numbers = (row.planned, row.flown, row.limit, row.margin, row.unit)
-    return RuleRow(state, sign, rule, ", ".join(parts), row.where, *numbers)
+    return RuleRow(state, sign, rule_word(rule), ", ".join(parts), row.where, *numbers)
 
 
 # ----------------------------------------------------------------------

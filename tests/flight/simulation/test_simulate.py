@@ -248,7 +248,7 @@ def test_not_a_number(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     flight.fdm.write(np.full(4, math.nan))
     flight.fdm.step()
     rows, ended = flight.block(60)
-    assert ended == "departure: the state is not a number"
+    assert ended == "loss of control: the state is not a number"
     assert len(rows) == 0
     assert np.isfinite(flight.memory.tolist()).all()
 

@@ -44,6 +44,12 @@ def test_each_finding_is_a_case_and_the_answer_one_more() -> None:
     assert answer[0].get("message") == "not flyable: slope"
 
 
+def test_a_failure_has_the_words_of_the_terminal_and_its_class_those_of_data() -> None:
+    lost = make_finding("departure", FLIGHT, ok=False, reason="bank 80° at 3.0 s")
+    made = cases(junit_text({"m": verdict(lost, flyable=False, line="no")}))
+    assert made["planfly.departure", "flight"][0].get("message") == "loss of control: bank 80° at 3.0 s"
+
+
 @pytest.mark.parametrize(("flyable", "failures"), [(True, 0), (False, 1)])
 def test_what_was_not_judged_in_full_is_no_success(flyable: bool, failures: int) -> None:
     """Nothing failed, but slopes are within what is not known of the aircraft: exit code 3, and no green case."""

@@ -59,6 +59,13 @@ def test_a_rule_that_fails_shows_no_margin_of_what_passes_beside_it(
     assert "11.6" not in line
 
 
+def test_a_rule_is_called_as_on_the_terminal(log_file: Path) -> None:
+    log = read_log(log_file)
+    _, items = compared(log, log)
+    assert "smallest margin: loss of control" in items
+    assert not [name for name in items if "departure" in name]
+
+
 def test_differences_and_notes_state_what_differs(log_file: Path, other: FlightLog, track: Track) -> None:
     found, items = compared(read_log(log_file), other)
     assert items["time in the air"].second - items["time in the air"].first == pytest.approx(0.5)

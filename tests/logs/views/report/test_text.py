@@ -19,6 +19,7 @@ from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, 
 from logs.verdict.wording import place_text
 from logs.views.report.text import (
     badge_of,
+    failed_groups,
     finding_rows,
     left_lines,
     level_rows,
@@ -60,6 +61,16 @@ def test_the_number_that_passes_bounds_on_the_side_of_the_margin(
     found = would_pass(failed(rule, flown, limit, margin), None)
     assert (found.bound, found.value, found.misses) == (bound, limit, -margin)
     assert found
+
+
+def test_tables_call_a_rule_as_the_terminal_does() -> None:
+    lost = make_finding(
+        "departure", FLIGHT, ok=False, reason="bank 80°", flown=80.0, limit=75.0, margin=-5.0, unit="deg"
+    )
+    level = Verdict((lost,), flyable=False, complete=True, lines=("no",), level="flown")
+    assert (
+        rule_rows([lost])[0].rule == finding_rows([lost])[0].rule == failed_groups(level)[0].rule == "loss of control"
+    )
 
 
 def test_a_finding_that_fails_by_other_evidence_names_no_number() -> None:
