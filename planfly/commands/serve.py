@@ -16,6 +16,11 @@ from planfly.terminal.options import (
     world_options,
 )
 
+_SERVED = """
+It flies the modes AUTO, LOITER, GUIDED (to a place) and RTL, and changes between them in flight.
+Parameters are read, listed and set by name before a flight: those of the autopilot's law, and PFLY_FORCE,
+which at 1 has a mission that is judged not flyable armed and flown all the same (default: 0)."""
+
 
 def serve_options(line: LineParser) -> None:
     """The parser of ``planfly serve``."""
@@ -24,6 +29,7 @@ def serve_options(line: LineParser) -> None:
         "simulate a MAVLink vehicle that a ground station uploads to, arms, starts and watches",
         "planfly serve mission.waypoints --terrain jacksboro",
         extra="live",
+        more=_SERVED,
     )
     completed(
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="a mission file to begin with"),

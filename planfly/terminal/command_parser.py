@@ -134,17 +134,18 @@ class LineParser(CommandParser):
         """Have the commands that follow listed below a title."""
         self._section = title
 
-    def command(self, name: str, summary: str, *examples: str, extra: str = "") -> CommandParser:
+    def command(self, name: str, summary: str, *examples: str, extra: str = "", more: str = "") -> CommandParser:
         """Make the parser of a command.
 
         summary: what it does.  examples: lines of its help.  extra: of planfly, which it needs; "" for none.
+        more: sentences after the first, of its own help.
         """
         needs = f"  It needs the extra planfly[{extra}]." if extra else ""
         shown = f"\n{' ' * len('example: ')}".join(examples)
         made: CommandParser = self._parsers.add_parser(
             name,
             help=summary,
-            description=f"{summary[0].upper()}{summary[1:]}.{needs}",
+            description=f"{summary[0].upper()}{summary[1:]}.{more}{needs}",
             epilog=f"example: {shown}\n\n{EXIT_CODES}",
         )
         self.commands[name] = made

@@ -3,6 +3,7 @@
 import math
 import os
 import random
+import re
 import signal
 import time
 from collections import Counter
@@ -14,6 +15,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from flight.live.station_requests import FORCE
+from flight.live.telemetry import MODE_NAMES
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from planfly.airframe import load_airframe
@@ -344,3 +347,11 @@ def test_bad_usage_is_refused(
     assert code == 2
     assert word in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_its_help_names_modes_and_parameters(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every mode that a station may choose but MANUAL, in which nothing flies, and the parameter of planfly's own."""
+    with pytest.raises(SystemExit):
+        main(["serve", "--help"])
+    out = capsys.readouterr().out
+    assert [name for name in (*MODE_NAMES.values(), FORCE) if not re.search(rf"\b{name}\b", out)] == ["MANUAL"]
