@@ -98,7 +98,9 @@ def _lead(helper: "subprocess.Popen[str]", waiting: "deque[str]", lines: "queue.
 _Taken = ParamSpec("_Taken")
 _Given = TypeVar("_Given")
 
-TITLE = "compiling the numeric kernels, once"
+# Each group is compiled at its first use: a command may do so more than once.
+TITLE = "compiling numeric kernels"
+KEPT = ", which later runs load"
 _WAY_OUT = f"{VARIABLE}=FOLDER names one that can"
 # Units that this process has had compiled, or tried to.
 _shared: set[str] = set()
@@ -148,11 +150,12 @@ def _report_and_compile(units: list[str]) -> None:
         return
     if TEMPORARY:
         say(f"compiling the numeric kernels for this command alone: {WANTED} cannot be written; {_WAY_OUT}")
+    title = TITLE if TEMPORARY else TITLE + KEPT
     if not (units and sys.executable and is_received()):
-        say(f"{TITLE} ...")
+        say(f"{title} ...")
     if not units or not sys.executable:
         return
     total = len(kernels_of(tuple(units)))
-    with stage(TITLE) as advance:
+    with stage(title, TITLE) as advance:
         advance(0, total, f"0 of {total}")
         compile_units(units, folder, lambda done: advance(done, total, f"{done} of {total}"))

@@ -313,10 +313,7 @@ def winds(
         folder = place.folder
         goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
         base = asked.open(_dispersions(spread).without(ASKED), place)
-        with (
-            open_winds_store(base, goal, folder, resume=resume) as store,
-            stage("flying", "flying in winds") as advance,
-        ):
+        with open_winds_store(base, goal, folder, resume=resume) as store, stage("flying", "winds") as advance:
             found = find_winds(base, goal, Workers(workers, scheduler), store, advance)
         if out is not None:
             write_winds(folder, base, found, winds_line(asked.name(place.folder), goal, asked.options(base, spread)))

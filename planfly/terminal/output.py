@@ -359,7 +359,7 @@ class _Lines:
             counted, self._counted = self._counted, self._counted or total > 0.0
             at_first = "" if counted else remark if _says_left(remark) else self._left.at_first(max(0.0, total - done))
             if not self._begun:
-                self._begin(at_first)
+                self._begin(at_first if _says_left(remark) else _joined(remark if total > 0.0 else "", at_first))
             elif total > 0.0 and not counted:
                 # It had been named before it knew how much there is.
                 self._tell(f"{self._title}: {_joined('' if _says_left(remark) else remark, at_first)}")

@@ -26,7 +26,7 @@ with warm_up():
     for _ in range(2):
         steepest_slopes(np.zeros((2, 2), np.float32), 1.0)
 """
-SAID = "compiling the numeric kernels, once"
+SAID = "compiling numeric kernels, which later runs load"
 WAY_OUT = "NUMBA_CACHE_DIR=FOLDER names one that can"
 
 
@@ -55,7 +55,7 @@ def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], caps
         assert numba.njit(lambda a: a + 1)(1) == 2
         begun, done = capsys.readouterr().err.splitlines()
         kernel_is_compiled()
-    assert begun == f"{SAID} ... (no estimate yet)"
+    assert begun == f"{SAID} ... (0 of {whole}, no estimate yet)"
     assert done.startswith(f"{SAID}: done in ")
     assert done.endswith(f" s: 2 of {whole}")
     assert capsys.readouterr().err == ""
