@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from flight.mission.items import OVER_TERRAIN
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -53,13 +54,13 @@ def _planned_clearance(
     reason = f"{planned:.1f} m above ground at the lowest"
     if math.isnan(planned):
         reason = "the leg leaves the known terrain"
+    elif planned < limit - CLEARANCE_TOLERANCE:
+        reason += f"; {limit:.0f} m are required{_straight(requirements, leg)}"
     return make_finding(
         "clearance",
         requirements.leg(leg),
         ok=None if math.isnan(planned) else planned >= limit - CLEARANCE_TOLERANCE,
-        reason=reason
-        + ("" if math.isnan(planned) or planned >= limit - CLEARANCE_TOLERANCE else f"; {limit:.0f} m are required")
-        + _less_error(planned, limit, error),
+        reason=reason + _less_error(planned, limit, error),
         planned=planned,
         limit=limit,
         source=requirements.limits_source,
@@ -91,7 +92,7 @@ def _flown_clearance(
             reason = off if math.isnan(least) else f"{reason}; {off}"
             ok = None if ok is not False else False
         if ok is False:
-            reason += f"; {limit:.0f} m are required"
+            reason += f"; {limit:.0f} m are required{_straight(requirements, leg)}"
         ground = requirements.setup.scenario.terrain
         reason += _less_error(least, limit, None if ground is None else ground.vertical_error)
     if planned < limit - CLEARANCE_TOLERANCE:
@@ -110,6 +111,15 @@ def _flown_clearance(
         unit="m",
         method="exact along the flown track",
     )
+
+
+def _straight(requirements: RouteRequirements, leg: int) -> str:
+    """That a leg does not follow the ground, where the height at its end is one above terrain."""
+    to_item = requirements.leg(leg).to_item
+    items = requirements.setup.mission.items
+    if any(item.seq == to_item and item.frame in OVER_TERRAIN for item in items):
+        return "; its height above terrain holds at its waypoint, and the leg is straight"
+    return ""
 
 
 def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
