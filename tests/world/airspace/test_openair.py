@@ -208,6 +208,14 @@ def test_names_times_and_comments() -> None:
     assert len(entries["rings_deg"][0]) == 4
 
 
+def test_the_record_of_the_page_is_read_as_it_says() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "airspace.md").read_text(encoding="utf-8")
+    entries = entries_of(page.partition("```text\n")[2].partition("```")[0])
+    assert entries["times"] == ["2026-05-01T00:00Z/2026-10-01T00:00Z", "BY NOTAM"]
+    # A circle of 1.5 nautical miles.
+    assert (entries["name"], entries["radius_m"]) == ("MILL (R)", 2778.0)
+
+
 FAULTS = {
     "AN LAKE": "line 1: AN: no AC before it begins an airspace",
     HEAD + "AH FL95\n": "line 5: AH 'FL95': an airspace has one lower limit (AL) and one upper limit (AH)",
