@@ -19,6 +19,7 @@ from mcap.records import Message as MessageRecord
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import LATEST, Track
+from logs.importers.open_log import is_imported_log
 from logs.recording.foxglove_scene import LEVELS
 from logs.recording.foxglove_updates import NAME as NOTED_IN_FLIGHT
 from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream, records
@@ -336,6 +337,9 @@ def _check_magic(magic: bytes, path: Path) -> None:
     if not magic:
         raise LogError(f"{path}: empty: a flight log (.mcap) is expected", file=path)
     if magic != MAGIC:
+        if is_imported_log(path):
+            way = f"`planfly import {path}` makes the flight log that is expected"
+            raise LogError(f"{path}: another program's log: {way}", file=path)
         raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected", file=path)
 
 
