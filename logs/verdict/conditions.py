@@ -12,7 +12,7 @@ from aircraft.catalog import find_again
 from aircraft.tracking import CORRIDOR_RADII
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
-from logs.verdict.measures.route_requirements import surveys_of
+from logs.verdict.measures.route_requirements import airspace_of, surveys_of
 from world.errors import FlightError
 from world.scenario import Scenario
 from world.scenario_tables import Navigation
@@ -46,6 +46,7 @@ class Conditions:
     turbulence, navigation: None where it was not simulated.
     autopilot: who steers, with the settings that decide most.  autopilot_version: "" for planfly's own guidance.
     terrain: its file or name, None for none.  height_datum: what the terrain's heights count from.
+    zones: of airspace that it is judged by: the scenario's and the mission's fence's.
     """
 
     aircraft: str
@@ -62,6 +63,7 @@ class Conditions:
     autopilot_version: str
     terrain: str | None
     height_datum: str | None
+    zones: int = 0
 
 
 def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
@@ -86,6 +88,7 @@ def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot:
         autopilot_version=autopilot.version,
         terrain=None if terrain is None else terrain.source,
         height_datum=None if terrain is None else terrain.datum,
+        zones=len(scenario.zones),
     )
 
 
@@ -98,7 +101,7 @@ def _source_of_airspeed(scenario: Scenario, autopilot: Autopilot) -> AirspeedSou
 def setup_conditions(setup: FlightSetup) -> Conditions:
     """What the verdict of a flight, or of a mission that is not flown, is for."""
     found = conditions_of(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
-    found = replace(found, navigation=setup.nav)
+    found = replace(found, navigation=setup.nav, zones=len(airspace_of(setup).zones))
     source = setup.source
     if source is None:
         return found
@@ -145,7 +148,8 @@ def _world_line(made: Conditions) -> str:
         turbulence = ", no turbulence" if made.turbulence == "none" else f", {made.turbulence} turbulence"
     navigation = "" if made.navigation is None else f"; navigation {_NAV[made.navigation]}"
     ground = "no terrain" if made.terrain is None else f"terrain {made.terrain}, heights above {made.height_datum}"
-    return f"Conditions: {blows}{turbulence}{navigation}; {ground}"
+    zones = "" if not made.zones else "; 1 zone" if made.zones == 1 else f"; {made.zones:,} zones"
+    return f"Conditions: {blows}{turbulence}{navigation}; {ground}{zones}"
 
 
 # Legs count as beside each other where their courses differ, or are opposite, by no more than this, and where at least

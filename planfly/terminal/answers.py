@@ -192,6 +192,8 @@ class ConditionsDocument:
     """Empty for planfly's own guidance, and where a log's program states it."""
     terrain: str | None
     height_datum: str | None
+    zones: int
+    """Of airspace that it is judged by: the scenario's and the mission's fence's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

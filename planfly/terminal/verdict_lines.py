@@ -32,7 +32,9 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     for rule in RULES.values():
         mine = [finding for finding in verdict.findings if finding.rule == rule.name]
         if mine:
-            lines.append(f"  {rule.title:<{_TITLES}}{_state(rule, mine)}")
+            zones = 0 if verdict.conditions is None else verdict.conditions.zones
+            count = f"{zones:,} zones; " if rule.name == "fence" and zones > 1 else ""
+            lines.append(f"  {rule.title:<{_TITLES}}{count}{_state(rule, mine)}")
     return [*lines, *(f"  note    {note}" for note in notes)]
 
 
@@ -62,8 +64,7 @@ def _in_short(finding: Finding) -> str:
 
 
 def _noun(finding: Finding) -> str:
-    rule = RULES[finding.rule]
-    return rule.noun or rule.name
+    return RULES[finding.rule].word
 
 
 def _state(rule: Rule, findings: list[Finding]) -> str:

@@ -16,6 +16,7 @@ from logs.verdict.findings import verdict_json
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from tests.logs.made_flight import make_setup, make_track
 from tests.logs.verdict.judging import bad_plan
+from world.airspace.zones import Cylinder, Zone
 from world.errors import FlightError
 from world.scenario import with_flight, with_wind
 from world.scenario_tables import FlightTable
@@ -48,9 +49,26 @@ def test_weather_and_ground() -> None:
     assert "heights above " in line
     calm = replace(with_wind(setup.scenario, 0.0, 0.0, "none"), terrain=None)
     _, line = lines_of(setup.in_scenario(calm))
-    assert line == "Conditions: no wind, no turbulence; navigation exact; no terrain"
+    assert line == "Conditions: no wind, no turbulence; navigation exact; no terrain; 1 zone"
     _, line = lines_of(replace(setup, nav="gnss"))
     assert "; navigation with GNSS's error (1.5 m on each axis); " in line
+
+
+def test_the_zones_are_counted_the_missions_own_among_them() -> None:
+    tower = Zone("tower", "exclusion", Cylinder(0.0, 0.0, 50.0))
+    setup = make_setup()
+    (own,) = setup.mission.fences
+    for of_scenario, fences, said in (
+        (0, (), ""),
+        (1, (), "; 1 zone"),
+        (0, (own,), "; 1 zone"),
+        (12, (own,), "; 13 zones"),
+    ):
+        world = replace(setup.scenario, zones=(tower,) * of_scenario)
+        judged = replace(setup, mission=replace(setup.mission, fences=fences)).in_scenario(world)
+        line = lines_of(judged)[1]
+        assert "zone" not in line if not said else line.endswith(said)
+        assert setup_conditions(judged).zones == of_scenario + len(fences)
 
 
 def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:

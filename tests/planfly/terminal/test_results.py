@@ -1,16 +1,19 @@
 """What commands print of results, and errors in the words of the command line."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from logs.recording.reader import read_log
-from logs.verdict.findings import Finding, Verdict
-from logs.verdict.places import Change, Place
+from logs.verdict.conditions import setup_conditions
+from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.places import FLIGHT, Change, Place
 from planfly.cli import main
 from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import error_text
 from planfly.terminal.results import print_verdict, print_warnings
+from tests.logs.made_flight import make_setup
 from world.errors import LogError, PlanflyError
 
 # ----------------------------------------------------------------------
@@ -45,6 +48,17 @@ def slope(leg: int, flown: float, limit: float) -> Finding:
 def printed(capsys: pytest.CaptureFixture[str], verdict: Verdict, *notes: str) -> list[str]:
     print_verdict(verdict, notes)
     return capsys.readouterr().out.splitlines()
+
+
+def test_the_table_counts_the_zones(capsys: pytest.CaptureFixture[str]) -> None:
+    """One finding stands for all zones that are kept to."""
+    kept = make_finding("fence", FLIGHT, ok=True, reason="none of 14 zones is violated")
+    made = Verdict(
+        (kept,), True, True, ("flyable",), "flown", conditions=replace(setup_conditions(make_setup()), zones=14)
+    )
+    assert [line.split() for line in printed(capsys, made) if line.startswith("  zones")] == [
+        ["zones", "14", "zones;", "1", "of", "1", "ok"]
+    ]
 
 
 def test_failures_stand_below_the_summary_with_what_would_pass(capsys: pytest.CaptureFixture[str]) -> None:
