@@ -1,12 +1,16 @@
 """The pictures of campaigns: failures by place, probability against wind, tracks, and the go/no-go chart."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from logs import theme
@@ -169,8 +173,6 @@ def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
 
 
 def _light(axes: object) -> None:
-    from matplotlib.axes import Axes
-
     if isinstance(axes, Axes):
         axes.grid(visible=True, color=GRID, linewidth=0.6)
         axes.set_axisbelow(True)
@@ -217,8 +219,8 @@ def draw_clearance_fan(
         top.axhline(least, color=LIMIT, linewidth=1.4, linestyle="--", label=f"required, {least:g} m")
         top.set_ylim(bottom=0.0)
         top.set_ylabel("above ground (m)")
-        top.set_title("Clearance along the way, over all flights")
-        # Over the panel, where it covers no band.
+        # The legend is over the panel, where it covers no band, and the title over that.
+        top.set_title("Clearance along the way, over all flights", pad=20.0)
         top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
         top.tick_params(labelbottom=False)
         low.fill_between(along, ground, np.nanmin(ground) - 10.0, color=theme.GROUND[1], linewidth=0.0)
@@ -384,7 +386,6 @@ def _legend(
     figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, edge: float | None
 ) -> None:
     """What stands for what.  edge: largest wind that was looked at, m/s, where some direction has no limit below it."""
-    from matplotlib.artist import Artist
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -406,3 +407,83 @@ def _legend(
         [handle for handle, _ in entries], [label for _, label in entries],
         loc="center left", bbox_to_anchor=(0.735, 0.45), fontsize=9, labelspacing=1.0,
     )  # fmt: skip
+
+
+# ----------------------------------------------------------------------
+# The same pictures for a phone: so narrow that their letters can still be read there.
+
+# in: width; margin at an edge; height of a line of a legend.
+NARROW, _EDGE, _LEGEND_LINE = 5.0, 0.15, 0.34
+# Panels of a grid beside each other, and the size of each with its title and numbers, in.
+_NARROW_COLUMNS, _PANEL, _PANEL_STEP = 3, 1.1, 1.6
+# Width of a letter and distance of lines, each of its size.
+_LETTER, _LINE = 0.57, 1.3
+
+
+def narrowed(figure: Figure) -> Figure:
+    """Lay a picture of this module out anew, `NARROW` inches wide: words in lines, legends below.  It is changed.
+
+    >>> narrowed(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth()
+    5.0
+    """
+    wide, tall = figure.get_size_inches().tolist()
+    panels = [axes for axes in figure.axes if axes.axison]
+    legends = [*figure.legends, *(found for axes in panels if (found := axes.get_legend()) is not None)]
+    foot = _LEGEND_LINE * sum(-(-len(found.get_texts()) // 2) for found in legends)
+    # in from the top: what the figure itself says.
+    head = _EDGE
+    said = []
+    for text in figure.texts:
+        said.append((text, head))
+        head += _in_lines(text, NARROW - 2.0 * _EDGE)
+    boxes: list[tuple[float, float, float, float]] = []  # left, top from the picture's top, width, height, in
+    if any(axes.name == "polar" for axes in panels):
+        side = NARROW - 1.0
+        boxes = [(0.5, head + 0.4, side, side)]
+        height = head + side + 0.9 + foot
+    elif any(axes.get_subplotspec() is not None for axes in panels):
+        step = (NARROW - _EDGE) / _NARROW_COLUMNS
+        for k in range(len(panels)):
+            row, column = divmod(k, _NARROW_COLUMNS)
+            boxes.append((0.4 + step * column, head + 0.3 + _PANEL_STEP * row, _PANEL, _PANEL))
+        height = head + 0.3 + _PANEL_STEP * -(-len(panels) // _NARROW_COLUMNS)
+    else:
+        more = below = 0.0
+        for axes in figure.axes:
+            box = axes.get_position()
+            left = box.x0 * wide
+            width = NARROW - left - 2.0 * _EDGE
+            more = max(more, sum(_in_lines(one, width) for one in _title(axes)))
+            below = max(below, _in_lines(axes.xaxis.label, width))
+            if axes.patches and axes.get_xlim()[0] == 0.0:
+                # Behind the longest bar stands its number.
+                axes.set_xlim(0.0, 1.5 * axes.get_xlim()[1])
+            boxes.append((left, (1.0 - box.y1) * tall, width, box.height * tall))
+        boxes = [(left, top + more, width, high) for left, top, width, high in boxes]
+        height = tall + more + below + foot
+    figure.set_size_inches(NARROW, height)
+    for axes, (left, top, width, high) in zip(panels or figure.axes, boxes, strict=True):
+        axes.set_position((left / NARROW, 1.0 - (top + high) / height, width / NARROW, high / height))
+    for text, top in said:
+        text.update({"x": _EDGE / NARROW, "y": 1.0 - top / height, "ha": "left", "va": "top"})
+    for found in legends:
+        labels = [text.get_text() for text in found.get_texts()]
+        handles = [one for one in found.legend_handles if one is not None]
+        with clean_style():
+            figure.legend(handles, labels, loc="lower left", ncols=2, fontsize=9)
+        found.remove()
+    return figure
+
+
+def _title(axes: Axes) -> list[Text]:
+    """The title of a panel, which stands at its left; none where it has none."""
+    said = axes.get_title("left")
+    return [one for one in axes.get_children() if isinstance(one, Text) and said and one.get_text() == said]
+
+
+def _in_lines(text: Text, width: float) -> float:
+    """Break a text into lines of a width, in; gives the height of them all, 0 of none, in."""
+    size = float(text.get_fontsize()) / 72.0
+    lines = textwrap.wrap(text.get_text(), max(10, int(width / (_LETTER * size))))
+    text.set_text("\n".join(lines))
+    return _LINE * size * len(lines)

@@ -33,6 +33,7 @@ from planfly.campaigns.pictures import (
     draw_go_no_go,
     draw_probability,
     draw_tornado,
+    narrowed,
     speed_bins,
 )
 from planfly.campaigns.statistics.decision import Estimate, Goal, Tally, lower_bound
@@ -51,7 +52,7 @@ _DRAWN = 3000
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
     """The page's bytes; command: the line that flies it again."""
-    pictures = [Markup(page_svg(figure, words)) for figure, words in _pictures(base, summary, store)]
+    pictures = [_both_widths(figure, words) for figure, words in _pictures(base, summary, store)]
     lines = campaign_lines(summary)
     text = _render(
         "campaign.html",
@@ -104,9 +105,16 @@ def _render(template: str, **values: object) -> str:
 
 
 def winds_page(name: str, figure: Figure, lines: list[str], rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """The page of a go/no-go chart."""
-    picture = Markup(page_svg(figure, "Go/no-go chart: wind from each direction"))
+    """The page of a go/no-go chart, which is narrowed."""
+    picture = _both_widths(figure, "Go/no-go chart: wind from each direction")
     return _render("winds.html", name=name, picture=picture, lines=lines, rows=rows, command=command).encode("utf-8")
+
+
+def _both_widths(figure: Figure, words: str) -> Markup:
+    """A picture as a page shows it: wide, and on a phone narrow, to which the figure is changed."""
+    wide = page_svg(figure, words)
+    narrow = page_svg(narrowed(figure), f"{words} (narrow)")
+    return Markup(f'<div class="wide">{wide}</div><div class="narrow">{narrow}</div>')
 
 
 def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:
@@ -333,9 +341,10 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
         ],
         "spread": base.dispersions.to_json(),
     }
+    picture = png_bytes(figure)
     page = winds_page(base.name, figure, wind_lines(found), rows, command)
     write_whole(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
-    write_whole(folder / "winds.png", png_bytes(figure))
+    write_whole(folder / "winds.png", picture)
     write_whole(folder / "winds.html", page)
 
 

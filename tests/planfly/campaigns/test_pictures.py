@@ -19,6 +19,7 @@ from planfly.campaigns.pictures import (
     draw_go_no_go,
     draw_probability,
     draw_tornado,
+    narrowed,
     speed_bins,
 )
 from planfly.campaigns.statistics.decision import wilson
@@ -157,3 +158,52 @@ def test_the_edge_of_the_search_is_no_limit() -> None:
     assert "no limit found up to\n20 m/s" in said
     without = draw_go_no_go(SPOKES, 20.0, 0.99, 0.95, "demo", None)
     assert not any("no limit" in text.get_text() for text in without.legends[0].get_texts())
+
+
+def test_the_legend_of_the_fan_leaves_its_title_free() -> None:
+    rows = np.linspace(60.0, 90.0, 40 * 50).reshape(40, 50)
+    figure = draw_clearance_fan(rows, np.arange(40) > 30, np.full(50, 100.0), 4000.0, 60.0)
+    figure.canvas.draw()
+    [axes] = [one for one in figure.axes if one.get_legend() is not None]
+    title = next(one for one in axes.get_children() if isinstance(one, Text) and one.get_text().startswith("Clearance"))
+    assert not title.get_window_extent().overlaps(axes.get_legend().get_window_extent())
+    assert title.get_window_extent().y1 < figure.bbox.y1
+
+
+# ----------------------------------------------------------------------
+# On a phone.
+
+RANDOM = np.random.default_rng(1)
+FAILED = RANDOM.uniform(size=40) > 0.8
+PICTURES = {
+    "failures": lambda: draw_failures([("photo lines", f"waypoint {k} (item {k + 2})", 1200) for k in range(14)], 1200),
+    "none failed": lambda: draw_failures([], 7),
+    "probability": lambda: draw_probability(
+        speed_bins(RANDOM.uniform(0.0, 9.0, 80), RANDOM.uniform(size=80) > 0.5), 0.9
+    ),
+    "tornado": lambda: draw_tornado([Bar("terrain height", 0.6, -0.7), Bar("drag", 0.2, 0.1)], "loss of control"),
+    "fan": lambda: draw_clearance_fan(RANDOM.uniform(60.0, 90.0, (40, 50)), FAILED, np.full(50, 100.0), 4000.0, 60.0),
+    "crossings": lambda: draw_crossings(RANDOM.normal(0.0, 3.0, (40, 8, 2)), FAILED),
+    "one crossing": lambda: draw_crossings(RANDOM.normal(0.0, 3.0, (40, 2, 2)), FAILED),
+    "winds": lambda: draw_go_no_go(
+        [replace(SPOKES[0], reaches=True), *SPOKES[1:]], 20.0, 0.99, 0.95, "demo", (5.0, 9.0)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_all_of_a_picture_is_within_a_phones_width(name: str) -> None:
+    """Letters of 8 points on 5 inches are 8.4 pixels on 380."""
+    figure = narrowed(PICTURES[name]())
+    width, height = figure.get_size_inches()
+    assert width == 5.0
+    # In inches.
+    reach = figure.get_tightbbox()
+    assert 0.0 <= reach.x0 < reach.x1 <= width
+    assert 0.0 <= reach.y0 < reach.y1 <= height
+    # No legend covers a panel.
+    tops = [legend.get_window_extent().y1 for legend in figure.legends]
+    panels = [axes.get_tightbbox() for axes in figure.axes if axes.axison]
+    assert not tops or max(tops) <= min(box.y0 for box in panels)
+    boxes = [axes.get_window_extent() for axes in figure.axes if axes.axison]
+    assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])

@@ -157,7 +157,7 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"
     page = (tmp_path / "winds.html").read_text()
     assert "over 20 m/s" in page
-    assert page.count('<svg role="img" aria-label="Go/no-go chart') == 1
+    assert page.count('<svg role="img" aria-label="Go/no-go chart') == 2
     # Of a direction that is known, and of one whose interval ends beyond.
     assert "6.5 to 7.5" in page
     assert "18.0 to over 20" in page

@@ -13,7 +13,7 @@ def test_it_holds_pictures_tables_and_no_link(base: CampaignBase, tmp_path: Path
     with made_report(base, tmp_path) as (store, summary):
         page = campaign_page(base, summary, store, "planfly campaign <x>").decode()
         assert page == campaign_page(base, summary, store, "planfly campaign <x>").decode()
-    assert page.count('<svg role="img" aria-label="') == 5
+    assert page.count('<svg role="img" aria-label="') == 2 * 5
     assert "planfly campaign &lt;x&gt;" in page
     assert "leg 1" in page
     assert not re.search(r'(src|href)="(?!data:|#)', page)
@@ -24,7 +24,11 @@ def test_its_pictures_are_dark_where_the_page_is(base: CampaignBase, tmp_path: P
     with made_report(base, tmp_path) as (store, summary):
         page = campaign_page(base, summary, store, "planfly campaign x").decode()
     pictures = re.findall(r"<svg .*?</svg>", page, re.DOTALL)
-    assert len(pictures) == 5
+    # Each twice: wide, and narrow for a phone.
+    assert len(pictures) == 2 * 5
+    assert page.count(' (narrow)"') == 5
+    names = [set(re.findall(r' id="([^"]+)"', picture)) for picture in pictures]
+    assert sum(map(len, names)) == len(set().union(*names))
     for picture in pictures:
         assert re.findall(r"#[0-9a-f]{6}\b", picture) == []
         used = set(re.findall(r"var\(--([a-z0-9-]+)\)", picture))
