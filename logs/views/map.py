@@ -11,12 +11,14 @@ from logs.verdict.findings import Verdict
 from logs.views.charts import Floats, Json, Label, Layer, Panel, numbers, panel_json, shorten
 from logs.views.failures import Failures, fail_labels, failures, inside_threats, paths_differ
 from logs.views.threats_and_zones import threat_circles, threat_names, zone_names, zone_shapes
+from world.airspace.zones_on_map import zone_rings
 from world.scenario import Scenario
 from world.terrain import Terrain
 from world.wind import Wind
 
-# Height over width of the map: a longer or flatter area is drawn with ground around it.  The rim, of the longer side.
-_ASPECTS, _RIM = (0.4, 1.25), 0.015
+# Height over width of the map: a longer or flatter area is drawn with ground around it.  The rim, of the longer side:
+# of an area, and of a mission that has none.
+_ASPECTS, _RIM, _MISSION_RIM = (0.4, 1.25), 0.015, 0.1
 # Beyond these numbers waypoints are numbered in steps, and their dots are small; points of a track.
 _MAX_NUMBERS, _MAX_DOTS, _MAX_POINTS = 40, 80, 6000
 
@@ -149,14 +151,21 @@ def map_json(chart: MapChart) -> Json:
 def map_extent(
     scenario: Scenario, route: Floats | None, tracks: Sequence[Track]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """East and north range of the scenario's area, widened to what lies outside it, with a rim, m."""
-    points = [scenario.bounds.T, scenario.start[None, :2], scenario.destination[None, :2]]
+    """East and north range of the scenario's area, widened to what lies outside it, with a rim, m.
+
+    Bounds made around an external mission limit nothing: its way is shown, and of zones what lies in them.
+    """
+    points = [scenario.start[None, :2], scenario.destination[None, :2]]
+    if scenario.external:
+        points += [np.clip(zone_rings(zone)[0], *scenario.bounds.T) for zone in scenario.zones]
+    else:
+        points.append(scenario.bounds.T)
     if route is not None:
         points.append(route[:, :2])
     points += [track.position[np.isfinite(track.position).all(axis=1), :2] for track in tracks]
     together = np.vstack(points)
     low, high = together.min(axis=0), together.max(axis=0)
-    padding = _RIM * float((high - low).max())
+    padding = (_MISSION_RIM if scenario.external else _RIM) * float((high - low).max())
     low, high = low - padding, high + padding
     width, height = (high - low).tolist()
     grown = np.array([max(width, height / _ASPECTS[1]), max(height, width * _ASPECTS[0])])

@@ -185,6 +185,20 @@ def test_map_widens_to_a_flight_that_left_the_area() -> None:
     assert axes.get_ylim()[1] > 900
 
 
+def test_map_of_a_mission_without_an_area_is_as_large_as_its_way() -> None:
+    """1,600 m by 800 m with a tenth of 1,600 m around, in an area of 2,400 m by 1,600 m that somebody made up."""
+
+    def shown(**changes: Any) -> list[float]:
+        world = make_scenario(threats=[], external=True, **changes)
+        chart = flight_map(world, plan_waypoints=None, route_waypoints=ROUTE, track=None, verdict=None)
+        return [*chart.east, *(chart.panel.span or ())]
+
+    assert shown() == pytest.approx([-1060.0, 860.0, -560.0, 560.0])
+    # A zone counts as far as it lies in the area: to 800 m north of 900 m.
+    zone = {"name": "town", "kind": "exclusion", "east_m": 0, "north_m": 700, "radius_m": 200}
+    assert shown(zones=[zone]) == pytest.approx([-1060.0, 860.0, -560.0, 960.0], abs=0.5)
+
+
 def test_zones_are_drawn_and_named() -> None:
     zones = [{"name": "town", "kind": "exclusion", "east_m": 0, "north_m": -500, "radius_m": 150}]
     figure = drawn_map(make_scenario(zones=zones), **ALL, track=None, verdict=None)
