@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from flight.autopilots.autopilot import Autopilot
-from flight.mission.items import Command, Mission
+from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
 from flight.simulation.setup import FlightSetup
@@ -39,7 +41,8 @@ class SurveyRemedy:
     verdict: of the flight.
     mission: as it was flown.
     length: of its route, m.
-    turn_around: m, of a layout; NaN where it stays as it is.  lead_in: m before its first line, where that is more.
+    turn_around: m, of a layout, or beside a parameter or an airspeed; NaN where it stays as it is.
+    lead_in: m before its first line, where that is more.
     """
 
     kind: RemedyKind
@@ -87,6 +90,9 @@ def survey_remedies(
 ) -> TriedRemedies:
     """What alone would let all photo lines be flown, by kind; of each kind the least change that was found.
 
+    Where nothing alone does, turn-arounds with a parameter of the autopilot half way to its farthest value, or with a
+    slower flight: at most four flights for each of some five.
+
     verdict: on the flight of the setup.  on_trial: called before each flight with what is tried.
     A change passes where no photo line fails, and nothing else that did not fail before.
     """
@@ -100,8 +106,10 @@ def survey_remedies(
         tried.every(math.inf if longer is None else longer.value),
         tried.course(),
         tried.parameter(),
-        tried.airspeed(),
+        tried.airspeed() or tried.mission_airspeed(),
     ]
+    if not any(found):
+        found.append(tried.parameter_and_turn_around() or tried.airspeed_and_turn_around())
     remedies = tuple(one for one in found if one is not None)
     return TriedRemedies(remedies, None if remedies else tried.nearest, tried.kept)
 
@@ -141,7 +149,7 @@ class _Trials:
         self, setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None]
     ) -> None:
         self._setup, self._airframe, self._on_trial = setup, airframe, on_trial
-        self._worst, self._verdict = _worst_margins(verdict), verdict
+        self._worst, self._verdict, self._changed = _worst_margins(verdict), verdict, ""
         lost = {item.place.index for item in verdict.findings if item.rule == "survey" and item.ok is not True}
         found = surveys_of(setup)
         self._numbers = [n for n, one in enumerate(found) if not lost.isdisjoint(range(one.first, one.last))]
@@ -159,6 +167,7 @@ class _Trials:
 
     def _fly(self, mission: Mission, airframe: Airframe, what: str) -> tuple[Verdict, float] | None:
         """The verdict of a flight, and its length; None where it cannot be laid out."""
+        what = self._changed + what
         self._on_trial(what)
         try:
             setup = self._made(mission, airframe)
@@ -231,7 +240,7 @@ class _Trials:
     def _least(self, every: int, tried: Sequence[float], lead_in: float) -> tuple[float, _Laid] | None:
         """The least of some rising turn-arounds (m) with which all lines can be used, by halves, where it passes.
 
-        One with which the flight does not get to its end is too long: the store of energy does not last.
+        One with which the flight does not get to its end for want of energy is too long.
         """
         order = "" if every == 1 else f"every {nth(every)} line, "
         low, high, best = -1, len(tried), None
@@ -244,7 +253,7 @@ class _Trials:
                 return None
             if _whole(laid[0]):
                 high, best = middle, laid
-            elif "completion" in _worst_margins(laid[0]).keys() - self._worst.keys():
+            elif {"completion", "energy"} <= _worst_margins(laid[0]).keys() - self._worst.keys():
                 high, best = middle, None
             else:
                 low = middle
@@ -283,19 +292,69 @@ class _Trials:
         verdict, length = flown["last"]
         return SurveyRemedy("parameter", found.name, found.current, found.passing, found.unit, verdict, mission, length)
 
+    def _longer_with(self, changed: str, airframe: Airframe, mission: Mission | None = None) -> SurveyRemedy | None:
+        """The least turn-around that passes with something else changed, too."""
+        other = copy(self)
+        other._airframe, other._changed = airframe, f"{changed}, "
+        if mission is not None:
+            other._setup = replace(self._setup, mission=mission)
+        found = other.turn_around()
+        self.nearest = other.nearest
+        return found
+
+    def parameter_and_turn_around(self) -> SurveyRemedy | None:
+        """The parameter of the autopilot that passes, half way to its farthest value, with longer turn-arounds."""
+        law = self._airframe.autopilot
+        values = {} if law.parameters is None else {one.name: one.value for one in law.parameters.values}
+        for name, step, far, unit, _ in law.side_candidates if values else ():
+            current = values[name]
+            value = round(current + math.copysign(step, far - current) * (abs(far - current) // (2.0 * step)), 6)
+            if value == current:
+                continue
+            airframe = replace(self._airframe, autopilot=law.with_parameters(**{name: value}))
+            found = self._longer_with(f"{name} {value:g}", airframe)
+            if found is not None:
+                return replace(found, kind="parameter", name=name, current=current, value=value, unit=unit)
+        return None
+
+    def airspeed_and_turn_around(self) -> SurveyRemedy | None:
+        """The slowest of some slower airspeeds, where it passes with longer turn-arounds."""
+        for speed, airframe in [*self._slower()][-1:]:
+            found = self._longer_with(f"{speed:g} m/s", airframe)
+            if found is not None:
+                return replace(found, kind="airspeed", current=self._airframe.airspeed, value=speed, unit="m/s")
+        return None
+
+    def mission_airspeed(self) -> SurveyRemedy | None:
+        """The aircraft's own airspeed where the mission sets one at which it stalls, with longer turn-arounds."""
+        mission, own = self._setup.mission, self._airframe.airspeed
+        slow = [item for item in mission.items if 0.0 < _set_airspeed(item) < self._airframe.aircraft.airspeed_min]
+        if not slow:
+            return None
+        items = tuple(
+            replace(item, params=(item.params[0], own, *item.params[2:])) if item in slow else item
+            for item in mission.items
+        )
+        found = self._longer_with(f"{own:g} m/s", self._airframe, replace(mission, items=items))
+        if found is None:
+            return None
+        return replace(found, kind="airspeed", current=min(map(_set_airspeed, slow)), value=own, unit="m/s")
+
+    def _slower(self) -> Iterator[tuple[float, Airframe]]:
+        """Slower airspeeds, m/s, of a mission that sets none itself, and the aircraft with them; the fastest first."""
+        if any(item.command == Command.DO_CHANGE_SPEED for item in self._setup.mission.items):
+            return
+        slowest = _ABOVE_SLOWEST * self._airframe.aircraft.airspeed_min
+        for speed in (round(2.0 * share * self._airframe.airspeed) / 2.0 for share in SLOWER):
+            if speed < slowest:
+                break
+            with suppress(PlanflyError):
+                yield speed, load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
+
     def airspeed(self) -> SurveyRemedy | None:
         """The fastest slower airspeed that passes, of a mission that sets none itself."""
         mission, now = self._setup.mission, self._airframe.airspeed
-        if any(item.command == Command.DO_CHANGE_SPEED for item in mission.items):
-            return None
-        slowest = _ABOVE_SLOWEST * self._airframe.aircraft.airspeed_min
-        for speed in (round(2.0 * share * now) / 2.0 for share in SLOWER):
-            if speed < slowest:
-                break
-            try:
-                airframe = load_airframe(with_flight(self._setup.scenario, airspeed_mps=speed))
-            except PlanflyError:
-                continue
+        for speed, airframe in self._slower():
             flown = self._fly(mission, airframe, f"{speed:g} m/s")
             if flown is not None and self._passes(flown[0]):
                 return SurveyRemedy("airspeed", "", now, speed, "m/s", flown[0], mission, flown[1])
@@ -309,6 +368,11 @@ def nth(count: int) -> str:
     ('second', '5th')
     """
     return {2: "second", 3: "third", 4: "fourth"}.get(count, f"{count}th")
+
+
+def _set_airspeed(item: MissionItem) -> float:
+    """The airspeed that an item sets, m/s; 0 of another, NaN or less where it sets none."""
+    return item.params[1] if item.command == Command.DO_CHANGE_SPEED else 0.0
 
 
 def _other_courses(course: float, wind: float) -> Iterator[float]:

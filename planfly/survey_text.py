@@ -110,7 +110,11 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
         case "course":
             change = f"lines on course {remedy.value:.0f}° instead of {remedy.current:.0f}°"
         case "parameter":
-            change = f"{remedy.name} {remedy.value:g} instead of {remedy.current:g}"
+            change = f"{remedy.name} {remedy.value:g} instead of {remedy.current:g} (--params)"
         case "airspeed":
-            change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s"
+            # A mission that is too slow is made faster by its items.
+            how = f" (--airspeed {remedy.value:g})" if remedy.value < remedy.current else ""
+            change = f"{remedy.value:g} m/s instead of {remedy.current:g} m/s{how}"
+    if remedy.kind in ("parameter", "airspeed") and not math.isnan(remedy.turn_around):
+        change += f", with turn-arounds of {remedy.turn_around:.0f} m"
     return f"{change}: flown, and all lines can be used; {remedy.length / 1000.0:.1f} km, {length / 1000.0:.1f} km now"

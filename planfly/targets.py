@@ -31,8 +31,12 @@ COMPARE_FILES = (
     *(f"compare-{name}.{kind}" for kind in ("png", "svg") for name in ("map", "profile")),
     "compare.html",
 )
-# What `planfly.survey` may write: the picture of the lines, and missions that would help.
-SURVEY_FILES = ("survey.png", "side.waypoints", "turn-around.waypoints", "every.waypoints", "course.waypoints")
+# What `planfly.survey` may write: the picture of the lines, and missions and parameters that would help.
+SURVEY_FILES = (
+    "survey.png",
+    *(f"{kind}.waypoints" for kind in ("side", "turn-around", "every", "course", "parameter", "airspeed")),
+    "parameter.param",
+)
 # Stretches of a flight that are flown again, and what is written of each: of those after the first with its number.
 REFLOWN = 9
 REFLY_FILES = tuple(

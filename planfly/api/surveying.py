@@ -97,7 +97,10 @@ class SurveyFound:
     @property
     def lines_without_remedy(self) -> tuple[str, ...]:
         """That nothing was found that would help, what came nearest, and why no other layout was tried, in words."""
-        said = ["no turn-around, order, course, parameter or airspeed alone was found that would help"]
+        said = [
+            "no turn-around, order, course, parameter or airspeed alone was found that would help, nor longer"
+            " turn-arounds with another parameter or a slower flight"
+        ]
         said += [needed_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
             said.append(f"no other layout was tried: {self.kept}")
@@ -142,7 +145,7 @@ def survey(
     along lines and across them, percent; None takes those of a .plan.
     suggest: whether to look for what would let all lines be used, of a mission: longer turn-arounds, every so-manieth
     line, another course, a parameter of the autopilot, a slower flight; each is flown before it is named.
-    out: folder for a picture of the lines, and for each other layout that would help as a .waypoints; None writes none.
+    out: folder for a picture of the lines, and what would help as a .waypoints and a .param; None writes none.
     overwrite: whether results in it are replaced.
     scenario, terrain, fence, seed, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
     mission, as of `planfly.fly`.
@@ -235,9 +238,16 @@ def _written(found: SurveyFound, out: str | Path | None, overwrite: bool) -> Sur
         write_whole(folder / "survey.png", png_bytes(draw_chart(chart)))
         files.append(folder / "survey.png")
     for remedy in found.remedies:
-        if f"{remedy.kind}.waypoints" in SURVEY_FILES:
+        if remedy.mission is not found.setup.mission:
             path = folder / f"{remedy.kind}.waypoints"
             write_whole(path, mission_text(remedy.mission, "waypoints"))
+            files.append(path)
+        if remedy.kind == "parameter":
+            # Those of the person's own file are flown with, too.
+            own = found.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
+            stated = {} if own is None else own.by_origin("file")
+            path = folder / "parameter.param"
+            write_whole(path, "".join(f"{name},{value!r}\n" for name, value in stated.items()))
             files.append(path)
     return replace(found, files=tuple(files))
 

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import planfly
@@ -65,6 +66,12 @@ def survey(args: argparse.Namespace) -> int:
             print(f"  {text}")
     for path in found.files:
         print(f"  written {path}")
+    if missions := [path for path in found.files if path.suffix == ".waypoints"]:
+        # Where nothing switches a camera, any other command judges a mission as a path.
+        settings = [f" --params {quote(str(path))}" for path in found.files if path.suffix == ".param"]
+        also = settings[0] if missions[0].stem == "parameter" and settings else ""
+        told = f"next      planfly survey {quote(str(missions[0]))}{also} with the same options, as it was flown"
+        print(coloured(told, "hint"))
     give_answer(args, lambda: _answer(str(args.what), found, code))
     return code
 

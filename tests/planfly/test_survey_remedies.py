@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from flight.mission.items import Command, Mission
 from flight.mission.survey_layout import turn_around_of
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, make_finding
@@ -111,6 +112,74 @@ def test_one_with_which_the_battery_does_not_last_is_too_long(monkeypatch: pytes
     found, flown = tried(monkeypatch, answer)
     assert [(one.kind, one.value) for one in found.remedies] == [("turn-around", 200.0)]
     assert flown[:4] == [150.0, 250.0, 175.0, 200.0]
+
+
+def test_a_flight_that_ends_early_by_another_fault_says_nothing_of_longer_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that misses the end of its way with short turn-arounds has energy left for longer ones."""
+
+    def answer(metres: float) -> tuple[bool, dict[str, float]]:
+        return metres >= 290.0, {"completion": -9.0} if 20.0 < metres < 290.0 else {}
+
+    found, flown = tried(monkeypatch, answer)
+    assert [(one.kind, one.value) for one in found.remedies] == [("turn-around", 300.0)]
+    assert flown[:4] == [150.0, 250.0, 350.0, 300.0]
+
+
+def judged_by(
+    monkeypatch: pytest.MonkeyPatch, passes: Callable[[FlightSetup, float], bool], path: Path = FIELD
+) -> TriedRemedies:
+    """What helps where a rule looks at all of a flight, and at its turn-arounds, m."""
+
+    def fly(setup: FlightSetup, *_: Any, **__: Any) -> Any:
+        return SimpleNamespace(verdict=verdict_of(setup, lambda metres: (passes(setup, metres), {})))
+
+    mission = opened(path)
+    monkeypatch.setattr(remedies, "fly_and_judge", fly)
+    return remedies.survey_remedies(mission.setup, mission.airframe, verdict_of(mission.setup, lambda _: (False, {})))
+
+
+def test_where_nothing_alone_helps_two_changes_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ROLL_LIMIT_DEG from 35 half way to 60, in whole degrees, is 47; neither it nor long turn-arounds alone pass."""
+
+    def passes(setup: FlightSetup, metres: float) -> bool:
+        own = setup.autopilot.parameters
+        assert own is not None
+        return metres >= 130.0 and next(one.value for one in own.values if one.name == "ROLL_LIMIT_DEG") >= 45.0
+
+    [both] = judged_by(monkeypatch, passes).remedies
+    assert (both.kind, both.name, both.current, both.value) == ("parameter", "ROLL_LIMIT_DEG", 35.0, 47.0)
+    assert both.turn_around == 150.0
+    assert remedy_text(both, 3000.0).startswith(
+        "ROLL_LIMIT_DEG 47 instead of 35 (--params), with turn-arounds of 150 m:"
+    )
+
+
+def test_a_slower_flight_with_longer_turn_arounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The x8 cruises at 18 m/s, and a tenth above its slowest airspeed are 15.5 m/s: the slowest that is tried."""
+    [both] = judged_by(monkeypatch, lambda setup, m: m >= 130.0 and setup.route.airspeed[0] < 17.0).remedies
+    assert (both.kind, both.current, both.value, both.turn_around) == ("airspeed", 18.0, 15.5, 150.0)
+    assert "15.5 m/s instead of 18 m/s (--airspeed 15.5), with turn-arounds of 150 m" in remedy_text(both, 3000.0)
+
+
+def test_a_mission_slower_than_the_aircraft_flies_is_made_faster(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A multicopter's 2 m/s; the 16 m/s further on the aircraft can fly."""
+    rows = FIELD.read_text(encoding="ascii").splitlines()
+    rows.insert(2, "1\t0\t2\t178\t0\t2\t-1\t0\t0\t0\t0\t1")
+    rows.append("20\t0\t2\t178\t0\t16\t-1\t0\t0\t0\t0\t1")
+    path = tmp_path / "slow.waypoints"
+    path.write_text("\n".join("\t".join([str(k), *row.split("\t")[1:]]) if k >= 0 else row
+                              for k, row in enumerate(rows, -1)) + "\n", encoding="ascii")  # fmt: skip
+
+    def speeds(mission: Mission) -> list[float]:
+        return [item.params[1] for item in mission.items if item.command == Command.DO_CHANGE_SPEED]
+
+    found = judged_by(monkeypatch, lambda setup, metres: metres >= 130.0 and speeds(setup.mission)[0] > 10.0, path)
+    [faster] = found.remedies
+    assert (faster.kind, faster.current, faster.value, faster.turn_around) == ("airspeed", 2.0, 18.0, 150.0)
+    assert speeds(faster.mission) == [18.0, 16.0]
+    assert "18 m/s instead of 2 m/s, with turn-arounds of 150 m" in remedy_text(faster, 3000.0)
 
 
 def test_what_comes_nearest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

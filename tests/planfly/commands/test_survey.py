@@ -1,13 +1,19 @@
 """``planfly survey``: a survey without turn-arounds, what it prints, answers and writes; and what would help."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import planfly
+from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Verdict
+from planfly.airframe import Airframe
+from planfly.api import surveying
 from planfly.cli import main
+from planfly.survey_remedies import SurveyRemedy, TriedRemedies
 
 FIELD_SURVEY = Path(__file__).with_name("field.waypoints")
 BY = ["--aircraft", "x8", "--autopilot-law", "ardupilot"]
@@ -31,6 +37,7 @@ def test_each_line_is_told_and_what_would_help_is_flown(
         assert parts == pytest.approx(1.0, abs=0.001)
         assert sum(high - low for low, high in one["lost_m"]) == pytest.approx(500.0 * (1.0 - one["usable"]), abs=2.0)
     assert (tmp_path / "better" / "survey.png").read_bytes().startswith(b"\x89PNG")
+    assert "next      planfly survey better/turn-around.waypoints with the same options" in out
     # What is said to help does: flown again from its file, all lines can be used.
     assert "turn-around" in {one["kind"] for one in answer["remedies"]}
     assert main(["survey", "better/turn-around.waypoints", *BY]) == 0
@@ -59,6 +66,24 @@ def test_a_flight_and_its_log_say_the_same(tmp_path: Path, capsys: pytest.Captur
     [found] = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))["overlaps"]
     assert (found["front"], found["front_asked"]) == (pytest.approx(seen.front, abs=1e-3), 0.95)
     assert (found["side"], found["side_asked"]) == (pytest.approx(seen.side, abs=1e-3), 0.6)
+
+
+def test_a_parameter_that_would_help_is_written_beside_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def found(setup: FlightSetup, _: Airframe, verdict: Verdict, __: Any) -> TriedRemedies:
+        laid = replace(setup.mission, items=setup.mission.items[:-1])
+        of = SurveyRemedy("parameter", "ROLL_LIMIT_DEG", 35.0, 47.0, "deg", verdict, laid, 5000.0, 150.0)
+        return TriedRemedies((of,))
+
+    monkeypatch.setattr(surveying, "survey_remedies", found)
+    monkeypatch.chdir(tmp_path)
+    Path("own.param").write_text("NAVL1_PERIOD,15.5\n", encoding="ascii")
+    assert main(["survey", str(FIELD_SURVEY), *BY, "--params", "own.param", "--suggest", "--out", "better"]) == 4
+    told = "next      planfly survey better/parameter.waypoints --params better/parameter.param with the same options"
+    assert told in capsys.readouterr().out
+    assert Path("better/parameter.param").read_text(encoding="ascii") == "NAVL1_PERIOD,15.5\nROLL_LIMIT_DEG,47.0\n"
+    assert len(Path("better/parameter.waypoints").read_text(encoding="ascii").splitlines()) == 19
 
 
 @pytest.mark.parametrize("camera", [(23.5, 15.6), (23.5, 0.0, 16.0), "23.5x15.6,16", (1.0, 1.0, 1.0, 70.0, 100.0), 5])
