@@ -423,7 +423,7 @@ _LETTER, _LINE = 0.57, 1.3
 def narrowed(figure: Figure) -> Figure:
     """Lay a picture of this module out anew, `NARROW` inches wide: words in lines, legends below.  It is changed.
 
-    >>> narrowed(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth()
+    >>> float(narrowed(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0
     """
     wide, tall = figure.get_size_inches().tolist()

@@ -195,6 +195,8 @@ def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, m
     told: list[tuple[float, float, str]] = []
     with open_winds_store(wind_base, goal, tmp_path, resume=False) as store:
         found = find_winds(wind_base, goal, Workers(1), store, lambda *one: told.append(one), surer_but_in_the_west)
+    # What it takes at least is said before the first flight.
+    assert told.pop(0) == (0.0, 4 * 30.0, "0 of 120 flights at least")
     pattern = r"(\d) of 4 directions settled, (\d+) flights, \d+ a minute(, \d+ s left at least)?"
     lines = [re.fullmatch(pattern, remark) for _, _, remark in told]
     assert all(lines)

@@ -94,10 +94,10 @@ def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_p
     pace = _Pace(goal, estimator, book.tally, lambda *said: told.append(said))
     with open_store(base, goal, tmp_path, resume=False) as store:
         _fly_rest(cast("WorkerPool", AtOnce()), book, store, pace)
-    # They were quicker than a line is due.
-    assert [said[:2] for said in told] == [(6.0, 6.0)]
-    assert told[0][2].startswith("6 flights, P ")
-    assert told[0][2].endswith(", 0 s left")
+    # How many there are is said before the first; they were quicker than another line is due.
+    assert [said[:2] for said in told] == [(0.0, 6.0), (6.0, 6.0)]
+    assert told[-1][2].startswith("6 flights, P ")
+    assert told[-1][2].endswith(", 0 s left")
 
 
 def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBase, tmp_path: Path) -> None:
