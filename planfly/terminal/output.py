@@ -207,7 +207,7 @@ class _TimeLeft:
         if last is not None and to_do > 0.0 and last.each > 0.0:
             return f"about {_duration(last.each * to_do)}, at the pace of the last time here"
         if last is not None:
-            return f"{_duration(last.whole)} the last time here"
+            return f"the last one here took {_duration(last.whole)}"
         return "no estimate yet" if to_do > 0.0 else "no estimate"
 
     def is_due(self) -> bool:

@@ -183,7 +183,7 @@ def test_work_that_counted_nothing_the_last_time_is_said_to_take_as_long(
     clock = Clock(monkeypatch)
     run(clock, "planning", "planning", 0, 0.5)
     run(clock, "planning", "planning", 20, 0.5)
-    assert capsys.readouterr().err.splitlines()[2] == "planning ... (7 s the last time here)"
+    assert capsys.readouterr().err.splitlines()[2] == "planning ... (the last one here took 7 s)"
 
 
 def test_what_failed_or_had_a_stage_within_is_no_measure(times: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -235,7 +235,7 @@ def test_a_stage_that_reports_nothing_is_named_and_timed(
         left.keep()
         lines.append(capsys.readouterr().err.splitlines())
     told = ["drawing: 61 s so far", "drawing: 121 s so far", "drawing: done in 130.0 s"]
-    assert lines == [["drawing ... (no estimate)", *told], ["drawing ... (2 min the last time here)", *told]]
+    assert lines == [["drawing ... (no estimate)", *told], ["drawing ... (the last one here took 2 min)", *told]]
 
 
 def test_what_is_counted_late_has_its_estimate_then(
@@ -249,7 +249,7 @@ def test_what_is_counted_late_has_its_estimate_then(
     shown.advance(0.0, 4.0, "0 of 4 flights")
     shown.advance(0.0, 4.0, "0 of 4 flights")
     assert capsys.readouterr().err.splitlines() == [
-        "flying ... (13 s the last time here)",
+        "flying ... (the last one here took 13 s)",
         "flying: 0 of 4 flights, about 12 s, at the pace of the last time here",
     ]
 
