@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -227,13 +227,19 @@ def _ends(scenario: Scenario) -> list[Layer]:
 
 
 def _end_labels(scenario: Scenario, route: Floats | None) -> list[Label]:
-    """Start and destination; the route's first and last number stand in their labels where they coincide."""
+    """Start and destination, in one label where they are at one place.
+
+    The route's first and last number stand in their labels where they coincide.
+    """
     labels = []
     for point, row, name in ((scenario.start, 0, "start"), (scenario.destination, -1, "destination")):
         at_end = route is not None and _same(route[row], point)
         text = f"{row % len(route)} {name}" if at_end and route is not None else name
         labels.append(Label(text, float(point[0]), float(point[1]), "end"))
-    return labels
+    start, destination = labels
+    if not _same(scenario.start, scenario.destination):
+        return labels
+    return [replace(start, text=f"{start.text}, {destination.text}")]
 
 
 def _same(a: Floats, b: Floats) -> bool:

@@ -1,5 +1,6 @@
 """The ground under a map: lit from the north-west, with contours at round heights, or a note instead."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -223,3 +224,11 @@ def test_the_page_has_the_flights_moments_instead_of_its_points() -> None:
     flown = [layer for layer in made["layers"] if "flight" in layer]
     assert [(layer["role"], layer["flight"], "x" in layer) for layer in flown] == [("flown", 0, False)]
     assert [label[0] for label in made["labels"]] == ["0 start", "3 destination", "1", "2"]
+
+
+def test_a_way_that_ends_where_it_began_has_one_label_there() -> None:
+    there = make_scenario()
+    back = replace(there, destination=there.start + np.array([49.0, 0.0, 0.0]))
+    loop = np.concatenate([ROUTE, ROUTE[:1]])
+    made = map_json(flight_map(back, plan_waypoints=None, route_waypoints=loop, track=None, verdict=None))
+    assert [label[0] for label in made["labels"]] == ["0 start, 4 destination", "1", "2", "3"]
