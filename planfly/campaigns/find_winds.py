@@ -60,12 +60,14 @@ class WindsFound:
     """The boundary of each direction, and the flights it rests on: direction, speed, and whether flyable.
 
     lost: which of them, from 0, could not be flown; they count as not flyable.
+    conditions: whose flights these are, in which world, and who flies: lines.
     """
 
     goal: WindsGoal
     boundaries: tuple[WindBoundary, ...]
     flights: tuple[tuple[int, float, bool], ...]
     lost: tuple[int, ...] = ()
+    conditions: tuple[str, ...] = ()
 
     def from_deg(self, direction: int) -> float:
         """Where the wind of a direction comes from, degrees."""
@@ -124,7 +126,7 @@ class _Search:
     """What has been asked for, round after round, and what came of it."""
 
     def __init__(self, goal: WindsGoal, base: CampaignBase) -> None:
-        self.goal = goal
+        self.goal, self._base = goal, base
         numbers = DrawnNumbers(
             standard_population(base.dispersions, _POPULATION), partial(standard_draws, base.dispersions, base.seed)
         )
@@ -179,7 +181,8 @@ class _Search:
     def found(self) -> WindsFound:
         """The answer."""
         boundaries = tuple(one.boundary() for one in self.directions)
-        return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost))
+        conditions = tuple(self._base.condition_lines(any_wind=True))
+        return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions)
 
 
 def _way(rule: str, place: Place) -> Hashable:

@@ -340,6 +340,7 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
             for one in chart
         ],
         "spread": base.dispersions.to_json(),
+        "conditions": list(found.conditions),
     }
     picture = png_bytes(figure)
     page = winds_page(base.name, figure, wind_lines(found), rows, command)
@@ -406,6 +407,7 @@ def wind_lines(found: WindsFound) -> list[str]:
         f"flies with P >= {found.goal.target:g}, by best estimate, in wind up to {_speed_text(least.boundary, most)}"
         f" from {least.from_deg:g}° (the lowest; {_interval_text(least.low, least.high, most)} m/s at {percent}),"
         f" {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
+        *found.conditions,
         *_none_failed_lines(found),
         *_open_lines(found),
         *_lost_lines(found),

@@ -425,6 +425,8 @@ class CampaignDocument:
     sensitivities: list[SensitivityEntry]
     worst: list[dict[str, Any]]
     spread: dict[str, Any]
+    conditions: list[str]
+    """Whose flights these are, in which weather and world, about which each is drawn, and who flies: lines."""
     made_of: str
     """What the campaign was made of, as a hash."""
 
@@ -466,6 +468,8 @@ class WindsDocument:
     """Flights without an outcome, from 0 in the order in which they were asked for; they count as not flyable."""
     directions: list[WindDirection]
     spread: dict[str, Any]
+    conditions: list[str]
+    """Whose flights these are, in which world, and who flies: lines."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

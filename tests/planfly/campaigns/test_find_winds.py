@@ -25,6 +25,7 @@ from planfly.campaigns.find_winds import (
     open_winds_store,
 )
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.report import wind_lines
 from planfly.campaigns.tables import WINDS_DATABASE, AskedFlight, FlownFlight, StoreError
 from planfly.campaigns.worker_pool import FlyOne, Workers
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
@@ -76,6 +77,8 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
     assert len(found.flights) <= goal.flights
     assert found.from_deg(3) == 270.0
     assert found.lost == ()
+    assert list(found.conditions) == wind_base.condition_lines(any_wind=True)
+    assert set(found.conditions) <= set(wind_lines(found))
     # No draw is flown twice in a direction, and those of least index are among them.
     rows = table(tmp_path / WINDS_DATABASE)
     for direction in range(4):
@@ -269,7 +272,9 @@ def test_a_killed_worker_loses_no_flight(wind_base: CampaignBase, tmp_path: Path
         open_winds_store(wind_base, goal, tmp_path / "killed", resume=False) as store,
         workers_killed(kills, begun) as killed,
     ):
-        found = find_winds(wind_base, goal, Workers(2), store, lambda *_: begun.set(), slow_flight)
+        found = find_winds(
+            wind_base, goal, Workers(2), store, lambda done, *_: begun.set() if done else None, slow_flight
+        )
     assert len(killed) == kills
     want = searched(wind_base, tmp_path / "one", goal)
     assert same((found, tmp_path / "killed"), (want, tmp_path / "one"))

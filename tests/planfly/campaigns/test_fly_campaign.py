@@ -234,7 +234,7 @@ def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> 
     pause = (0.3, 1.2) if SOAK else (0.1, 0.4)
     begun, goal = threading.Event(), Goal(None, False, count)
     with open_store(base, goal, tmp_path, resume=False) as store, workers_killed(kills, begun, pause=pause) as killed:
-        fly_campaign(base, goal, Workers(2), store, lambda *_: begun.set(), fly=slow_flight)
+        fly_campaign(base, goal, Workers(2), store, lambda done, *_: begun.set() if done else None, fly=slow_flight)
     assert len(killed) == kills
     assert table(tmp_path / DATABASE) == expected(base, tmp_path / "one", count)
     note("campaign: kill -9 of its workers", kills=kills, flights=count, lost=0)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.report import campaign_page
 from planfly.campaigns.summary import campaign_lines, summary_json
 from tests.planfly.campaigns.made_campaigns import made_flight
 from tests.planfly.campaigns.made_report import made_report
@@ -31,3 +32,21 @@ def test_it_counts_what_failed_and_names_what_was_lost(base: CampaignBase, tmp_p
         text = "\n".join(campaign_lines(summary))
         assert f"{59 - failed} of 60 flights are flyable" in text
         assert "lost    1" in text
+
+
+def test_whose_flights_they_are_stands_behind_the_answer(base: CampaignBase, tmp_path: Path) -> None:
+    """The aircraft of 11 kg and its 25 m/s are of the published Aerosonde; the rest the scenario states."""
+    with made_report(base, tmp_path) as (store, summary):
+        aircraft, world, pilot = campaign_lines(summary)[3:6]
+        assert aircraft.startswith("  Aircraft: aerosonde, 11 kg, 25 m/s")
+        assert world.startswith("  Conditions: wind 5 m/s from 250 degrees, light turbulence; navigation ")
+        assert world.endswith("; terrain flat at 100 m, heights above mean sea level")
+        assert pilot.startswith("  Flown by: ")
+        assert json.loads(summary_json(summary))["conditions"] == [line.strip() for line in (aircraft, world, pilot)]
+        page = campaign_page(base, summary, store, "planfly campaign").decode()
+        assert page.count("Aircraft: aerosonde, 11 kg, 25 m/s") == 1
+
+
+def test_where_the_wind_is_asked_for_none_is_stated(base: CampaignBase) -> None:
+    _, world, _ = base.condition_lines(any_wind=True)
+    assert world.startswith("Conditions: wind from each direction, ")
