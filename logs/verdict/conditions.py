@@ -128,6 +128,11 @@ def autopilot_line(conditions: Conditions, *, flown: bool) -> str:
     return f"{'Flown by' if flown else 'Autopilot'}: {conditions.autopilot}"
 
 
+def flown_lines(conditions: Conditions) -> list[str]:
+    """All of it for what was flown: aircraft, weather and world, and who flew."""
+    return [*condition_lines(conditions), autopilot_line(conditions, flown=True)]
+
+
 def _aircraft_line(made: Conditions) -> str:
     speed = f"{made.airspeed_mps:.3g} m/s {made.airspeed_kind} airspeed ({_WHOSE_AIRSPEED[made.airspeed_source]})"
     if not made.aircraft:

@@ -19,7 +19,7 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
-from logs.verdict.conditions import autopilot_line, condition_lines, setup_conditions
+from logs.verdict.conditions import flown_lines, setup_conditions
 from planfly.airframe import Airframe, bank_limit, choose_seed, load_airframe, with_tracking
 from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
 from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission, open_planned
@@ -65,7 +65,7 @@ class CampaignBase:
         conditions = setup_conditions(self.nominal_setup())
         if any_wind:
             conditions = replace(conditions, wind_mps=math.nan, wind_from_deg=math.nan)
-        return [*condition_lines(conditions), autopilot_line(conditions, flown=True)]
+        return flown_lines(conditions)
 
     def world_hash(self) -> str:
         """Hash of what decides flight k beside the code: scenario, mission, model, dispersions and seed."""

@@ -61,9 +61,13 @@ def returns_options(line: LineParser) -> None:
 
 def returns(args: argparse.Namespace) -> int:
     """Judge every return: 0 for all safe, 4 where one is not, 3 where that is not known."""
+    from logs.verdict.conditions import flown_lines, setup_conditions
+
     found = call(planfly.returns, args)
     code = FLYABLE if found.safe else LOSS if found.undecided else NOT_FLYABLE
     print(f"returns   {coloured(found.headline, 'good' if found.safe else 'bad')}")
+    for text in flown_lines(setup_conditions(found.setup)):
+        print(f"  {text}")
     for text in found.lines_of_causes:
         print(f"  {text}")
     for text in found.lines_of_ranges[:_LISTED]:
@@ -87,7 +91,15 @@ def returns(args: argparse.Namespace) -> int:
 
 
 def _answer(what: str, found: "ReturnsFound", code: int) -> object:
-    from planfly.terminal.answers import CauseEntry, ReturnsAnswer, glides_entry, return_entry, suggestion_entry
+    from logs.verdict.conditions import setup_conditions
+    from planfly.terminal.answers import (
+        CauseEntry,
+        ReturnsAnswer,
+        conditions_document,
+        glides_entry,
+        return_entry,
+        suggestion_entry,
+    )
 
     returns, no_return = found.returns, found.returns.point_of_no_return
     return ReturnsAnswer(
@@ -95,6 +107,7 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         what=what,
         headline=found.headline,
         safe=found.safe,
+        conditions=conditions_document(setup_conditions(found.setup)),
         every_s=returns.every,
         least_clearance_m=returns.limit,
         causes=[

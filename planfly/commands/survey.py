@@ -51,12 +51,16 @@ def survey_options(line: LineParser) -> None:
 
 def survey(args: argparse.Namespace) -> int:
     """Judge every photo line: 4 where one cannot be used, else as the flight is judged."""
+    from logs.verdict.conditions import flown_lines, setup_conditions
+
     found = call(planfly.survey, args)
     code = verdict_code(found.verdict)
     if not found.usable:
         code = NOT_FLYABLE
     print(f"survey    {coloured(found.headline, 'good' if found.usable else 'bad')}")
     print(f"flight    {found.verdict.headline}")
+    for text in flown_lines(setup_conditions(found.setup)):
+        print(f"  {text}")
     for text in found.lines_of_lines:
         print(f"  {text}")
     for text in found.lines_of_remedies:
@@ -77,8 +81,10 @@ def survey(args: argparse.Namespace) -> int:
 
 
 def _answer(what: str, found: "SurveyFound", code: int) -> object:
+    from logs.verdict.conditions import setup_conditions
     from planfly.terminal.answers import (
         SurveyAnswer,
+        conditions_document,
         near_miss_entry,
         overlap_entry,
         photo_line_entry,
@@ -90,6 +96,7 @@ def _answer(what: str, found: "SurveyFound", code: int) -> object:
         what=what,
         headline=found.headline,
         usable=found.usable,
+        conditions=conditions_document(setup_conditions(found.setup)),
         surveys=[
             [photo_line_entry(found.setup, line, one) for line, one in zip(survey.lines, lines, strict=True)]
             for survey, lines in zip(found.surveys, found.lines, strict=True)

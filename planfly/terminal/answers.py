@@ -778,6 +778,7 @@ class ReturnsAnswer:
     what: str
     headline: str
     safe: bool
+    conditions: ConditionsDocument
     every_s: float
     least_clearance_m: float
     causes: list[CauseEntry]
@@ -869,6 +870,7 @@ class SurveyAnswer:
     what: str
     headline: str
     usable: bool
+    conditions: ConditionsDocument
     surveys: list[list[PhotoLineEntry]]
     overlaps: list[OverlapEntry | None]
     """Of each survey; null where its camera is not known."""

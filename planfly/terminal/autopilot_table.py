@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from logs.verdict.conditions import autopilot_line, condition_lines
+from logs.verdict.conditions import flown_lines
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.rules.registry import RULES
 from planfly.terminal.command_parser import coloured
@@ -40,7 +40,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
         more = f"; {rest[0]}" if rest and not verdict.flyable else ""
         lines.append(f"{name}: " + coloured(first, "good" if verdict.flyable else "bad") + more)
         if verdict.conditions is not None:
-            said = (*condition_lines(verdict.conditions), autopilot_line(verdict.conditions, flown=True))
+            said = flown_lines(verdict.conditions)
             lines += [f"  {line}" for line in said]
     return lines
 

@@ -24,10 +24,12 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFi
     assert main(asked) == 4
     out = capsys.readouterr().out
     assert "of 13 returns 1 hits the ground, 1 comes lower than 30 m above ground; 11 are safe" in out
+    assert out.splitlines()[1].startswith("  Aircraft: aerosonde, 11 kg, ")
     assert "it returns: the pilot's RTL, the mission's end" in out
     assert "it does not: RC lost (FS_LONG_ACTN 0), station lost (FS_GCS_ENABL 0), battery low" in out
     assert "flown again in JSBSim" in out
     answer = json.loads((hill / "mission.json").read_text(encoding="utf-8"))
+    assert answer["conditions"]["aircraft"] == "aerosonde"
     assert answer["ranges"][0]["kind"] == "ground"
     assert "engine out: of 13 places home can be reached from" in out
     assert "point of no return: none, for every return leaves the reserve of" in out

@@ -28,8 +28,14 @@ def test_each_line_is_told_and_what_would_help_is_flown(
     out = capsys.readouterr().out
     assert "survey    0 of 4 photo lines can be used" in out
     assert "4 lines, 60 m apart, the first on course 0°" in out
+    # Whose lines they are, in which weather and world.
+    aircraft, world, pilot = out.splitlines()[2:5]
+    assert aircraft == "  Aircraft: x8, 3.36 kg, 18 m/s equivalent airspeed (its cruise speed)"
+    assert world.startswith("  Conditions: no wind, no turbulence; ")
+    assert pilot.startswith("  Flown by: ArduPlane 4.6's law")
     assert "would help: turn-arounds of" in out
     answer = json.loads((tmp_path / "answer.json").read_text(encoding="utf-8"))
+    assert (answer["conditions"]["aircraft"], answer["conditions"]["wind_mps"]) == ("x8", 0.0)
     [lines] = answer["surveys"]
     assert [(one["first_item"], one["last_item"]) for one in lines] == [(2, 4), (6, 8), (10, 12), (14, 16)]
     for one in lines:
