@@ -4,7 +4,6 @@ Both renderers draw what is described here: `logs.views.drawing` with matplotlib
 script with plotly.js, from `chart_json`.  A role is a word ("missile", "planned") that `logs.theme` gives a look.
 """
 
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -202,16 +201,15 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
     column = np.asarray(values, dtype=np.float64)
     if column.size <= 2 * count:
         return np.arange(column.size)
-    edges = np.linspace(0, column.size, count + 1).astype(int)
-    kept = {0, column.size - 1}
-    for low, high in itertools.pairwise(edges):
-        block = column[low:high]
-        good = np.flatnonzero(np.isfinite(block))
-        if good.size == 0:
-            kept.add(int(low))
-            continue
-        kept.update((int(low + good[np.argmin(block[good])]), int(low + good[np.argmax(block[good])])))
-    return np.array(sorted(kept), dtype=np.intp)
+    edges = np.linspace(0, column.size, count + 1).astype(np.intp)
+    starts, ends = edges[:-1], edges[1:]
+    rows = starts[:, None] + np.arange(np.diff(edges).max())
+    blocks = column[np.minimum(rows, column.size - 1)]
+    known = (rows < ends[:, None]) & np.isfinite(blocks)
+    # A block with nothing known keeps its first row.
+    lowest = starts + np.where(known, blocks, np.inf).argmin(axis=1)
+    highest = starts + np.where(known, blocks, -np.inf).argmax(axis=1)
+    return np.unique(np.concatenate([[0, column.size - 1], lowest, highest]))
 
 
 def nice_step(span: float, parts: int) -> float:
