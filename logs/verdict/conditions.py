@@ -42,7 +42,7 @@ class Conditions:
     airspeed_mps: until the mission sets another.  airspeed_kind: equivalent is less than true at height.
     airspeed_source: who states it: "scenario" (or an option), "parameters" (of the autopilot), "aircraft" (its cruise);
     "flight" of an imported one by what it flew.
-    wind_mps, wind_from_deg: the mean wind, and where it comes from; NaN where the answer is about the wind.
+    wind_mps, wind_from_deg: the mean wind, and where it comes from; None where the answer is about the wind.
     turbulence, navigation: None where it was not simulated.
     autopilot: who steers, with the settings that decide most.  autopilot_version: "" for planfly's own guidance.
     terrain: its file or name, None for none.  height_datum: what the terrain's heights count from.
@@ -55,8 +55,8 @@ class Conditions:
     airspeed_mps: float
     airspeed_kind: Literal["true", "equivalent"]
     airspeed_source: AirspeedSource
-    wind_mps: float
-    wind_from_deg: float
+    wind_mps: float | None
+    wind_from_deg: float | None
     turbulence: Turbulence | None
     navigation: Navigation | None
     autopilot: str
@@ -146,7 +146,7 @@ def _aircraft_line(made: Conditions) -> str:
 
 def _world_line(made: Conditions) -> str:
     blows = "no wind"
-    if math.isnan(made.wind_mps):
+    if made.wind_mps is None:
         blows = "wind from each direction"
     elif made.wind_mps > 0.0:
         blows = f"wind {made.wind_mps:.3g} m/s from {made.wind_from_deg:.0f} degrees"

@@ -19,7 +19,7 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
-from logs.verdict.conditions import flown_lines, setup_conditions
+from logs.verdict.conditions import Conditions, setup_conditions
 from planfly.airframe import Airframe, bank_limit, choose_seed, load_airframe, with_tracking
 from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
 from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission, open_planned
@@ -60,12 +60,9 @@ class CampaignBase:
         """The flight with nothing drawn.  Raises PlanflyError for a mission that cannot be laid out."""
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
-    def condition_lines(self, *, any_wind: bool = False) -> list[str]:
-        """Whose flights these are, in which weather and world, and who flies.  any_wind: the wind is what is asked."""
-        conditions = setup_conditions(self.nominal_setup())
-        if any_wind:
-            conditions = replace(conditions, wind_mps=math.nan, wind_from_deg=math.nan)
-        return flown_lines(conditions)
+    def conditions(self) -> Conditions:
+        """What flights are drawn about: whose they are, in which weather and world, and who flies."""
+        return setup_conditions(self.nominal_setup())
 
     def world_hash(self) -> str:
         """Hash of what decides flight k beside the code: scenario, mission, model, dispersions and seed."""

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Callable, Hashable
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from logs.verdict.conditions import Conditions
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.dispersions import standard_draws, standard_population
@@ -60,14 +61,14 @@ class WindsFound:
     """The boundary of each direction, and the flights it rests on: direction, speed, and whether flyable.
 
     lost: which of them, from 0, could not be flown; they count as not flyable.
-    conditions: whose flights these are, in which world, and who flies: lines.
+    conditions: whose flights these are, in which world, and who flies; the wind is that of each direction.
     """
 
     goal: WindsGoal
     boundaries: tuple[WindBoundary, ...]
     flights: tuple[tuple[int, float, bool], ...]
     lost: tuple[int, ...] = ()
-    conditions: tuple[str, ...] = ()
+    conditions: Conditions | None = None
 
     def from_deg(self, direction: int) -> float:
         """Where the wind of a direction comes from, degrees."""
@@ -181,7 +182,7 @@ class _Search:
     def found(self) -> WindsFound:
         """The answer."""
         boundaries = tuple(one.boundary() for one in self.directions)
-        conditions = tuple(self._base.condition_lines(any_wind=True))
+        conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions)
 
 

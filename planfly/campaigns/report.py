@@ -6,7 +6,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import resources
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from logs.theme import css_variables
+from logs.verdict.conditions import flown_lines
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text
 from logs.views.drawing import page_svg, png_bytes
@@ -340,7 +341,7 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
             for one in chart
         ],
         "spread": base.dispersions.to_json(),
-        "conditions": list(found.conditions),
+        "conditions": None if found.conditions is None else asdict(found.conditions),
     }
     picture = png_bytes(figure)
     page = winds_page(base.name, figure, wind_lines(found), rows, command)
@@ -407,7 +408,7 @@ def wind_lines(found: WindsFound) -> list[str]:
         f"flies with P >= {found.goal.target:g}, by best estimate, in wind up to {_speed_text(least.boundary, most)}"
         f" from {least.from_deg:g}° (the lowest; {_interval_text(least.low, least.high, most)} m/s at {percent}),"
         f" {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
-        *found.conditions,
+        *(() if found.conditions is None else flown_lines(found.conditions)),
         *_none_failed_lines(found),
         *_open_lines(found),
         *_lost_lines(found),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from logs.verdict.conditions import Conditions, flown_lines
 from logs.verdict.places import Place
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text
@@ -52,7 +53,7 @@ class CampaignSummary:
     deciding: the rule that fails most, or, where none does, that of the least reliability index: the mean of its
     margins in their standard deviations (Cornell, "A probability-based structural code", ACI Journal 66, 1969); "" for
     none.
-    conditions: whose flights these are, in which weather and world, about which each is drawn, and who flies: lines.
+    conditions: whose flights these are, in which weather and world, about which each is drawn, and who flies.
     low_margin: of that rule, the margin that one flight in twenty falls below, in `unit`; None where unknown.
     """
 
@@ -69,7 +70,7 @@ class CampaignSummary:
     worst: tuple[FlightRow, ...]
     dispersions: dict[str, dict[str, Any]]
     made_of: str
-    conditions: tuple[str, ...]
+    conditions: Conditions
 
 
 def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:
@@ -91,7 +92,7 @@ def summarise(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) 
         worst=worst,
         dispersions=base.dispersions.to_json(),
         made_of=store.made_of,
-        conditions=tuple(base.condition_lines()),
+        conditions=base.conditions(),
     )
 
 
@@ -176,7 +177,7 @@ def summary_json(summary: CampaignSummary) -> str:
         ],
         "worst": [_flight(row) for row in summary.worst],
         "spread": summary.dispersions,
-        "conditions": list(summary.conditions),
+        "conditions": asdict(summary.conditions),
         "made_of": summary.made_of,
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
@@ -217,7 +218,7 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
         f"{_answer_text(summary)}: {tally.flyable} of {tally.flown} flights are flyable, P = {tally.share:.4f}",
         f"  at least {found.lower:.4f}, at most {found.upper:.4f} (each at {sure}; {goal.method})",
         f"  two-sided at {sure}: {found.interval.low:.4f} to {found.interval.high:.4f}",
-        *(f"  {line}" for line in summary.conditions),
+        *(f"  {line}" for line in flown_lines(summary.conditions)),
     ]
     for one in summary.by_rule:
         where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])

@@ -180,8 +180,9 @@ class ConditionsDocument:
     """true or equivalent."""
     airspeed_source: str
     """scenario (or an option), parameters, aircraft (its cruise speed) or flight (as it was flown)."""
-    wind_mps: float
-    wind_from_deg: float
+    wind_mps: float | None
+    wind_from_deg: float | None
+    """Both null where the wind is what is asked for."""
     turbulence: str | None
     """null where it was not simulated, as navigation."""
     navigation: str | None
@@ -425,8 +426,8 @@ class CampaignDocument:
     sensitivities: list[SensitivityEntry]
     worst: list[dict[str, Any]]
     spread: dict[str, Any]
-    conditions: list[str]
-    """Whose flights these are, in which weather and world, about which each is drawn, and who flies: lines."""
+    conditions: ConditionsDocument
+    """What each flight is drawn about."""
     made_of: str
     """What the campaign was made of, as a hash."""
 
@@ -468,8 +469,8 @@ class WindsDocument:
     """Flights without an outcome, from 0 in the order in which they were asked for; they count as not flyable."""
     directions: list[WindDirection]
     spread: dict[str, Any]
-    conditions: list[str]
-    """Whose flights these are, in which world, and who flies: lines."""
+    conditions: ConditionsDocument
+    """Without the wind, which is what is asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
