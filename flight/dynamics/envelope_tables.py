@@ -3,6 +3,7 @@
 import contextlib
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     tables = _read(file, key, _airspeeds(aircraft))
     if tables is None:
         tables = compute_tables(aircraft, motor_braking)
-        _write(file, key, tables)
+        write_tables(file, key, tables)
     known = read_uncertainty(aircraft.folder)
     return Envelope(
         source="" if known is None else known.source,
@@ -130,24 +131,37 @@ def _key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
 
 def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
     """Return the tables of a cache file, or None if it is not whole, undamaged and for this key."""
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-        if {name: content[name] for name in key} != key:
-            return None
-        # No trim is kept as null, because JSON has no NaN; numpy reads it back as NaN.
-        tables = {name: np.array(content["tables"][name], dtype=np.float64) for name in _TABLES}
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
     grid = (airspeeds.size, _AMSL.size)
     shapes = dict.fromkeys(("climb", "descent", *POWERS), grid) | {"airspeed": airspeeds.shape}
-    if any(tables[name].shape != shapes.get(name, _AMSL.shape) for name in _TABLES):
+    tables = read_tables(file, key, {name: shapes.get(name, _AMSL.shape) for name in _TABLES})
+    if tables is None:
         return None
     if not (np.array_equal(tables["airspeed"], airspeeds) and np.array_equal(tables["amsl"], _AMSL)):
         return None
     return tables
 
 
-def _write(file: Path, key: dict[str, Any], tables: dict[str, Floats]) -> None:
+# ----------------------------------------------------------------------
+# Tables of an aircraft in the user's cache folder, equal to the last bit to what was computed.
+
+
+def read_tables(file: Path, key: dict[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Floats] | None:
+    """The tables that `write_tables` kept, or None if the file is not whole, undamaged and for this key.
+
+    key: what JSON gives back as it is.  shapes: of each table by its name.
+    """
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        if {name: content[name] for name in key} != key:
+            return None
+        # No trim is kept as null, because JSON has no NaN; numpy reads it back as NaN.
+        tables = {name: np.array(content["tables"][name], dtype=np.float64) for name in shapes}
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return tables if all(tables[name].shape == shape for name, shape in shapes.items()) else None
+
+
+def write_tables(file: Path, key: dict[str, Any], tables: Mapping[str, Floats]) -> None:
     """Write a cache file whole or not at all; without disk space or permission, do nothing."""
     values: dict[str, object] = {}
     for name, table in tables.items():

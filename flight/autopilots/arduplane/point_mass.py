@@ -6,14 +6,17 @@ specific excess power is that of trims at this throttle, airspeed and height, le
 
 import functools
 import math
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from platformdirs import user_cache_dir
 
-from aircraft.catalog import Aircraft
+from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import GRAVITY, Envelope
-from flight.dynamics.fdm import Fdm
+from flight.dynamics.envelope_tables import read_tables, write_tables
+from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import trim
 from world.kernels import Record, inner, record_dtype
 from world.wind import Wind, mean_wind_speed
@@ -79,14 +82,38 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
     return PointMass(record, excess, power, bool(np.isfinite(trims[0]).any()))
 
 
+# Any change of what `_trims` computes counts this up.
+_SCHEMA = 1
+
+
 @functools.lru_cache(maxsize=8)
 def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     """Airspeeds (v,), specific excess power (t, v, h) and the angle of attack, without lift and times V^2 with it.
 
-    Excess power is NaN where there is no trim.
+    Excess power is NaN where there is no trim.  Trims are kept in the user's cache folder, as the envelope is.
+    """
+    speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _SPEEDS)
+    version = model_hash(aircraft)
+    file = Path(user_cache_dir("planfly")) / f"trims-{aircraft.name}-{version[:16]}-v{_SCHEMA}.json"
+    key = {"schema": _SCHEMA, "model_hash": version, "jsbsim": JSBSIM_VERSION, "airspeeds": speeds.tolist()}
+    shapes = {"excess": (_THROTTLES, _SPEEDS, len(_HEIGHTS)), "alpha": (_SPEEDS,)}
+    tables = read_tables(file, key, shapes)
+    if tables is None:
+        tables = _trims(aircraft, speeds)
+        write_tables(file, key, tables)
+    alphas = tables["alpha"]
+    _fill(alphas)
+    terms = np.stack([np.ones(_SPEEDS), speeds**-2.0], axis=1)
+    alpha, lift = np.linalg.lstsq(terms, np.nan_to_num(alphas), rcond=None)[0]
+    return speeds, tables["excess"], float(alpha), float(lift)
+
+
+def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
+    """Specific excess power (t, v, h), and the angle of attack (v,) at the lowest height; NaN where there is no trim.
+
+    speeds: (v,) m/s.
     """
     simulator = Fdm(aircraft)
-    speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _SPEEDS)
     excess = np.full((_THROTTLES, _SPEEDS, len(_HEIGHTS)), np.nan)
     alphas = np.full(_SPEEDS, np.nan)
     for h, amsl in enumerate(_HEIGHTS):
@@ -100,10 +127,7 @@ def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
                 excess[t, v, h] = speed * math.sin(found.climb)
                 if h == 0:
                     alphas[v] = found.alpha
-    _fill(alphas)
-    terms = np.stack([np.ones(_SPEEDS), speeds**-2.0], axis=1)
-    alpha, lift = np.linalg.lstsq(terms, np.nan_to_num(alphas), rcond=None)[0]
-    return speeds, excess, float(alpha), float(lift)
+    return {"excess": excess, "alpha": alphas}
 
 
 def filled_excess(trims: Floats) -> Floats:

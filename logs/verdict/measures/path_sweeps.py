@@ -227,17 +227,18 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     if not radius > 0.0 or _far(position, centre, radius):
         return []
     closest, enter, leave = _windows(np.ascontiguousarray(position), np.ascontiguousarray(centre), float(radius))
+    rows = np.flatnonzero(leave > enter)
+    if not rows.size:
+        return []
     step = np.diff(time)
+    start, end = (time[rows] + share[rows] * step[rows] for share in (enter, leave))
+    first = np.flatnonzero(np.append(True, start[1:] - end[:-1] > TOUCH))
     found: list[Passage] = []
-    for k in np.flatnonzero(leave > enter).tolist():
-        start, end = time[k] + enter[k] * step[k], time[k] + leave[k] * step[k]
-        last = k == len(step) - 1 and leave[k] >= 1.0
-        here = Passage(float(start), float(end), float(closest[k]), float(time[k]), not last)
-        if found and start - found[-1].end <= TOUCH:
-            before = found.pop()
-            nearer = here if here.closest < before.closest else before
-            here = Passage(before.start, here.end, nearer.closest, nearer.closest_time, here.whole)
-        found.append(here)
+    for here in np.split(np.arange(rows.size), first[1:]):
+        row, last = rows[here[np.argmin(closest[rows[here]])]], rows[here[-1]]
+        whole = not (last == len(step) - 1 and leave[last] >= 1.0)
+        place = (float(start[here[0]]), float(end[here[-1]]), float(closest[row]), float(time[row]))
+        found.append(Passage(*place, whole=bool(whole)))
     return found
 
 

@@ -1,5 +1,6 @@
 """What stands where an aircraft has no trim: closed throttles are filled from closed ones, by hand."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,6 +42,8 @@ def made(monkeypatch: pytest.MonkeyPatch, slowest_glide: float) -> PointMass:
     monkeypatch.setattr(subject, "trim", trim)
     # Not the kept trims of that aircraft, nor these for anyone else.
     monkeypatch.setattr(subject, "_trimmed", subject._trimmed.__wrapped__)
+    monkeypatch.setattr(subject, "read_tables", lambda *_: None)
+    monkeypatch.setattr(subject, "write_tables", lambda *_: None)
     one = airframe()
     return point_mass(one.aircraft, one.limits.envelope, one.airspeed, Wind(0.0, 0.0))
 
@@ -57,3 +60,25 @@ def test_without_any_trim_of_a_closed_throttle_it_has_no_glide(monkeypatch: pyte
     assert not found.glides
     # A return with an engine is flown still, by the nearest throttle.
     assert excess_power(found.excess, 0.1, 18.0, 500.0, found.record) == pytest.approx(0.5)
+
+
+def test_trims_are_kept_to_the_last_bit_for_the_model_that_they_are_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(subject, "user_cache_dir", lambda name: str(tmp_path / name))
+    keep = subject._trimmed.__wrapped__
+    aircraft = airframe().aircraft
+    made = keep(aircraft)
+    (file,) = (tmp_path / "planfly").iterdir()
+    sound = file.read_text(encoding="utf-8")
+    # A kept file is read, and no aircraft loaded.
+    with monkeypatch.context() as patch:
+        patch.setattr(subject, "Fdm", None)
+        for one, again in zip(made, keep(aircraft), strict=True):
+            np.testing.assert_array_equal(one, again)
+    # One of another model, or that is damaged, is made anew.
+    trims = {"excess": made[1], "alpha": np.zeros(len(made[0]))}
+    monkeypatch.setattr(subject, "_trims", lambda *_: trims)
+    for damaged in (sound.replace('"model_hash": "', '"model_hash": "0'), sound[:99], sound.replace("null", "[1]")):
+        file.write_text(damaged, encoding="utf-8")
+        assert keep(aircraft)[2:] == (0.0, 0.0)
