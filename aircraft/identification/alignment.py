@@ -70,16 +70,20 @@ class Signals:
 
     def thinned(self, every: int, extra: Mapping[str, Floats]) -> "Signals":
         """Of so many rows one, low-passed before; extra: (n,) more columns that are thinned alike."""
-        made: dict[str, list[Floats]] = {}
-        edges, blocks = [0], []
+        edges, blocks, parts = [0], [], []
         columns = {name: getattr(self, name) for name in _SAMPLED} | dict(extra)
+        together = np.column_stack(list(columns.values()))
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
-            for name, values in columns.items():
-                smooth = low_pass(values[first:last], 0.3 * self.hertz / every, self.hertz)
-                made.setdefault(name, []).append(smooth[::every])
+            parts.append(low_pass(together[first:last], 0.3 * self.hertz / every, self.hertz)[::every])
             blocks.append(self.block[first:last:every])
             edges.append(edges[-1] + len(blocks[-1]))
-        joined: dict[str, Any] = {name: np.concatenate(values) for name, values in made.items()}
+        # Each column in a run of its own again, (n,) or (n, k).
+        whole, at = np.concatenate(parts), 0
+        joined: dict[str, Any] = {}
+        for name, values in columns.items():
+            width = 1 if values.ndim == 1 else values.shape[1]
+            joined[name] = np.ascontiguousarray(whole[:, at] if values.ndim == 1 else whole[:, at : at + width])
+            at += width
         more = {name: joined.pop(name) for name in extra}
         return replace(
             self, **joined, edges=tuple(edges), block=np.concatenate(blocks), hertz=self.hertz / every, extra=more
