@@ -109,7 +109,7 @@ HOMELESS = ({"HOME": "/nonexistent"}, {}, {"HOME": "/dev/null", "TMPDIR": "/none
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="temporary files are where Linux has them")
-@pytest.mark.parametrize("given", some(HOMELESS, 2))
+@pytest.mark.parametrize("given", some(HOMELESS, 3))
 def test_a_user_who_can_write_no_cache_gets_results_and_the_way_out(given: dict[str, str]) -> None:
     """Neither the sources nor a cache in a home: kernels are kept in a temporary folder while the command runs."""
     path = f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"

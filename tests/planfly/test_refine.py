@@ -80,7 +80,7 @@ def test_a_plan_over_the_hill_becomes_one_round_it(tmp_path: Path, capsys: pytes
 @pytest.mark.usefixtures("blank_pictures")
 def test_what_cannot_fly_is_shown_not_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    assert main(["run", "tight", "--out", str(out), "--refine", "2"]) == 4
+    assert main(["run", "tight", "--out", str(out), "--refine", "1"]) == 4
     rounds = rounds_of(out)
     assert len(rounds) >= 2
     assert not any(entry["flyable"] for entry in rounds)

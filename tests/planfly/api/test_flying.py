@@ -158,9 +158,11 @@ def test_a_scenario_made_in_python_is_planned_and_flown() -> None:
 
 
 def test_both_at_once_are_the_one_after_the_other(tmp_path: Path) -> None:
+    (tmp_path / "field.toml").write_text(f"{FIELD}[planner]\npopulation = 20\ngenerations = 5\n")
+    field = str(tmp_path / "field.toml")
     flown_with = {"wind": (4.0, 90.0), "turbulence": "light", "airspeed": 27.0}
-    both = planfly.plan_then_fly("paper-07", seed=2, log=tmp_path / "f.mcap", **flown_with)
-    plan = planfly.plan("paper-07", seed=2, **flown_with)
+    both = planfly.plan_then_fly(field, seed=2, log=tmp_path / "f.mcap", **flown_with)
+    plan = planfly.plan(field, seed=2, **flown_with)
     assert plan_json(both.plan) == plan_json(plan)
     assert verdict_json(both.verdict) == verdict_json(planfly.fly(plan, seed=2).verdict)
     assert planfly.read_log(tmp_path / "f.mcap").setup.scenario.wind.speed == 4.0

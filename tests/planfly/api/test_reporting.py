@@ -11,34 +11,29 @@ from matplotlib.figure import Figure
 
 import planfly
 from flight.mission_files.formats import read_mission
-from logs.views import figures
-from logs.views.drawing import new_figure, png_bytes
 from planfly.cli import main
+from tests.logs.blank_pictures import draw_nothing
 from tests.soak import SOAK
 from world.scenario import with_flight
 
 FLOWN = ["map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy"]
 
 
-def test_figures_are_matplotlibs_by_name(flown: planfly.FlownMission, path: planfly.Plan) -> None:
-    drawn = planfly.figures(flown)
+def test_figures_are_matplotlibs_by_name(flown: planfly.FlownMission, path: planfly.Plan, tmp_path: Path) -> None:
+    """Of a log and of a plan; README's lines draw those of a flight.  A figure is the script's own to save."""
+    assert flown.log is not None
+    drawn = planfly.figures(str(flown.log))
     assert list(drawn) == FLOWN
     assert all(isinstance(figure, Figure) for figure in drawn.values())
-    assert list(planfly.figures(path)) == FLOWN[:5]
-
-
-def test_a_figure_is_the_scripts_own_to_save(flown: planfly.FlownMission, tmp_path: Path) -> None:
-    assert flown.log is not None
-    planfly.figures(str(flown.log))["map"].savefig(tmp_path / "map.pdf")
+    drawn["map"].savefig(tmp_path / "map.pdf")
     assert (tmp_path / "map.pdf").read_bytes().startswith(b"%PDF")
+    assert list(planfly.figures(path)) == FLOWN[:5]
 
 
 def test_a_report_of_a_log_is_the_commands(
     flown: planfly.FlownMission, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    names = ("map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy")
-    pixel = png_bytes(new_figure(1.0))
-    monkeypatch.setattr(figures, "draw_pictures", lambda *_, **__: {f"{name}.png": pixel for name in names})
+    draw_nothing(monkeypatch)
     assert flown.log is not None
     ours = planfly.report(str(flown.log), tmp_path / "ours")
     assert main(["report", str(flown.log), "--out", str(tmp_path / "theirs")]) == 0
@@ -47,7 +42,11 @@ def test_a_report_of_a_log_is_the_commands(
     assert {file.name for file in ours.files} == {file.name for file in (tmp_path / "theirs").iterdir()}
 
 
-def test_results_are_replaced_where_the_script_says_so_alone(flown: planfly.FlownMission, tmp_path: Path) -> None:
+def test_results_are_replaced_where_the_script_says_so_alone(
+    flown: planfly.FlownMission, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not SOAK:
+        draw_nothing(monkeypatch)
     (tmp_path / "map.png").write_text("old")
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(planfly.PlanflyError, match="not empty; overwrite=True replaces"):

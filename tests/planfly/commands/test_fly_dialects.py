@@ -1,6 +1,10 @@
 """Mission files as QGroundControl, Mission Planner and MAVProxy write them, flown from the command line."""
 
 import json
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from functools import cache
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -42,11 +46,26 @@ def test_every_sample_is_listed() -> None:
     assert {path.name for path in MISSIONS.iterdir() if path.name != ".gitattributes"} == set(LEGS)
 
 
+Flown = Callable[[str], tuple[int, str, Path]]
+
+
+@pytest.fixture(scope="module")
+def over_terrain(tmp_path_factory: pytest.TempPathFactory) -> Flown:
+    """Fly a mission over terrain, once: exit code, what was printed, and the log."""
+
+    @cache
+    def fly(name: str) -> tuple[int, str, Path]:
+        log = tmp_path_factory.mktemp("flown") / "flight.mcap"
+        with redirect_stdout(StringIO()) as out:
+            code = main(["fly", str(MISSIONS / name), "--terrain", "jacksboro", "--log", str(log)])
+        return code, out.getvalue(), log
+
+    return fly
+
+
 @pytest.mark.parametrize("name", OVER)
-def test_it_flies_over_terrain(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    log = tmp_path / "flight.mcap"
-    code = main(["fly", str(MISSIONS / name), "--terrain", "jacksboro", "--log", str(log)])
-    out = capsys.readouterr().out
+def test_it_flies_over_terrain(name: str, over_terrain: Flown) -> None:
+    code, out, log = over_terrain(name)
     why = NOT_FLYABLE.get(name)
     assert code == (0 if why is None else 4), out
     assert out.splitlines()[0].startswith("flyable" if why is None else f"not flyable: {why} ")
@@ -95,13 +114,12 @@ def test_the_geometric_level_agrees(name: str, capsys: pytest.CaptureFixture[str
     assert all(line.startswith((f"  failed  {why} ", f"  failed  {why},")) for line in failed)
 
 
-def test_wind_turns_a_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wind_turns_a_verdict(over_terrain: Flown, tmp_path: Path) -> None:
     """A wind that leaves too little room or climb is told apart from calm air."""
     name = str(MISSIONS / "mavproxy_terrain.txt")
-    assert main(["fly", name, "--terrain", "jacksboro", "--log", str(tmp_path / "a.mcap")]) == 0
     windy = ["--wind", "9,250", "--turbulence", "moderate", "--seed", "4"]
     code = main(["fly", name, "--terrain", "jacksboro", "--log", str(tmp_path / "b.mcap"), *windy])
-    calm, wind = read_log(tmp_path / "a.mcap"), read_log(tmp_path / "b.mcap")
+    calm, wind = read_log(over_terrain("mavproxy_terrain.txt")[2]), read_log(tmp_path / "b.mcap")
     assert code in (0, 4)
     assert wind.setup.scenario.wind.speed == 9.0
     assert wind.track.wind.std() > 0.3 > calm.track.wind.std()

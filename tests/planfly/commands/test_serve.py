@@ -22,6 +22,7 @@ from logs.recording.reader import read_log
 from planfly.airframe import load_airframe
 from planfly.cli import main
 from tests.planfly.conftest import FIELD, Served
+from tests.planfly.misuse.test_listeners import listening, table
 from tests.soak import SOAK, scaled, tally, widen
 from tests.stations import UdpStation, item
 from tests.stopwatch import Stopwatch
@@ -151,6 +152,10 @@ def test_of_two_stations_over_sockets_one_wins(quick: Served) -> None:
             first.send(mavlink.MAVLink_mission_request_int_message(1, 1, 3, 0))
             back = first.until(lambda m: m.get_type() == "MISSION_ITEM_INT")
             assert (back.x, back.y) == (ROUTE[3].x, ROUTE[3].y)
+
+
+def test_its_sockets_are_those_of_the_table_of_the_network_page(quick: Served) -> None:
+    assert listening(quick.process.pid) == table()["`serve`"]
 
 
 def flown_until_a_power_cut(serve: Callable[..., Served], seed: int) -> tuple[Path, float]:

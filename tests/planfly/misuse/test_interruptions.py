@@ -70,7 +70,8 @@ FEW = (
         signal.SIGINT,
         grown="f.mcap",
     ),
-    Case(SERVE, "flight logs", 0.3, signal.SIGINT),
+    # Each vehicle of the other tests is ended so.
+    *((Case(SERVE, "flight logs", 0.3, signal.SIGINT),) if SOAK else ()),
     Case(CAMPAIGN, "flying", 3.0, signal.SIGINT),
     # They end as a campaign does.
     *((Case(("winds", *CAMPAIGN[1:]), "flying", 3.0, signal.SIGINT),) if SOAK else ()),

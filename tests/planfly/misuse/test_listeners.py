@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import psutil
@@ -19,7 +18,7 @@ from planfly.campaigns.worker_pool import Workers, child_processes, child_start_
 from planfly.cli import main
 from planfly.commands.registry import build_parser
 from tests.planfly.campaigns.kills import is_fork_server
-from tests.planfly.conftest import FIELD, Served
+from tests.planfly.conftest import FIELD
 from tests.soak.test_hostile_files import WPL
 
 ROOT = Path(__file__).parents[3]
@@ -77,12 +76,6 @@ def test_only_its_user_reaches_a_campaigns_fork_server() -> None:
     # No abstract name, which has no owner, but a file; who may not enter the folder may not speak.
     assert stat.S_IMODE(Path(path).stat().st_mode) == 0o600
     assert stat.S_IMODE(Path(path).parent.stat().st_mode) == 0o700
-
-
-def test_a_vehicle(serve: Callable[..., Served]) -> None:
-    vehicle = serve("--scenario", "field.toml")
-    assert listening(vehicle.process.pid) == table()["`serve`"]
-    assert vehicle.stop() == 0
 
 
 @pytest.mark.parametrize("command", ["`replay --to`", "`replay --foxglove`"])

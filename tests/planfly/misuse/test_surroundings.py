@@ -18,6 +18,7 @@ from logs.recording.reader import read_log
 from planfly.cli import main
 from planfly.crash_safe_log import CrashSafeLog
 from tests.planfly.conftest import FIELD
+from tests.soak import SOAK
 from tests.soak.test_hostile_files import WPL
 from world.errors import PlanflyError
 from world.files import hold, write_whole
@@ -103,6 +104,9 @@ def test_a_folder_that_takes_no_files(place: str, folder: Path, capsys: pytest.C
     assert said[0].startswith(f"planfly: {place}/verdict.json: ")
 
 
+@pytest.mark.skipif(
+    not SOAK, reason="a command has neither in test_every_command.py and test_first_start.py: in make soak"
+)
 @pytest.mark.parametrize("changes", [{"HOME": "/nonexistent"}, {"XDG_CACHE_HOME": "/proc/none"}])
 def test_no_home_and_no_cache(changes: dict[str, str]) -> None:
     """Kernels are compiled for this process alone."""

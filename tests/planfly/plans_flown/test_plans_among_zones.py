@@ -17,7 +17,7 @@ from planfly.pipeline import make_plan
 from tests.soak import SOAK, some
 
 # Of the bench's: the first draws of these numbers that the grid search passes.
-DRAWS = {0: 1, 3: 3}
+DRAWS = {3: 3, 0: 1}
 
 
 def sampled(path: np.ndarray) -> np.ndarray:
