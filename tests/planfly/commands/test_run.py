@@ -6,8 +6,6 @@ import os
 import re
 import subprocess
 import sys
-from contextlib import redirect_stdout
-from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -16,9 +14,9 @@ from logs.recording.reader import read_log
 from logs.verdict.rules.registry import RULES
 from planfly.cli import main
 from planfly.targets import RUN_FILES
-from tests.logs.blank_pictures import draw_nothing
 from tests.logs.verdict.judging import SILENT_ON_WAYPOINTS
 from tests.planfly.conftest import FIELD
+from tests.planfly.made_plans import DEFAULT_RUN, default_run
 from tests.soak import SOAK, scaled
 
 ROOT = Path(__file__).parents[3]
@@ -51,13 +49,13 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
         result = planfly("run", cwd=folder)
         code, said = result.returncode, result.stdout
     else:
-        with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()) as out:
-            draw_nothing(patch)
-            patch.chdir(folder)
-            code, said = main(["run"]), out.getvalue()
+        code, said, files = default_run()
+        (folder / DEFAULT_RUN).mkdir(parents=True)
+        for name, data in files.items():
+            (folder / DEFAULT_RUN / name).write_bytes(data)
     assert code == 0, said
     assert said.startswith("flyable\n")
-    return folder / "runs" / "jacksboro-seed1"
+    return folder / DEFAULT_RUN
 
 
 def test_a_run_leaves_every_file(demo: Path) -> None:

@@ -42,10 +42,24 @@ time.time = lambda: real() - (3600.0 if os.path.exists({flag!r}) else 0.0)
 """
 
 
-def test_a_served_flight_goes_on_where_it_was(serve: Callable[..., Served]) -> None:
-    """All of its processes are stopped for 3 s, as a sleep stops them: the flight is 3 s late, and lacks no row."""
-    vehicle = serve("--scenario", "field.toml")
+def test_a_served_flight_goes_on_through_a_sleep_and_a_clock_that_is_set_back(
+    serve: Callable[..., Served], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a signed link.  All of its processes are stopped for 3 s, as a sleep stops them, and later it is an hour ago.
+
+    The flight is 3 s late, and lacks no row; the station hears all of it, and the log knows nothing of the clock.
+    """
+    (tmp_path / "key").write_text(KEY.hex(), encoding="ascii")
+    (tmp_path / "key").chmod(0o600)
+    flag = tmp_path / "back"
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(SET_BACK.format(flag=str(flag)), encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "site"), *filter(None, sys.path)]))
+    vehicle = serve("--scenario", "field.toml", "--sign-key", "key")
     with UdpStation(vehicle.port) as station:
+        station.mav.signing.secret_key, station.mav.signing.sign_outgoing = KEY, True
+        station.mav.signing.timestamp = round((time.time() - 1_420_070_400.0) * 1e5)
+        station.parser.signing.secret_key = KEY
         assert station.upload(ROUTE) == 0
         started = time.monotonic()
         station.fly()
@@ -58,12 +72,24 @@ def test_a_served_flight_goes_on_where_it_was(serve: Callable[..., Served]) -> N
         os.killpg(vehicle.process.pid, signal.SIGCONT)
         after = station.listen(1.5)
         assert station.command(512, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION) == mavlink.MAV_RESULT_ACCEPTED
+        flag.touch()
+        late = station.listen(1.0)
+        station.send(mavlink.MAVLink_command_long_message(1, 1, 512, 0, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, *[0.0] * 6))
+        told = station.until(lambda m: m.get_type() == "SYSTEM_TIME")
+        assert told.get_signed()
+        assert told.time_unix_usec / 1e6 == pytest.approx(time.time() - 3600.0, abs=60.0)
+        assert station.command(400, 0, 21196) == mavlink.MAV_RESULT_ACCEPTED
+        real = time.monotonic() - started
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and "log" in m.text)
     assert vehicle.stop() == 0
-    real = time.monotonic() - started
     east = [m.lon for m in (begun, *before, *after) if m.get_type() == "GLOBAL_POSITION_INT"]
     # 25 m/s and a light wind for as long as it flew: never 3 s in one leap.
     steps = np.diff(east) * 1e-7 * 111_320.0 * np.cos(np.deg2rad(46.0))
     assert steps.max() < 40.0
+    boots = [m.time_boot_ms for m in late if m.get_type() == "ATTITUDE"]
+    assert len(boots) > 20
+    assert all(early <= later for early, later in itertools.pairwise(boots))
+    assert not any("old" in line or "replayed" in line for line in vehicle.lines if line.startswith("frames dropped"))
     log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
     assert log.complete
     assert np.allclose(np.diff(log.track.time), 1.0 / 60.0, atol=1e-6)
@@ -89,42 +115,6 @@ def test_a_replay_goes_on_where_it_was(
     assert "s  end " in capsys.readouterr().out
     # The hour counts as a second of the 3.
     assert waited == pytest.approx(3.0 - (1.0 - 0.1), abs=0.01)
-
-
-def test_a_served_flight_survives_a_clock_set_back(
-    serve: Callable[..., Served], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """An hour back, in flight, on a signed link: the station hears all of it, and the log knows nothing of it."""
-    (tmp_path / "key").write_text(KEY.hex(), encoding="ascii")
-    (tmp_path / "key").chmod(0o600)
-    flag = tmp_path / "back"
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site" / "sitecustomize.py").write_text(SET_BACK.format(flag=str(flag)), encoding="utf-8")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "site"), *filter(None, sys.path)]))
-    vehicle = serve("--scenario", "field.toml", "--speed", "10", "--sign-key", "key")
-    with UdpStation(vehicle.port) as station:
-        station.mav.signing.secret_key, station.mav.signing.sign_outgoing = KEY, True
-        station.mav.signing.timestamp = round((time.time() - 1_420_070_400.0) * 1e5)
-        station.parser.signing.secret_key = KEY
-        assert station.upload(ROUTE) == 0
-        station.fly()
-        station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0)
-        flag.touch()
-        after = station.listen(1.0)
-        station.send(mavlink.MAVLink_command_long_message(1, 1, 512, 0, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, *[0.0] * 6))
-        told = station.until(lambda m: m.get_type() == "SYSTEM_TIME")
-        assert told.get_signed()
-        assert told.time_unix_usec / 1e6 == pytest.approx(time.time() - 3600.0, abs=60.0)
-        assert station.command(400, 0, 21196) == mavlink.MAV_RESULT_ACCEPTED
-        station.until(lambda m: m.get_type() == "STATUSTEXT" and "log" in m.text)
-    assert vehicle.stop() == 0
-    assert sum(m.get_type() == "ATTITUDE" for m in after) > 20
-    boots = [m.time_boot_ms for m in after if m.get_type() == "ATTITUDE"]
-    assert all(early <= late for early, late in itertools.pairwise(boots))
-    assert not any("old" in line or "replayed" in line for line in vehicle.lines if line.startswith("frames dropped"))
-    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
-    assert log.complete
-    assert np.allclose(np.diff(log.track.time), 1.0 / 60.0, atol=1e-6)
 
 
 # A wall clock that an hour is taken from where one file is there, and a day added where another is.

@@ -140,7 +140,7 @@ def test_what_is_chosen_tells_more_than_what_comes() -> None:
         return frozenset({"slope"}) if random.normal() < -4.0 + 0.5 * (speed - 10.0) + 2.0 * drawn[0] else frozenset()
 
     chosen, plain = (Direction(20.0, 0.99, normal_numbers(4, 3)) for _ in range(2))
-    fly(chosen, 300, outcome)
+    fly(chosen, 300, outcome, together=10)
     # 10 + (4 + 2.236 z) / 0.5, where Phi(z) is 0.01.
     truth = 10.0 + (4.0 + np.sqrt(5.0) * norm.ppf(0.01)) / 0.5
     for draw in range(300):
