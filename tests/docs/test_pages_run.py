@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from logs.views import figures
+from logs.views.drawing import new_figure
 from tests.docs.page_blocks import PAGES, ROOT, TYPED, Bench, blocks, parse
-from tests.logs.blank_pictures import draw_nothing
+from tests.logs.blank_pictures import NAMES, draw_nothing
 from tests.soak import SOAK
 
 # What other libraries say among themselves is not the reader's fault.
@@ -24,6 +26,7 @@ def test_the_blocks_of_a_page_run(
     monkeypatch.chdir(tmp_path)
     if not SOAK:
         draw_nothing(monkeypatch)
+        monkeypatch.setattr(figures, "draw_figures", lambda *_: {name: new_figure(1.0) for name in NAMES})
     names: dict[str, object] = {"__name__": "__main__"}
     for block in blocks(page):
         if not block.file and block.language not in TYPED:

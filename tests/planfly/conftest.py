@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from flight.dynamics import model_check
+from logs.views import drawing
 from planfly.cli import main
 from tests.logs.blank_pictures import draw_nothing
 from tests.shared import made_once
@@ -161,6 +162,12 @@ def scheduler() -> Iterator[str]:
 def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """See `draw_nothing`."""
     draw_nothing(monkeypatch)
+
+
+@pytest.fixture
+def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """PNGs without content, for tests that look at their names: rendering is most of what pictures take."""
+    monkeypatch.setattr(drawing, "png_bytes", lambda _: b"\x89PNG")
 
 
 @pytest.fixture(scope="session")

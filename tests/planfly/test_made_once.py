@@ -60,7 +60,7 @@ FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "fly_to_end", "judge_flight
 # An autopilot's flight has the aircraft's own beside it, at true airspeeds along a path of its own.
 BESIDE = dict.fromkeys(("fly_by_path", "around", "fly_to_end", "route_requirements", "align_track", "judge_flight"), 2)
 LOG = ALIGNED | dict.fromkeys(("make_limits", "fly_by_path"), 1)
-MISSION = Path(__file__).parents[1] / "flight" / "missions" / "qgc.waypoints"
+MISSION = Path(__file__).parents[1] / "flight" / "missions" / "by_hand.waypoints"
 
 Count = Callable[..., dict[str, int]]
 

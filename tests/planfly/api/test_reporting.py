@@ -59,6 +59,7 @@ def test_results_are_replaced_where_the_script_says_so_alone(
     assert flown.verdict.headline.split(":")[0] in written.page.read_text()
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_two_flights_are_compared_and_drawn(flown: planfly.FlownMission, tmp_path: Path) -> None:
     assert flown.log is not None
     found = planfly.compare(flown.log, planfly.read_log(flown.log), tmp_path / "out")

@@ -27,9 +27,13 @@ def plan_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def log_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    file = tmp_path_factory.mktemp("log") / "flight.mcap"
-    assert main(["fly", str(MISSIONS / "by_hand.waypoints"), "--log", str(file), "--log-hz", "10"]) == 0
-    return file
+    folder = tmp_path_factory.mktemp("log")
+    places = ["46\t8\t100", "46.01\t8\t120", "46.01\t8.01\t120"]
+    lines = [f"{k}\t0\t3\t16\t0\t0\t0\t0\t{place}\t1" for k, place in enumerate(places, 1)]
+    text = "\n".join(["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t46\t8\t0\t1", *lines]) + "\n"
+    (folder / "m.waypoints").write_text(text, encoding="ascii")
+    assert main(["fly", str(folder / "m.waypoints"), "--log", str(folder / "flight.mcap"), "--log-hz", "10"]) == 0
+    return folder / "flight.mcap"
 
 
 def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,6 +24,7 @@ def test_the_list_and_a_new_one(capsys: Output) -> None:
     assert (made["name"], made["mass_kg"], Path(made["folder"])) == ("mine", 11.0, Path("mine").resolve())
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_one_with_its_numbers(capsys: Output) -> None:
     (one,) = answered(capsys, 0, "aircraft", "aerosonde", "--out", "out")["aircraft"]
     detail = one["detail"]
