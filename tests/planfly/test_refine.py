@@ -15,6 +15,7 @@ from planfly.airframe import load_airframe
 from planfly.cli import main
 from planfly.pipeline import make_plan, make_setup
 from planfly.refine import GO_ON, refine, tighten_limits
+from tests.planfly.conftest import FIELD
 from tests.synthetic import fly_path
 from world.scenario import Scenario, from_spec
 
@@ -87,7 +88,8 @@ def test_what_cannot_fly_is_shown_not_to(tmp_path: Path, capsys: pytest.CaptureF
     assert str(rounds[-1]["next"]).startswith("ended: ")
     # Run again, the old rounds are cleared away, whatever else lies there stays.
     (out / "mine.txt").write_text("keep", encoding="utf-8")
-    assert main(["run", "tight", "--out", str(out), "--overwrite"]) == 4
+    (tmp_path / "field.toml").write_text(f"{FIELD}[planner]\npopulation = 20\ngenerations = 5\n", encoding="utf-8")
+    assert main(["run", str(tmp_path / "field.toml"), "--out", str(out), "--overwrite"]) == 0
     assert (out / "mine.txt").exists()
     assert not list(out.glob("round*"))
     capsys.readouterr()
