@@ -12,6 +12,9 @@ test low newest: export OPENBLAS_NUM_THREADS := 1
 # A file's tests run in one of three processes, so that what they share is made once; files in their own order.  Three,
 # since a tenth of the tests' time is waiting: for a port, a timeout, a process that ends.
 SPREAD := -n 3 --dist loadfile --no-loadscope-reorder
+# Temporary files of the tests: in memory where it has 4 GB of room, since some disks wait for each file that is removed.
+IN_MEMORY := if [ "$$(df --output=avail /dev/shm 2>/dev/null | tail -n 1)" -gt 4000000 ] 2>/dev/null; then \
+	TMPDIR=$$(mktemp -d /dev/shm/planfly-tests-XXXXXX) && export TMPDIR && trap 'rm -rf "$$TMPDIR"' EXIT; fi
 # Rooms that need nothing but planfly itself, and some of its extras; the others test with clients, which have their own
 # lower bounds.
 LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/flight/mission_files tests/flight/dynamics \
@@ -48,7 +51,7 @@ test: $(TESTED) clients
 	@$(BIN)/python -m tests.kernels >/dev/null; \
 	echo "tested with the versions of constraints.txt:"; \
 	$(BIN)/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"; \
-	$(BIN)/python -m pytest $(SPREAD)
+	$(IN_MEMORY); $(BIN)/python -m pytest $(SPREAD)
 
 # What is seen without running anything: style, types, and the pages of docs/.
 lint: $(TESTED)

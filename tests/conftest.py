@@ -21,6 +21,27 @@ prepare_process()
 settings.register_profile("planfly", deadline=None)
 settings.load_profile("planfly")
 
+# Files that compile kernels for more than a second, as no command does.  They come first: nobody waits for them later,
+# and no two processes of a run compile the same.
+COMPILING = (
+    "planner/search/test_embedded_scenarios.py",
+    "planner/seeding/test_grids.py",
+    "planner/search/test_replan.py",
+    "planner/optimisers/test_optimisers.py",
+    "flight/simulation/test_same_bytes_in_any_process.py",
+    "logs/verdict/measures/test_zone_visits.py",
+    "planner/optimisers/test_niche_sampling.py",
+    "planner/evaluation/test_terrain_clearance.py",
+    "logs/verdict/rules/test_height_rule.py",
+    "flight/autopilots/planfly/test_law.py",
+    "logs/verdict/measures/test_path_moves.py",
+    "planner/airspace/test_zone_distances.py",
+    "planner/evaluation/test_airspace_scores.py",
+    "logs/importers/test_dataflash_frames.py",
+    "logs/verdict/measures/limits/test_path_sweeps_limits.py",
+    "logs/views/report/test_compare.py",
+)
+
 
 @pytest.fixture(autouse=True, scope="session")
 def _no_estimates_of_other_runs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
@@ -33,13 +54,14 @@ def _no_estimates_of_other_runs(tmp_path_factory: pytest.TempPathFactory) -> Ite
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests of files that have more to do in a soak, and leave out those that one before has passed."""
+    """Mark the tests of files that have more to do in a soak, leave out those that one before has passed, and sort."""
     for item in items:
         if {"SOAK", "scaled"} & vars(getattr(item, "module", object)).keys():
             item.add_marker("soak")
     if passed := passed_files():
         config.hook.pytest_deselected(items=[item for item in items if _file(item.nodeid) in passed])
         items[:] = [item for item in items if _file(item.nodeid) not in passed]
+    items.sort(key=lambda item: not _file(item.nodeid).endswith(COMPILING))
 
 
 def _file(nodeid: str) -> str:

@@ -2,9 +2,9 @@
 
 First what a first start compiles, in the same two processes; then the planner's other kernels in one process, and those
 of other flights, verdicts and reports in another: they are not each other's.  Beside them all tests are read, so that
-Python's own bytecode of them is kept too.  At last tests run that call kernels with types, or in parts, that no command
-has: whether they pass is seen later.  All stay in the cache for all later processes, with a note of the sources that
-they were compiled for: with the same sources nothing is done a second time.
+Python's own bytecode of them is kept too.  All stay in the cache for all later processes, with a note of the sources
+that they were compiled for: with the same sources nothing is done a second time.  What tests call with types, or in
+parts, that no command has, they compile themselves: such files come first (conftest.py).
 """
 
 import os
@@ -80,25 +80,6 @@ PROCESSES = (
         ("report", "path.mcap", "--out", "report"),
     ),
 )
-# Tests that compile for more than a second.
-TESTS = (
-    "planner/search/test_embedded_scenarios.py::test_tight_has_corners_that_the_aircraft_cannot_turn",
-    "planner/seeding/test_grids.py",
-    "planner/search/test_replan.py::test_a_zone_that_comes_up_is_kept_out_of_and_a_leg_that_begins_in_it_is_refused",
-    "planner/optimisers/test_optimisers.py::test_finds_the_bottom_of_a_turned_valley",
-    "flight/simulation/test_same_bytes_in_any_process.py",
-    "logs/verdict/measures/test_zone_visits.py::test_a_way_through_a_box",
-    "planner/optimisers/test_niche_sampling.py::test_at_most_half_of_the_rows_are_kept",
-    "planner/evaluation/test_terrain_clearance.py::test_steps_over_the_ground_leave_nothing_out",
-    "logs/verdict/rules/test_height_rule.py::test_the_height_over_a_valley_across_the_map",
-    "flight/autopilots/planfly/test_law.py::test_on_the_path_nothing_is_asked",
-    "logs/verdict/measures/test_path_moves.py::test_a_block_holds_its_moves",
-    "planner/airspace/test_zone_distances.py::test_beside_an_exclusion_and_into_it",
-    "planner/evaluation/test_airspace_scores.py::test_pieces_that_touch_a_zone_are_counted",
-    "logs/importers/test_dataflash_frames.py",
-    "logs/verdict/measures/limits/test_path_sweeps_limits.py::test_stays_a_microsecond_apart_are_one",
-    "logs/views/report/test_compare.py::test_a_flight_does_not_differ_from_itself",
-)
 TESTS_FOLDER = Path(__file__).parents[1]
 PYTEST = (sys.executable, "-m", "pytest", "-q")
 
@@ -120,9 +101,7 @@ def main() -> int:
         started = [subprocess.Popen([*command, str(k)], cwd=folder, env=environment) for k in range(len(PROCESSES))]
         reading = subprocess.Popen([*PYTEST, "-n", "0", "--collect-only"], cwd=TESTS_FOLDER.parent)
         failed = max(one.wait() for one in started)
-    chosen = [str(TESTS_FOLDER / one) for one in TESTS]
-    subprocess.run([*PYTEST, "-n", "2", *chosen], cwd=TESTS_FOLDER.parent, check=False)
-    reading.wait()
+        reading.wait()
     if not failed:
         done.touch()
     return failed
