@@ -14,7 +14,8 @@ test low newest: export OPENBLAS_NUM_THREADS := 1
 SPREAD := -n 3 --dist loadfile --no-loadscope-reorder
 # Temporary files of the tests: in memory where it has 4 GB of room, since some disks wait for each file that is removed.
 IN_MEMORY := if [ "$$(df --output=avail /dev/shm 2>/dev/null | tail -n 1)" -gt 4000000 ] 2>/dev/null; then \
-	TMPDIR=$$(mktemp -d /dev/shm/planfly-tests-XXXXXX) && export TMPDIR && trap 'rm -rf "$$TMPDIR"' EXIT; fi
+	TMPDIR=$$(mktemp -d /dev/shm/planfly-tests-XXXXXX) && export TMPDIR && \
+	trap 'rm -rf "$$TMPDIR"' EXIT && trap 'exit 130' INT && trap 'exit 143' TERM; fi
 # Rooms that need nothing but planfly itself, and some of its extras; the others test with clients, which have their own
 # lower bounds.
 LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/flight/mission_files tests/flight/dynamics \
