@@ -1,8 +1,9 @@
-"""What keeps a dask cluster of this machine to itself: a certificate that nobody else holds, and no HTTP beside it.
+"""What a dask cluster of this machine needs beside dask's own: a certificate, no HTTP, and a clock that nobody sets.
 
 A dask scheduler and its workers run whatever they are sent, and loopback is open to every user of the machine.
 """
 
+import time
 from typing import Any
 
 from planfly.certificates import temporary_certificate
@@ -32,3 +33,29 @@ def dask_setup(server: Any) -> None:
     dask calls it, by this name, of a module that is preloaded.
     """
     server.http_server.stop()
+    keep_steady_time()
+
+
+# s since 1970 when this module was imported, less what the monotonic clock had then.
+_OFFSET = time.time() - time.monotonic()
+
+
+def steady_time() -> float:
+    """Seconds since 1970 by the clock as it stood when this module was imported, whatever it was set to since."""
+    return _OFFSET + time.monotonic()
+
+
+def keep_steady_time() -> None:
+    """Let dask's messages in this process go out by a clock that nobody sets.
+
+    dask holds a message back for some milliseconds after the one before, until a time of the wall clock: where that is
+    set back by an hour meanwhile, the message, and all that follow on its connection, wait for the hour.  Tornado says
+    of `IOLoop.time` that it is relative to any time, but compares it with that of dask.  Neither has a setting for it.
+    """
+    import distributed.batched
+    from tornado.ioloop import IOLoop
+
+    # They state no types that a clock of another kind would fit.
+    messages: Any = distributed.batched
+    loop: Any = IOLoop
+    messages.time, loop.time = steady_time, staticmethod(steady_time)

@@ -32,7 +32,7 @@ from aircraft.catalog import find_aircraft, model_hash
 from planfly import __version__
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
-from planfly.campaigns.private_cluster import private_security
+from planfly.campaigns.private_cluster import keep_steady_time, private_security
 from planfly.pipeline import Advance
 from planfly.process_setup import PARENT
 from world.errors import PlanflyError
@@ -158,6 +158,7 @@ def connected(workers: Workers) -> Iterator[Any]:
     # It states no types.
     cluster_types: Any = distributed
 
+    keep_steady_time()
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     settings: dict[str, Any] = {
         "distributed.worker.multiprocessing-method": child_start_method(),

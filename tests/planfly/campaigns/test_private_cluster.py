@@ -5,16 +5,20 @@ import contextlib
 import os
 import socket
 import ssl
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import distributed.batched
 import psutil
 import pytest
 from distributed import Security
+from distributed.batched import BatchedSend
 from distributed.core import rpc
+from tornado.ioloop import IOLoop
 
-from planfly.campaigns.private_cluster import private_security
+from planfly.campaigns.private_cluster import keep_steady_time, private_security
 from planfly.campaigns.worker_pool import Workers, connected
 from planfly.certificates import Certificate, temporary_certificate
 
@@ -38,6 +42,8 @@ def cluster() -> Iterator[Cluster]:
         patch.setattr("planfly.campaigns.worker_pool._LOOK", 0.2)
         with connected(Workers(1)) as client:
             assert list(client.run(os.getuid).values()) == [os.getuid()], "who holds the certificate is served"
+            clock = client.run(eval, "__import__('distributed').batched.time.__qualname__")
+            assert list(clock.values()) == [distributed.batched.time.__qualname__] == ["steady_time"]
             processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
             found = [
                 (connection.laddr.ip, connection.laddr.port)
@@ -117,3 +123,42 @@ def test_each_run_has_a_certificate_of_its_own() -> None:
     assert one.tls_ca_file == one.tls_worker_cert == one.tls_client_cert == one.tls_scheduler_cert
     assert one.tls_ca_file != other.tls_ca_file
     assert one.tls_worker_key != other.tls_worker_key
+
+
+class Connection:
+    """What a `BatchedSend` writes to."""
+
+    def __init__(self) -> None:
+        self.written: list[str] = []
+
+    def closed(self) -> bool:
+        return False
+
+    async def write(self, payload: list[str], **_: object) -> int:
+        self.written += payload
+        return 0
+
+
+async def sent(set_back: Callable[[], None]) -> list[str]:
+    """What goes out of three messages within 5 s, where the clock is set back while the second is held back."""
+    connection, stream = Connection(), BatchedSend("300 ms")
+    stream.start(connection)
+    until = time.monotonic() + 5.0
+    for number, message in enumerate(("one", "two", "three"), start=1):
+        stream.send(message)
+        if message == "two":
+            set_back()
+        while len(connection.written) < number and time.monotonic() < until:
+            await asyncio.sleep(0.001)
+    return connection.written
+
+
+def test_a_message_does_not_wait_for_a_clock_that_is_set_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The wall clock loses an hour in the 0.3 s for which a message waits; a campaign was seen to stand still."""
+    wall = [0.0]
+    monkeypatch.setattr(time, "time", lambda real=time.time: real() + wall[0])
+    # dask has the clock of the moment at which it was imported.
+    monkeypatch.setattr(distributed.batched, "time", lambda: time.time())
+    monkeypatch.setattr(IOLoop, "time", lambda _: time.time())
+    keep_steady_time()
+    assert asyncio.run(sent(lambda: wall.__setitem__(0, -3600.0))) == ["one", "two", "three"]
