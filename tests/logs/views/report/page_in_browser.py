@@ -4,6 +4,7 @@ import io
 import json
 import re
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,31 @@ def spread(png: bytes) -> int:
     return len(np.unique((pixels(png) * 15).astype(int).reshape(-1, 3), axis=0))
 
 
+def changed(png: bytes, before: bytes) -> float:
+    """Share of a picture's pixels that are clearly others than before."""
+    return float((np.abs(pixels(png) - pixels(before)).max(axis=-1) > 0.1).mean())
+
+
+def apart(one: bytes, other: bytes) -> float:
+    """Mean difference of two pictures, 0 to 1."""
+    return float(np.abs(pixels(one) - pixels(other)).mean())
+
+
 def own_problems(browser: Browser) -> list[str]:
     return [text for text in browser.problems if not _RENDERER.search(text)]
+
+
+def picture_when(browser: Browser, selector: str, shows: Callable[[bytes], bool]) -> bytes:
+    """PNG of an element as soon as it shows what is asked for: a software renderer is behind on a loaded machine.
+
+    After a minute the picture as it is then, whatever it shows.
+    """
+    deadline = time.monotonic() + _PATIENCE
+    while True:
+        browser.settle()
+        png = browser.picture(selector)
+        if shows(png) or time.monotonic() > deadline:
+            return png
 
 
 def until(browser: Browser, condition: str) -> None:

@@ -15,12 +15,14 @@ from logs.views.report.compare import compare_logs, write_comparison
 from logs.views.report.page import write_report
 from tests.browser import Browser
 from tests.logs.views.report.page_in_browser import (
+    changed,
     grave_findings,
     own_problems,
-    pixels,
+    picture_when,
     prefer,
     show_all_charts,
     show_chart,
+    spread,
     until,
 )
 from tests.soak import SOAK
@@ -104,8 +106,7 @@ def test_the_slider_moves_the_aircraft_and_its_read_out(browser: Browser, track:
     browser.value("document.querySelector('#view3d').scrollIntoView()")
     browser.value(f"{slider}.value = 0; {slider}.dispatchEvent(new Event('input'))")
     browser.value(f"{slider}.focus()")
-    browser.settle()
-    first = browser.picture("#view3d")
+    first = picture_when(browser, "#view3d", lambda png: spread(png) > 60)
     for _ in range(3):
         browser.key("ArrowRight")
     browser.settle()
@@ -116,7 +117,8 @@ def test_the_slider_moves_the_aircraft_and_its_read_out(browser: Browser, track:
     assert float(said["airspeed"].split()[0]) == pytest.approx(float(track.airspeed[row]), abs=0.3)
     assert {"leg", "above ground", "bank"} <= set(said)
     assert browser.value(f"{slider}.getAttribute('aria-valuetext')").startswith("3.0 s, leg ")
-    assert (np.abs(pixels(browser.picture("#view3d")) - pixels(first)).max(axis=-1) > 0.1).mean() > 5e-4
+    later = picture_when(browser, "#view3d", lambda png: changed(png, first) > 5e-4)
+    assert changed(later, first) > 5e-4
     # Eight seconds at five times their speed.
     speed = "document.querySelector('.player select')"
     browser.value(f"{speed}.value = '5'; {speed}.dispatchEvent(new Event('change'))")

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from flight.simulation.setup import FlightSetup
@@ -11,7 +10,7 @@ from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_flight
 from logs.views.report.page import write_report
 from tests.browser import Browser
-from tests.logs.views.report.page_in_browser import own_problems, pixels, spread
+from tests.logs.views.report.page_in_browser import apart, changed, own_problems, picture_when, spread
 
 pytestmark = [pytest.mark.client, pytest.mark.xdist_group("browser")]
 
@@ -36,7 +35,7 @@ def test_wide_page_draws_the_view_and_fills_the_tables(page: Path, tmp_path: Pat
         assert len(tables) >= 5
         assert all(rows > 0 and full for rows, full in tables)
         assert browser.value("[...document.images].every(i => i.complete && i.naturalWidth > 500)")
-        first = browser.picture("#view3d")
+        first = picture_when(browser, "#view3d", lambda png: spread(png) > 60)
         assert spread(first) > 60
         assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "none"
         _try_the_controls(browser, first)
@@ -62,13 +61,12 @@ def _try_the_controls(browser: Browser, first: bytes) -> None:
         lambda: browser.value("document.querySelector('[data-do=stretch]').click()"),
     ):
         act()
-        browser.settle()
-        pictures.append(browser.picture("#view3d"))
-        difference = np.abs(pixels(pictures[-1]) - pixels(pictures[-2])).max(axis=-1) > 0.1
-        assert difference.mean() > 0.005, len(pictures)
+        before = pictures[-1]
+        pictures.append(picture_when(browser, "#view3d", lambda png, before=before: changed(png, before) > 0.005))
+        assert changed(pictures[-1], before) > 0.005, len(pictures)
     browser.value("document.querySelector('[data-do=home]').click()")
-    browser.settle()
-    assert np.abs(pixels(browser.picture("#view3d")) - pixels(first)).mean() < 0.01
+    last = picture_when(browser, "#view3d", lambda png: apart(png, first) < 0.01)
+    assert apart(last, first) < 0.01
 
 
 def test_narrow_page_fits_a_phone(page: Path, tmp_path: Path) -> None:
@@ -76,7 +74,7 @@ def test_narrow_page_fits_a_phone(page: Path, tmp_path: Path) -> None:
         browser.open(page)
         browser.settle()
         assert browser.value("document.documentElement.scrollWidth") <= 420
-        assert spread(browser.picture("#view3d")) > 40
+        assert spread(picture_when(browser, "#view3d", lambda png: spread(png) > 40)) > 40
         small = browser.value(
             "[...document.querySelectorAll('button, nav a')]"
             ".map(b => b.getBoundingClientRect().height).filter(h => h < 24)"
