@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from world.kernels import compiled, inlined
+from world.least_squares import least_squares
 
 if TYPE_CHECKING:
     from pyproj import Proj, Transformer
@@ -230,7 +231,7 @@ def fit_polymap(
         basis = np.stack([nodes_u**i * nodes_v**j for i, j in powers], axis=1)
         blocks = np.zeros((2, size, size))
         for block, values in zip(blocks, wanted, strict=True):
-            solution = _least_squares(basis, np.ascontiguousarray(values, dtype=np.float64))
+            solution = least_squares(basis, np.asarray(values, dtype=np.float64))
             for (i, j), coefficient in zip(powers, solution, strict=True):
                 block[i, j] = coefficient
         record = _record(centre, half, *blocks)
@@ -243,35 +244,6 @@ def fit_polymap(
     if best is None:  # pragma: no cover - the loop always runs
         raise ValueError("no polynomial was fitted")
     return best
-
-
-@compiled
-def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover - compiled
-    """Coefficients (k,) that bring basis (n, k) closest to values (n,): modified Gram-Schmidt."""
-    # By hand: LAPACK rounds as the machine has it, and a plan must not depend on the machine.
-    count, size = basis.shape
-    q, r = basis.copy(), np.zeros((size, size + 1))
-    rest = values.copy()
-    for k in range(size):
-        norm = 0.0
-        for n in range(count):
-            norm += q[n, k] * q[n, k]
-        for j in range(k + 1, size + 1):
-            dot = 0.0
-            for n in range(count):
-                dot += q[n, k] * (q[n, j] if j < size else rest[n])
-            r[k, j] = dot / norm
-            for n in range(count):
-                if j < size:
-                    q[n, j] -= r[k, j] * q[n, k]
-                else:
-                    rest[n] -= r[k, j] * q[n, k]
-    out = np.zeros(size)
-    for k in range(size - 1, -1, -1):
-        out[k] = r[k, size]
-        for j in range(k + 1, size):
-            out[k] -= r[k, j] * out[j]
-    return out
 
 
 @inlined

@@ -407,7 +407,8 @@ class Fdm:
         """(6,) body accelerations, m/s^2 and rad/s^2, of the steady flight with this trim vector (8,)."""
         airspeed, climb, alpha, bank, *commands = values.tolist()
         axes = body_axes(self._heading, climb, bank, alpha)
-        air = axes @ np.array([math.cos(alpha), 0.0, math.sin(alpha)]) * airspeed
+        # Sums by hand, which are the same on every machine: see `world.least_squares`.
+        air = (axes * np.array([math.cos(alpha), 0.0, math.sin(alpha)])).sum(axis=1) * airspeed
         return self._evaluate(euler(axes), air + self._wind, (0.0, 0.0, 0.0), commands, settle=True)[:6]
 
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
@@ -417,9 +418,8 @@ class Fdm:
         """
         roll, pitch = states[6], states[7]
         axes = body_axes(self._heading, pitch, roll, 0.0)
-        return self._evaluate(
-            (roll, pitch, self._heading), axes @ states[:3] + self._wind, tuple(states[3:6]), commands
-        )
+        velocity = (axes * states[:3]).sum(axis=1) + self._wind
+        return self._evaluate((roll, pitch, self._heading), velocity, tuple(states[3:6]), commands)
 
     def _evaluate(
         self,

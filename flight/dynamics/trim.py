@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flight.dynamics.jsbsim_properties import RATES
 from flight.dynamics.state import Commands
 from world.errors import FlightError
+from world.least_squares import least_squares
 
 Floats = NDArray[np.float64]
 
@@ -167,7 +168,7 @@ def solve(
             difference = _DIFFERENCE * _STEP[k] * (-1.0 if values[k] >= 0.0 else 1.0)
             moved[k] += difference
             columns.append((balance(moved) - residual) / difference)
-        step = np.linalg.lstsq(np.array(columns).T, -residual, rcond=1e-12)[0]
+        step = least_squares(np.stack(columns, axis=1), -residual)
         step /= max(1.0, float(np.abs(step / _STEP[free]).max()))
         for _ in range(6):
             trial = values.copy()
@@ -309,8 +310,8 @@ def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> 
     Raises FlightError where the airspeed makes no way against the wind.
     """
     along = np.array([math.cos(climb) * math.cos(course), math.cos(climb) * math.sin(course), -math.sin(climb)])
-    tailwind = float(along @ wind)
-    square = airspeed**2 - float(wind @ wind) + tailwind**2
+    tailwind = float((along * wind).sum())
+    square = airspeed**2 - float((wind * wind).sum()) + tailwind**2
     speed = tailwind + math.sqrt(square) if airspeed > 0.0 and square > 0.0 else -1.0
     if speed <= 0.0:
         raise FlightError(

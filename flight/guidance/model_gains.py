@@ -14,6 +14,7 @@ from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import Floats, Trim, linearise, straight
 from flight.guidance.gains import Gains
 from world.errors import FlightError
+from world.least_squares import least_squares
 
 # Height that the model is linearised at, m.
 AMSL = 500.0
@@ -95,7 +96,7 @@ def _airframe_gains(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float
     elevator, aileron, rudder = range(3)
     # Steady yaw rate without sideslip: ailerons and rudder balance its rolling and yawing moments.
     steered = abs(b[r, rudder]) > 1e-6
-    hold = np.linalg.solve(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])[1] if steered else 0.0
+    hold = least_squares(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])[1] if steered else 0.0
     return {
         "reference_airspeed": speed,
         "alpha_per_g": -9.80665 / (a[w, w] * speed),

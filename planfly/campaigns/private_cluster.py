@@ -36,15 +36,6 @@ def dask_setup(server: Any) -> None:
     keep_steady_time()
 
 
-# s since 1970 when this module was imported, less what the monotonic clock had then.
-_OFFSET = time.time() - time.monotonic()
-
-
-def steady_time() -> float:
-    """Seconds since 1970 by the clock as it stood when this module was imported, whatever it was set to since."""
-    return _OFFSET + time.monotonic()
-
-
 def keep_steady_time() -> None:
     """Let dask's messages in this process go out by a clock that nobody sets.
 
@@ -58,4 +49,4 @@ def keep_steady_time() -> None:
     # They state no types that a clock of another kind would fit.
     messages: Any = distributed.batched
     loop: Any = IOLoop
-    messages.time, loop.time = steady_time, staticmethod(steady_time)
+    messages.time, loop.time = time.monotonic, staticmethod(time.monotonic)

@@ -4,7 +4,7 @@ Those that they call themselves are compiled with them.  `tests/planfly/kernel_u
 """
 
 _WORLD = (
-    "world.frames._least_squares",
+    "world.least_squares._least_squares",
     "world.frames._polymap_many",
     "world.terrain._heights_many",
     "flight.autopilots.arduplane.tracking_error._fill",
@@ -47,7 +47,9 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "routes": (
         *_PROBLEM,
         "planner.evaluation.leg_constraints.slope_limits",
-        "planner.seeding.grids.cheapest_route",
+        "planner.seeding.grids.begin_route",
+        "planner.seeding.grids.continue_route",
+        "planner.seeding.grids.end_route",
         "planner.seeding.waypoint_fitting._choose",
         "planner.seeding.grids.find_obstacles",
         _SIDES + "cheapest_passings",

@@ -102,8 +102,11 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     found, scores = [], []
     followed_free = search.shortens and search.algorithm.optimiser == "waypoints" and not search.first_safe
-    routes = airspace_routes if is_limited(data.airspace) else grid_routes
-    for route in routes(data, frame, span, grids):
+    limited = is_limited(data.airspace)
+    routes = (
+        airspace_routes(data, frame, span, grids) if limited else grid_routes(data, frame, span, grids, search.pause)
+    )
+    for route in routes:
         if followed_free and search.has_safe():
             search.shorten(resample(frame.restore(route.points), encoding.waypoints))
             if search.must_end():

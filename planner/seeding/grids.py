@@ -9,7 +9,7 @@ optimal. `grid_routes` repeats this with a penalty near earlier routes, to find 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -331,35 +331,98 @@ def prune(
                 after[z, y] = math.inf
 
 
-@compiled
+class GridSearch(NamedTuple):
+    """A search for the cheapest route over a grid, as far as it has come; arrays are (layers, across).
+
+    parents: (stages + 1, layers, across).  cost, after: of the last stage reached, and scratch; price: cost per m,
+    scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  stage: the last one reached.
+    """
+
+    step_layers: Records
+    obstacles: Records
+    parents: Codes
+    cost: Floats
+    after: Floats
+    price: Floats
+    spans: Records
+    start: int
+    home: int
+    goal: int
+    stage: int
+
+
+# Cells of a grid that are reached between two calls of `pause`: some 10 ms.
+CELLS_AT_ONCE = 150_000
+
+
 def cheapest_route(
-    data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float
-) -> tuple[Records, float]:  # pragma: no cover - compiled
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    grid: Grid,
+    extra: Floats,
+    bound: float,
+    pause: Callable[[], None] = lambda: None,
+) -> tuple[Records, float]:
     """`ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost; empty if there is none.
 
     extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost; more expensive routes are not
-    searched.
+    searched. pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """
+    stages = max(1, CELLS_AT_ONCE // (grid.across.size * grid.layers.size))
+    search: GridSearch = begin_route(data, frame, grid)
+    while search.stage < grid.stages:
+        search = continue_route(data, frame, grid, extra, bound, search, stages)
+        pause()
+    cells, cost = end_route(search)
+    return cells, cost
+
+
+@compiled
+def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:  # pragma: no cover - compiled
+    """A search that is at the start."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
-    pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
-    step_layers, required = layers_per_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
-    obstacles = find_obstacles(data, frame, step, grid.shrink)
-    parents = np.empty((stages + 1, high, wide), dtype=np.int32)
-    price, cost, after = np.full((high, wide), np.inf), np.full((high, wide), np.inf), np.full((high, wide), np.inf)
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
     goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
-    rises, ahead = grid.layers - grid.layers[goal], np.empty(wide)
+    cost = np.full((high, wide), np.inf)
     cost[start, home] = 0.0
     spans = np.zeros(high, dtype=SPAN)
     for z in range(high):
         spans[z].first, spans[z].last = (home, home) if z == start else (wide, -1)
-    for stage in range(1, stages + 1):
+    return GridSearch(
+        layers_per_step(data, frame, step, grid.layers, grid.ratio),
+        find_obstacles(data, frame, step, grid.shrink),
+        np.empty((stages + 1, high, wide), dtype=np.int32),
+        cost,
+        np.full((high, wide), np.inf),
+        np.full((high, wide), np.inf),
+        spans,
+        start,
+        home,
+        goal,
+        0,
+    )
+
+
+@compiled
+def continue_route(
+    data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float, search: GridSearch, more: int
+) -> GridSearch:  # pragma: no cover - compiled
+    """The search after up to `more` further stages, or at the last one if no route comes further."""
+    stages, wide, high = grid.stages, grid.across.size, grid.layers.size
+    step = frame.length / stages
+    pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
+    required = required_clearance(data)
+    step_layers, obstacles, parents, cost, after, price, spans, start, home, goal, reached = search
+    rises, ahead = grid.layers - grid.layers[goal], np.empty(wide)
+    last_stage = min(stages, reached + more)
+    for stage in range(reached + 1, last_stage + 1):
         low, last = wide, -1
         for z in range(high):
             low, last = min(low, spans[z].first), max(last, spans[z].last)
         low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
         if low > last:
+            last_stage = stages
             break
         set_cell_costs(data, required, frame, stage, obstacles, grid, extra, low, last, price)
         after[:, low : last + 1] = np.inf
@@ -367,9 +430,16 @@ def cheapest_route(
         distance_to_goal(wide, home, stages - stage, step, grid.ratio, ahead)
         prune(after, spans, ahead, rises, bound, low, last)
         cost, after = after, cost
-    if spans[goal].first > home or spans[goal].last < home or cost[goal, home] == np.inf:
+    return GridSearch(step_layers, obstacles, parents, cost, after, price, spans, start, home, goal, last_stage)
+
+
+@compiled
+def end_route(search: GridSearch) -> tuple[Records, float]:  # pragma: no cover - compiled
+    """`ROUTE_CELL` records (stages + 1,) of the route found, and its cost; empty if there is none."""
+    goal, home, cost = search.goal, search.home, search.cost
+    if search.spans[goal].first > home or search.spans[goal].last < home or cost[goal, home] == np.inf:
         return np.zeros(0, dtype=ROUTE_CELL), np.inf
-    return trace_back(parents, goal, home), cost[goal, home]
+    return trace_back(search.parents, goal, home), cost[goal, home]
 
 
 @inner
@@ -434,18 +504,20 @@ def grid_route(
     grid: Grid,
     used: tuple[GridRoute, ...] = (),
     expected: float = math.inf,
+    pause: Callable[[], None] = lambda: None,
 ) -> GridRoute | None:
     """Cheapest route over a grid; None if terrain and ceiling leave none.
 
     used: earlier routes, near which the cost is higher, so that the next route takes another side. expected: cost bound
-    to try first, such as the cost on a coarser grid; a search without a bound follows if it fails.
+    to try first, such as the cost on a coarser grid; a search without a bound follows if it fails. pause: as in
+    `cheapest_route`.
     """
     if grid.layers.size == 0:
         return None
     along = np.linspace(0.0, frame.length, grid.stages + 1)
     extra = proximity_cost(along, grid.across, used)
     for bound in (expected, math.inf):
-        cells, cost = cheapest_route(data, frame, grid, extra, bound)
+        cells, cost = cheapest_route(data, frame, grid, extra, bound, pause)
         if cells.size:
             points = np.column_stack([along, grid.across[cells["across"]], grid.layers[cells["layer"]]])
             return GridRoute(points, float(cost))
@@ -465,16 +537,20 @@ def proximity_cost(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -
 
 
 def grid_routes(
-    data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    span: tuple[float, float],
+    grids: tuple[tuple[int, int], ...],
+    pause: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
-    """Routes in the order found, for each grid (stages, number of different routes)."""
+    """Routes in the order found, for each grid (stages, number of different routes). pause: as in `cheapest_route`."""
     expected = EXPECTED * math.dist(data.start, data.destination)
     for stages, each in grids:
         grid = make_grid(data, frame, span, stages)
         used: tuple[GridRoute, ...] = ()
         for _ in range(each):
             # A second route costs more than the first.
-            route = grid_route(data, frame, grid, used, math.inf if used else expected)
+            route = grid_route(data, frame, grid, used, math.inf if used else expected, pause)
             if route is None:
                 break
             if not used:

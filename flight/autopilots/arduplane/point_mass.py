@@ -19,6 +19,7 @@ from flight.dynamics.envelope_tables import read_tables, write_tables
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import trim
 from world.kernels import Record, inner, record_dtype
+from world.least_squares import least_squares
 from world.wind import Wind, mean_wind_speed
 
 Floats = NDArray[np.float64]
@@ -83,7 +84,7 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
 
 
 # Any change of what `_trims` computes counts this up.
-_SCHEMA = 1
+_SCHEMA = 2
 
 
 @functools.lru_cache(maxsize=8)
@@ -104,7 +105,7 @@ def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     alphas = tables["alpha"]
     _fill(alphas)
     terms = np.stack([np.ones(_SPEEDS), speeds**-2.0], axis=1)
-    alpha, lift = np.linalg.lstsq(terms, np.nan_to_num(alphas), rcond=None)[0]
+    alpha, lift = least_squares(terms, np.nan_to_num(alphas))
     return speeds, tables["excess"], float(alpha), float(lift)
 
 
@@ -179,7 +180,7 @@ def _induced_drag(speeds: Floats, excess: Floats) -> float:
     Drag by weight is a V^2 + b / V^2 in straight flight; b is what bank adds to, as the square of the load.
     """
     terms = np.stack([speeds**2, speeds**-2.0], axis=1)
-    return max(0.0, float(np.linalg.lstsq(terms, -excess / speeds, rcond=None)[0][1]))
+    return max(0.0, float(least_squares(terms, -excess / speeds)[1]))
 
 
 @inner

@@ -43,7 +43,7 @@ def cluster() -> Iterator[Cluster]:
         with connected(Workers(1)) as client:
             assert list(client.run(os.getuid).values()) == [os.getuid()], "who holds the certificate is served"
             clock = client.run(eval, "__import__('distributed').batched.time.__qualname__")
-            assert list(clock.values()) == [distributed.batched.time.__qualname__] == ["steady_time"]
+            assert list(clock.values()) == [distributed.batched.time.__qualname__] == ["monotonic"]
             processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
             found = [
                 (connection.laddr.ip, connection.laddr.port)

@@ -1,0 +1,69 @@
+"""Least squares that round alike on every machine.
+
+LAPACK and the BLAS below it choose their arithmetic by the processor: the last digits of a solution differ, and with
+them those of a track that starts from it.  Whatever a plan or a flight is computed from is solved here instead.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.kernels import compiled, inner
+
+Floats = NDArray[np.float64]
+
+# Squared share of the longest column at which what a column has beside those before it is noise, not a direction.
+_DEPENDENT = 1e-18
+
+
+def least_squares(basis: Floats, values: Floats) -> Floats:
+    """Coefficients (k,) that bring basis (n, k) closest to values (n,).
+
+    By modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6).  The coefficient
+    of a column that depends on those before it, to 1e-9 of the longest, is 0.
+
+    >>> least_squares(np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]), np.array([1.0, 3.0, 5.0])).round(9).tolist()
+    [1.0, 2.0]
+    """
+    solution: Floats = _least_squares(np.ascontiguousarray(basis), np.ascontiguousarray(values))
+    return solution
+
+
+@compiled
+def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover - compiled
+    count, size = basis.shape
+    # Columns and values are made orthogonal together.
+    q, r = np.empty((count, size + 1)), np.zeros((size, size + 1))
+    for n in range(count):
+        for k in range(size):
+            q[n, k] = basis[n, k]
+        q[n, size] = values[n]
+    dependent = np.zeros(size, dtype=np.bool_)
+    longest = 0.0
+    for k in range(size):
+        longest = max(longest, _dot(basis, k, k))
+    for k in range(size):
+        norm = _dot(q, k, k)
+        dependent[k] = norm <= _DEPENDENT * longest
+        if dependent[k]:
+            continue
+        for j in range(k + 1, size + 1):
+            r[k, j] = _dot(q, k, j) / norm
+            for n in range(count):
+                q[n, j] -= r[k, j] * q[n, k]
+    out = np.zeros(size)
+    for k in range(size - 1, -1, -1):
+        if dependent[k]:
+            continue
+        out[k] = r[k, size]
+        for j in range(k + 1, size):
+            out[k] -= r[k, j] * out[j]
+    return out
+
+
+@inner
+def _dot(columns: Floats, one: int, other: int) -> float:  # pragma: no cover - compiled
+    """The product of two columns."""
+    total = 0.0
+    for n in range(columns.shape[0]):
+        total += columns[n, one] * columns[n, other]
+    return total
