@@ -242,17 +242,17 @@ def _fly_program(
                 log.unlink(missing_ok=True)
             raise
         if log is not None:
-            flight.keep_log(autopilot_log(log))
+            flight.keep_log(log.with_suffix(program.log_suffix))
     return judged
 
 
-def autopilot_log(log: Path) -> Path:
+def autopilot_log(log: Path, program: Path) -> Path:
     """Where the log that an autopilot's program writes is kept, beside ours.
 
-    >>> autopilot_log(Path("runs/flight.mcap")).name
+    >>> autopilot_log(Path("runs/flight.mcap"), Path("arduplane")).name
     'flight.BIN'
     """
-    return log.with_suffix(".BIN")
+    return log.with_suffix(program_autopilot(program).log_suffix)
 
 
 def _record_and_judge(

@@ -16,6 +16,7 @@ RUN_FILES = (
     "mission.plan",
     "flight.mcap",
     "flight.BIN",
+    "flight.ulg",
     "verdict.json",
     "map.png",
     "profile.png",

@@ -10,6 +10,7 @@ from flight.autopilots.autopilot import Autopilot, StoredAutopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4_sitl.autopilot import Px4Sitl
 from world.errors import ScenarioError
 from world.files import did_you_mean
 from world.scenario import Scenario
@@ -19,6 +20,7 @@ AUTOPILOTS: tuple[type[Autopilot], ...] = (
     ArduPlane,
     PlanflyGuidance,
     Px4,
+    Px4Sitl,
     ArduPlaneSitl,
 )
 # By the name that a scenario states.

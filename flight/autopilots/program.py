@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot
@@ -24,7 +24,12 @@ class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
 
 
 class ProgramAutopilot(Autopilot):
-    """An autopilot that is a program of its own; `law` is the autopilot that models it."""
+    """An autopilot that is a program of its own; `law` is the autopilot that models it.
+
+    log_suffix: of the log that the program itself writes.
+    """
+
+    log_suffix: ClassVar[str]
 
     @classmethod
     @abstractmethod

@@ -6,7 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from flight.autopilots.arduplane_sitl.process import check_binary
+from flight.autopilots.catalog import program_autopilot
+from flight.autopilots.sitl.process import check_binary
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup, VerticalDatum
 from flight.simulation.track import Track
@@ -221,7 +222,7 @@ def fly(
             opened.setup, opened.airframe, target, advance, every=60 // log_hz, autopilot=program, limits=limits
         )
     target = target if len(flown.track) else None
-    own = None if target is None or program is None else autopilot_log(target)
+    own = None if target is None or program is None else autopilot_log(target, program)
     return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, own)
 
 
@@ -277,9 +278,9 @@ def _log_target(
     source = None if isinstance(mission, Plan) else Path(mission)
     target = file_target(log, opened.name, opened.setup.seed, overwrite=overwrite, source=source)
     if program is not None:
-        refuse_existing(autopilot_log(target), overwrite, source)
+        refuse_existing(autopilot_log(target, program), overwrite, source)
     target.parent.mkdir(parents=True, exist_ok=True)
-    say_replaced(target, *((autopilot_log(target),) if program is not None else ()))
+    say_replaced(target, *((autopilot_log(target, program),) if program is not None else ()))
     return target
 
 
@@ -441,8 +442,9 @@ def named_program(autopilot: str | Path | None) -> Path | None:
     if autopilot is None:
         return None
     need_extra("live", "--autopilot needs")
-    check_binary(Path(autopilot))
-    return Path(autopilot)
+    program = Path(autopilot)
+    check_binary(program, program_autopilot(program).title)
+    return program
 
 
 def named_fences(files: FencePaths) -> NamedFences:

@@ -196,7 +196,7 @@ def _rounds(
             folder.mkdir(parents=True, exist_ok=True)
             held.enter_context(hold(folder))
             if task.program is not None:
-                say_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap"))
+                say_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
             prepare_folder(folder)
         flown.append(_fly_round(task, plan, len(flown)))
         if on_round is not None:

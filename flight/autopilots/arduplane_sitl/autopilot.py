@@ -10,6 +10,7 @@ from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.autopilot import AutopilotProgram, StoredAutopilot, describe_program
 from flight.autopilots.program import ProgramAutopilot, ProgramFlight
+from flight.autopilots.sitl.servos import SERVO_FILE, load_servo_map
 from flight.simulation.setup import FlightSetup
 
 
@@ -22,6 +23,7 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
     """
 
     own: ClassVar[np.dtype[np.record] | None] = None
+    log_suffix: ClassVar = ".BIN"
     program: AutopilotProgram | None = None
     binary: Path | None = field(default=None, compare=False)
 
@@ -43,8 +45,6 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
         """The servo map, if it is missing."""
-        from flight.autopilots.arduplane_sitl.physics import SERVO_FILE, load_servo_map
-
         if (aircraft.folder / SERVO_FILE).exists():
             load_servo_map(aircraft)
             return []

@@ -155,7 +155,7 @@ FROM_ARDUPILOT = {
     "TECS_SINK_MAX": ("FW_T_SINK_MAX", 1.0),
 }
 # Of an aircraft, beside its model.
-_AIRCRAFT_FILE = "ardupilot.parm"
+AIRCRAFT_FILE = "ardupilot.parm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -372,7 +372,7 @@ def _parameters(
     for low, high in _PAIRS:
         if values[low] >= values[high]:
             value, allowed = values[low], f"must be below {high} {values[high]:g}"
-            where = source or _AIRCRAFT_FILE
+            where = source or AIRCRAFT_FILE
             message = f"{where}: {low} {value:g}: {allowed}"
             raise ParameterError(message, file=where, field=low, value=value, allowed=allowed)
     return made
@@ -380,7 +380,7 @@ def _parameters(
 
 def _of_aircraft(aircraft: Aircraft) -> dict[str, float]:
     """What the aircraft's folder states for ArduPlane that is PX4's too, within PX4's ranges."""
-    file = aircraft.folder / _AIRCRAFT_FILE
+    file = aircraft.folder / AIRCRAFT_FILE
     if not file.exists():
         return {}
     values = {}

@@ -21,15 +21,15 @@ LINUX_ALONE = {
     "os.getuid": set(),
     "os.geteuid": set(),
     "os.fork": set(),
-    # Programs of ArduPlane run on Linux and macOS.
-    "os.killpg": {"flight/autopilots/arduplane_sitl/process.py"},
+    # Programs of autopilots run on Linux and macOS.
+    "os.killpg": {"flight/autopilots/sitl/process.py"},
     "os.setsid": set(),
     "os.set_blocking": {"planfly/terminal/signal_watch.py"},
     "signal.pthread_sigmask": {"world/interruption.py"},
     "signal.SIGHUP": set(),
     # Elsewhere no process is forked.
     "signal.SIGALRM": {"planfly/campaigns/fork_server.py"},
-    "signal.SIGKILL": {"flight/autopilots/arduplane_sitl/process.py"},
+    "signal.SIGKILL": {"flight/autopilots/sitl/process.py"},
     "select.select": set(),
     "import fcntl": {"world/file_locks.py"},
     "import resource": {"planfly/campaigns/worker_pool.py", "planfly/process_setup.py"},

@@ -1,6 +1,6 @@
 """A small autopilot of ours, run as a program in ArduPlane's place: it flies waypoints, or fails as it is told.
 
-``python fake_autopilot.py FAULT [ArduPlane's options]``; FAULT is one of `FAULTS`.
+``python fake_autopilot.py FAULT [ArduPlane's options]``; FAULT is one of `FAULTS`.  The fake of PX4 flies by it, too.
 """
 
 import argparse
@@ -65,7 +65,7 @@ class Fake:
             time = state["timestamp"]
             if self.frame % 12 == 0:
                 self.talk(time)
-            pulses = self.steer(state) if self.mode == AUTO else [NEUTRAL] * 16
+            pulses = pulses_of(*self.steer(state)) if self.mode == AUTO else [NEUTRAL] * 16
             if time > self.auto_since + GOES_WRONG:
                 if self.fault == "dive":
                     pulses[1], pulses[2] = NEUTRAL - FULL, 1000
@@ -162,8 +162,11 @@ class Fake:
         scale = math.cos(math.radians(0.5 * (lat + self.home[0])))
         return (lat - self.home[0]) * METRES, (lon - self.home[1]) * METRES * scale, self.home[2] - item.z
 
-    def steer(self, state: dict[str, Any]) -> list[int]:
-        """Fly to the current waypoint: bank for the course to it, pitch for its height, throttle for the speed."""
+    def steer(self, state: dict[str, Any]) -> tuple[float, float, float]:
+        """Fly to the current waypoint: bank for the course to it, pitch for its height, throttle for the speed.
+
+        Aileron, elevator (positive for nose up) and throttle, as shares of their throw.
+        """
         north, east, down = state["position"]
         v_north, v_east, v_down = state["velocity"]
         roll, pitch, _ = state["attitude"]
@@ -187,11 +190,15 @@ class Fake:
         climb = max(-3.0, min(3.0, 0.3 * (down - to_down)))
         aim = 0.06 + 0.05 * (climb + v_down)
         aileron = 0.6 * (bank - roll) - 0.1 * p
-        # Nose up is more microseconds.
         elevator = 0.15 + 0.8 * (aim - pitch) - 0.15 * q + 0.1 * roll * roll
         throttle = 0.77 + 0.05 * (25.0 - state["airspeed"]) + 0.03 * climb
-        surfaces = [NEUTRAL + round(FULL * max(-1.0, min(1.0, value))) for value in (aileron, elevator)]
-        return [*surfaces, 1000 + round(1000 * max(0.0, min(1.0, throttle))), NEUTRAL, *[0] * 12]
+        return max(-1.0, min(1.0, aileron)), max(-1.0, min(1.0, elevator)), max(0.0, min(1.0, throttle))
+
+
+def pulses_of(aileron: float, elevator: float, throttle: float) -> list[int]:
+    """The pulses of ArduPlane's outputs; nose up is more microseconds."""
+    surfaces = [NEUTRAL + round(FULL * share) for share in (aileron, elevator)]
+    return [*surfaces, 1000 + round(1000 * throttle), NEUTRAL, *[0] * 12]
 
 
 def main() -> None:

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from flight.autopilots.arduplane_sitl import process
-from flight.autopilots.arduplane_sitl.process import AutopilotProcess, check_binary
+from flight.autopilots.arduplane_sitl.process import arduplane_launch
 from flight.autopilots.guard import Guard
+from flight.autopilots.sitl import process
+from flight.autopilots.sitl.process import AutopilotProcess, check_binary
 from flight.mission.items import Home
 from world.errors import FlightError
 
@@ -33,7 +34,9 @@ def script(tmp_path: Path, text: str) -> Path:
 
 
 def started(program: Path) -> AutopilotProcess:
-    return AutopilotProcess(program, HOME, 90.0, {"WP_RADIUS": 90.0, "NAVL1_PERIOD": 17.5}, 4001, 4002)
+    return AutopilotProcess(
+        program, arduplane_launch(HOME, 90.0, {"WP_RADIUS": 90.0, "NAVL1_PERIOD": 17.5}, 4001, 4002)
+    )
 
 
 def wait_for(file: Path) -> str:
@@ -203,7 +206,7 @@ def test_a_program_without_a_log_leaves_none(tmp_path: Path) -> None:
 
 def test_the_digest_is_the_files(tmp_path: Path) -> None:
     program = script(tmp_path, "exit 0")
-    assert check_binary(program) == hashlib.sha256(program.read_bytes()).hexdigest()
+    assert check_binary(program, "ArduPlane") == hashlib.sha256(program.read_bytes()).hexdigest()
 
 
 def test_what_is_no_program_is_told_apart(tmp_path: Path) -> None:
@@ -211,4 +214,4 @@ def test_what_is_no_program_is_told_apart(tmp_path: Path) -> None:
     plain.write_text("no program")
     for path, said in ((tmp_path / "none", "no such file"), (tmp_path, "not a file"), (plain, "not executable")):
         with pytest.raises(FlightError, match=said):
-            check_binary(path)
+            check_binary(path, "ArduPlane")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane_sitl.flight import beyond_end, place_on_path
+from flight.autopilots.sitl.flight import beyond_end, place_on_path
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION

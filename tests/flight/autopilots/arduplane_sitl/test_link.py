@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.autopilots.arduplane_sitl.link import AutopilotLink
+from flight.autopilots.sitl.link import AutopilotLink, TcpLink
 
 
 class Program:
@@ -24,7 +24,7 @@ class Program:
 
 @pytest.fixture
 def link() -> Iterator[AutopilotLink]:
-    opened = AutopilotLink()
+    opened = TcpLink()
     yield opened
     opened.close()
 

@@ -16,22 +16,23 @@ import pytest
 from aircraft.catalog import aircraft_names, load_aircraft
 from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.physics import (
+    JsonLockstep,
+    PhysicsPort,
+    ServoPacket,
+    encode_motion,
+    parse_servo_packet,
+)
+from flight.autopilots.sitl.exchange import (
     LOOK_FRAMES,
     METRES_A_DEGREE,
     PUSH,
     BodyMotion,
-    Lockstep,
-    PhysicsPort,
     RailEnd,
-    ServoOutput,
-    ServoPacket,
-    encode_motion,
-    load_servo_map,
     motion_on_rail,
     offset_on_sphere,
-    parse_servo_packet,
     rail_end,
 )
+from flight.autopilots.sitl.servos import ServoOutput, load_servo_map
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
@@ -417,7 +418,7 @@ class Exchange:
         self.trim = self.fdm.start(46.0, 8.0, 500.0, math.pi / 2.0, 25.0, 0.0, (-4.0, 0.0, 0.0))
         self.port, self.looks = Port(), 0
         servos = load_servo_map(AEROSONDE)
-        self.lockstep = Lockstep(self.port, servos, self.fdm, self.space, HOME, self.look)  # type: ignore[arg-type]  # a port by hand
+        self.lockstep = JsonLockstep(self.port, servos, self.fdm, self.space, HOME, self.look)  # type: ignore[arg-type]  # a port by hand
 
     def look(self) -> None:
         self.looks += 1

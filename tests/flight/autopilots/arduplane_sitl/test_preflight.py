@@ -9,15 +9,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from aircraft.catalog import load_aircraft
-from flight.autopilots.arduplane_sitl.link import AutopilotNews
-from flight.autopilots.arduplane_sitl.preflight import (
-    AUTO,
-    Preflight,
-    Talk,
-    UploadedMission,
-    uploaded_mission,
-    version_text,
-)
+from flight.autopilots.arduplane_sitl.preflight import AUTO, Preflight, version_text
+from flight.autopilots.sitl.conversation import Talk
+from flight.autopilots.sitl.link import AutopilotNews
+from flight.autopilots.sitl.mission import UploadedMission, uploaded_mission
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from flight.mission.route import make_route

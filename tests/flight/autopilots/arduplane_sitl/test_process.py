@@ -9,13 +9,13 @@ import pytest
 from aircraft.catalog import aircraft_names, load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import load_parameters
-from flight.autopilots.arduplane_sitl.physics import load_servo_map
 from flight.autopilots.arduplane_sitl.process import (
     SIMULATION,
     autopilot_parameters,
     load_aircraft_parameters,
     person_parameters,
 )
+from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
 from tests.setups import setup_maker
 from world.errors import ParameterError

@@ -1,0 +1,1 @@
+"""PX4 itself: its program in lockstep with our physics."""

@@ -1,0 +1,111 @@
+"""The parameters that PX4 gets for a flight: the simulation's, the aircraft's, and a person's on top."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.parameter_files import read_parameter_file
+from flight.autopilots.px4.parameters import AIRCRAFT_FILE, Px4Parameters
+from flight.autopilots.px4_sitl.physics import AILERON, ELEVATOR, RUDDER, THROTTLE
+from flight.simulation.setup import FlightSetup
+
+# CA_SV_CSn_TYPE of what moves about each axis, and PWM_MAIN_FUNCn of the first motor and the first surface.
+_SURFACES = {AILERON: 15.0, ELEVATOR: 3.0, RUDDER: 4.0}
+_MOTOR, _SERVO = 101.0, 201.0
+
+# What our physics and a start in the air need, whatever the aircraft.
+SIMULATION = {
+    # One motor and three surfaces, in the order of the outputs.
+    "CA_AIRFRAME": 1.0,
+    "CA_ROTOR_COUNT": 1.0,
+    "CA_SV_CS_COUNT": float(len(_SURFACES)),
+    **{f"CA_SV_CS{output}_TYPE": kind for output, kind in _SURFACES.items()},
+    "CA_SV_CS0_TRQ_R": 1.0,
+    "CA_SV_CS1_TRQ_P": 1.0,
+    "CA_SV_CS2_TRQ_Y": 1.0,
+    **{f"PWM_MAIN_FUNC{output + 1}": _SERVO + output for output in _SURFACES},
+    f"PWM_MAIN_FUNC{THROTTLE + 1}": _MOTOR,
+    # One of each sensor, without delay.
+    "EKF2_MULTI_IMU": 0.0,
+    "EKF2_MULTI_MAG": 0.0,
+    "SENS_IMU_MODE": 1.0,
+    "SENS_MAG_MODE": 1.0,
+    "EKF2_GPS_DELAY": 0.0,
+    "SENS_GPS0_DELAY": 0.0,
+    # It is held in MANUAL on the rail, by us as a joystick; no link that falls silent ends a flight.
+    "COM_RC_IN_MODE": 1.0,
+    "COM_RC_OVERRIDE": 0.0,
+    "NAV_RCL_ACT": 0.0,
+    "NAV_DLL_ACT": 0.0,
+    # How empty a battery is ends none either: the verdict judges energy.
+    "CBRK_SUPPLY_CHK": 894281.0,
+    "COM_LOW_BAT_ACT": 0.0,
+    "COM_FLTT_LOW_ACT": 0.0,
+    "FD_FAIL_R": 0.0,
+    "FD_FAIL_P": 0.0,
+    # It starts and ends in the air.
+    "MIS_TKO_LAND_REQ": 0.0,
+    "MIS_DIST_1WP": 100_000.0,
+    # Its log is from arming to disarming.
+    "SDLOG_MODE": 0.0,
+    "SDLOG_PROFILE": 1.0,
+    # The rudder turns in with the wing, and little more.
+    "FW_YR_FF": 0.1,
+    "FW_YR_P": 0.05,
+    "FW_YR_I": 0.05,
+}
+# ArduPlane's gains of an aircraft that are PX4's by another name.  ArduPlane's give degrees of 45 by degrees a second,
+# PX4's shares of the throw by radians a second; both count at cruise speed.
+_GAINS = {
+    "RLL_RATE_FF": "FW_RR_FF",
+    "RLL_RATE_P": "FW_RR_P",
+    "RLL_RATE_I": "FW_RR_I",
+    "PTCH_RATE_FF": "FW_PR_FF",
+    "PTCH_RATE_P": "FW_PR_P",
+    "PTCH_RATE_I": "FW_PR_I",
+}
+_BY_RADIANS = math.degrees(1.0) / 45.0
+# A person's parameters that say how an aircraft flies begin so; others belong to the hardware that they were read from.
+FLYING = ("FW_", "NPFG_", "NAV_ACC_RAD", "NAV_FW_", "NAV_LOITER_RAD", "NAV_MIN_", "RTL_", "MIS_", "WEIGHT_", "CS_")
+
+
+@dataclass(frozen=True, slots=True)
+class GivenParameters:
+    """Parameters by name.
+
+    given: all that PX4 gets over its own defaults.
+    changed: of those the person's, where they differ from the aircraft's or are not among them.
+    unused: the person's that belong to other hardware.
+    """
+
+    given: Mapping[str, float]
+    changed: Mapping[str, float]
+    unused: tuple[str, ...] = ()
+
+
+def given_parameters(setup: FlightSetup, aircraft: Aircraft, made: Px4Parameters) -> GivenParameters:
+    """Put the parameters of a flight together.  Raises ParameterError for a bad file.
+
+    The mission's speed is the cruise speed, unless the person has one.
+    """
+    file = setup.scenario.flight.params
+    own = {} if file is None else {name: entry.value for name, entry in read_parameter_file(Path(file)).items()}
+    own |= made.by_origin("file")
+    base = SIMULATION | rate_gains(aircraft) | made.by_origin("aircraft")
+    base["FW_AIRSPD_TRIM"] = setup.airspeed
+    flying = {name: value for name, value in own.items() if name.startswith(FLYING) and name not in SIMULATION}
+    changed = {name: value for name, value in flying.items() if base.get(name) != value}
+    return GivenParameters(base | flying, changed, tuple(sorted(own.keys() - flying.keys())))
+
+
+def rate_gains(aircraft: Aircraft) -> dict[str, float]:
+    """Gains of the rate controllers, from those that the aircraft's folder has for ArduPlane.  Raises ParameterError.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> round(rate_gains(load_aircraft("aerosonde"))["FW_RR_FF"], 2)
+    0.33
+    """
+    stated = read_parameter_file(aircraft.folder / AIRCRAFT_FILE)
+    return {name: stated[old].value * _BY_RADIANS for old, name in _GAINS.items() if old in stated}

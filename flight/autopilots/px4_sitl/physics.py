@@ -1,0 +1,322 @@
+"""PX4's simulator link in lockstep: the sensors that it is sent, the socket, and the exchange.
+
+PX4 connects to the simulator by TCP and speaks MAVLink.  Each HIL_SENSOR sets its clock and has it step; once its
+outputs run, it answers each with one HIL_ACTUATOR_CONTROLS.  Facts of PX4's
+`src/modules/simulation/simulator_mavlink/SimulatorMavlink.cpp` and of docs.px4.io, "Simulator MAVLink API".
+"""
+
+import math
+import random
+import socket
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink import mavextra
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.autopilots.sitl.exchange import (
+    FRAME_HZ,
+    LOOPBACK,
+    SILENCE,
+    BodyMotion,
+    Lockstep,
+    RailEnd,
+    place_on_sphere,
+    to_body,
+)
+from flight.autopilots.sitl.servos import ServoMap
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.state import Commands
+from flight.mission.items import Home
+from flight.simulation.tick import Workspace
+from world.errors import FlightError
+from world.running_clock import RunningClock
+
+# ----------------------------------------------------------------------
+# What its sensors measure.
+
+# Of every sensor, in HIL_SENSOR.fields_updated.
+_ALL = 0x1FFF
+_FIX_3D, _SATELLITES = 3, 12
+# m.  Of a receiver's place, which is exact but for what the flight's navigation mistakes.
+_ACCURACY = 0.9
+# PX4 takes a value that never changes for a broken sensor, and one on the rail would not: a little more than PX4's
+# quantum is added, of numbers that are the same in each flight.  Gauss, m/s^2, rad/s, hPa.
+_DITHER_FIELD, _DITHER_FORCE, _DITHER_RATE, _DITHER_PRESSURE = 2e-4, 6e-3, 1.5e-3, 5e-3
+
+
+def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
+    """The Earth's magnetic field north, east and down, gauss, of the tables that pymavlink brings along.
+
+    >>> north, east, down = earth_field(47.4, 8.5)
+    >>> round(north, 2), abs(east) < 0.03, round(down, 2)
+    (0.21, True, 0.43)
+    """
+    declination, inclination, strength = mavextra.get_mag_field_ef(lat_deg, lon_deg)
+    declination, inclination = math.radians(declination), math.radians(inclination)
+    level = strength * math.cos(inclination)
+    return level * math.cos(declination), level * math.sin(declination), strength * math.sin(inclination)
+
+
+def atmosphere(amsl: float) -> tuple[float, float, float]:
+    """Pressure (Pa), temperature (K) and density (kg/m^3) of the international standard atmosphere (ISO 2533), m AMSL.
+
+    >>> [round(value, 3) for value in atmosphere(1000.0)]
+    [89874.563, 281.65, 1.112]
+    """
+    temperature = 288.15 - 0.0065 * amsl
+    pressure = 101325.0 * (temperature / 288.15) ** 5.255880
+    return pressure, temperature, pressure / (287.05287 * temperature)
+
+
+class Sensors:
+    """The messages about an aircraft's motion.
+
+    home: what the motion's positions count from.
+    """
+
+    def __init__(self, home: Home) -> None:
+        self._home = (math.radians(home.lat_deg), math.radians(home.lon_deg), home.alt)
+        self._field = earth_field(home.lat_deg, home.lon_deg)
+        self._random = random.Random(1)
+
+    def measured(self, motion: BodyMotion) -> Any:
+        """HIL_SENSOR: inertial sensors, magnetometer, barometer and Pitot tube."""
+        dither = self._random.uniform
+        field = to_body((motion.roll, motion.pitch, motion.yaw), self._field)
+        pressure, temperature, density = atmosphere(self._home[2] - motion.down)
+        return mavlink.MAVLink_hil_sensor_message(
+            round(motion.time * 1e6),
+            motion.force_x + dither(-_DITHER_FORCE, _DITHER_FORCE),
+            motion.force_y + dither(-_DITHER_FORCE, _DITHER_FORCE),
+            motion.force_z + dither(-_DITHER_FORCE, _DITHER_FORCE),
+            motion.roll_rate + dither(-_DITHER_RATE, _DITHER_RATE),
+            motion.pitch_rate + dither(-_DITHER_RATE, _DITHER_RATE),
+            motion.yaw_rate + dither(-_DITHER_RATE, _DITHER_RATE),
+            field[0] + dither(-_DITHER_FIELD, _DITHER_FIELD),
+            field[1] + dither(-_DITHER_FIELD, _DITHER_FIELD),
+            field[2] + dither(-_DITHER_FIELD, _DITHER_FIELD),
+            pressure / 100.0 + dither(-_DITHER_PRESSURE, _DITHER_PRESSURE),
+            0.5 * density * motion.airspeed**2 / 100.0,
+            self._home[2] - motion.down,
+            temperature - 273.15,
+            _ALL,
+            0,
+        )
+
+    def fix(self, motion: BodyMotion) -> Any:
+        """HIL_GPS."""
+        lat, lon = place_on_sphere(motion.north, motion.east, self._home[0], self._home[1])
+        north, east, down = motion.velocity_north, motion.velocity_east, motion.velocity_down
+        return mavlink.MAVLink_hil_gps_message(
+            round(motion.time * 1e6),
+            _FIX_3D,
+            round(math.degrees(lat) * 1e7),
+            round(math.degrees(lon) * 1e7),
+            round((self._home[2] - motion.down) * 1e3),
+            round(_ACCURACY * 100.0),
+            round(_ACCURACY * 100.0),
+            round(math.hypot(north, east) * 100.0),
+            round(north * 100.0),
+            round(east * 100.0),
+            round(down * 100.0),
+            round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000,
+            _SATELLITES,
+        )
+
+
+def between(before: BodyMotion, after: BodyMotion) -> BodyMotion:
+    """The motion half way from one to another; the courses of both differ by less than half a turn."""
+    middle = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
+    made = BodyMotion(*middle)
+    return made._replace(yaw=before.yaw + 0.5 * math.remainder(after.yaw - before.yaw, 2.0 * math.pi))
+
+
+# ----------------------------------------------------------------------
+# The socket.
+
+_LARGEST = 65536
+# How often (s) a wait looks whether the program still runs.
+_LOOK = 0.25
+
+
+class SimulatorPort:
+    """The socket that PX4 connects to.
+
+    port: its number.
+    watch: called while nothing comes; raises FlightError where the program has ended.
+    """
+
+    def __init__(self) -> None:
+        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._listener.bind((LOOPBACK, 0))
+        self._listener.listen(1)
+        self.port = int(self._listener.getsockname()[1])
+        self.watch: Callable[[], None] = _nothing
+        self._stream: socket.socket | None = None
+        self._mav = mavlink.MAVLink(None, 1, mavlink.MAV_COMP_ID_AUTOPILOT1)
+        self._mav.robust_parsing = True
+        self._answers: list[tuple[float, ...]] = []
+        # A sleeping laptop is no silence.
+        self._clock = RunningClock()
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._listener.close()
+        if self._stream is not None:
+            self._stream.close()
+
+    def connect(self, seconds: float) -> None:
+        """Wait until PX4 has connected.  Raises FlightError for one that ends, or does not within so many seconds."""
+        self._listener.settimeout(_LOOK)
+        began = self._clock()
+        while self._stream is None:
+            try:
+                self._stream, _ = self._listener.accept()
+            except TimeoutError:
+                self.watch()
+                if self._clock() - began > seconds:
+                    message = f"did not connect to the simulator within {seconds:.0f} s"
+                    raise FlightError(message, field="simulator") from None
+        self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def send(self, *messages: Any) -> None:
+        """Send messages together."""
+        if self._stream is None:
+            raise ValueError("PX4 has not connected")
+        data = b"".join(message.pack(self._mav) for message in messages)
+        try:
+            self._stream.sendall(data)
+        except OSError:
+            # Nobody is there any more: the next wait finds out why.
+            return
+
+    def answer(self, patience: float) -> tuple[float, ...] | None:
+        """HIL_ACTUATOR_CONTROLS.controls (16,), or None where none comes within so many seconds by the clock.
+
+        Raises FlightError for a program that ends.
+        """
+        began = self._clock()
+        while not self._answers:
+            left = patience - (self._clock() - began)
+            if left <= 0.0 or not self._read(min(left, _LOOK)):
+                self.watch()
+            if left <= 0.0:
+                return None
+        return self._answers.pop(0)
+
+    def awaited_answer(self) -> tuple[float, ...]:
+        """The same from a PX4 whose outputs run: every step has its answer.  Raises FlightError for one without."""
+        answer = self.answer(SILENCE)
+        if answer is None:
+            raise FlightError(f"silent for {SILENCE:.0f} s; ended", field="simulator")
+        return answer
+
+    def _read(self, patience: float) -> bool:
+        """Take in what comes within so many seconds; whether anything did."""
+        if self._stream is None:
+            raise ValueError("PX4 has not connected")
+        self._stream.settimeout(patience)
+        try:
+            data = self._stream.recv(_LARGEST)
+        except (TimeoutError, ConnectionResetError):
+            return False
+        if not data:
+            # Closed by the other side: it is ending.
+            return False
+        try:
+            messages = self._mav.parse_buffer(data) or []
+        except (mavlink.MAVError, struct.error):
+            return True
+        self._answers += [
+            tuple(message.controls) for message in messages if message.get_type() == "HIL_ACTUATOR_CONTROLS"
+        ]
+        return True
+
+
+def _nothing() -> None:
+    """Watch nothing."""
+
+
+# ----------------------------------------------------------------------
+# The exchange.
+
+# Frames from one fix of the satellites to the next: a tenth of a second.
+_FIX_FRAMES = 12
+# The outputs, in the order of PWM_MAIN_FUNC1..4.
+AILERON, ELEVATOR, RUDDER, THROTTLE = range(4)
+# Until its estimator runs PX4 answers every fifth step or so; from so many answers in a row on it answers each.
+_IN_A_ROW = 50
+# s by the clock.  Before that, a step without an answer by then is followed by the next.
+_FIRST_ANSWER = 0.01
+
+
+class HilLockstep(Lockstep):
+    """The exchange over that socket: two steps of PX4, which samples its sensors at 250 Hz, in each frame.
+
+    servos: which output moves what; the throw of each is PX4's -1..1 (throttle 0..1).  The others as of `Lockstep`.
+    """
+
+    def __init__(
+        self,
+        port: SimulatorPort,
+        servos: ServoMap,
+        fdm: Fdm,
+        workspace: Workspace,
+        home: Home,
+        look: Callable[[], None],
+    ) -> None:
+        super().__init__(fdm, workspace, home, look)
+        self._port, self._servos = port, servos
+        self._sensors = Sensors(home)
+        self._before: BodyMotion | None = None
+        self._answered = 0
+
+    @property
+    def _running(self) -> bool:
+        """Whether each step has its answer."""
+        return self._answered >= _IN_A_ROW
+
+    def _outputs(self) -> tuple[float, ...]:
+        """The answer to the last step; nothing where there is none yet."""
+        if self._running:
+            return self._port.awaited_answer()
+        answer = self._port.answer(_FIRST_ANSWER)
+        self._answered = 0 if answer is None else self._answered + 1
+        return answer or (0.0,) * 4
+
+    def boot(self, rail: RailEnd, started: Callable[[], bool], patience: float, seconds: float) -> None:
+        """Have PX4 start with its clock standing still: a step only where it waits for one.
+
+        started: whether its start-up script has ended.  patience: s by the clock without an answer until a step.
+        Raises FlightError where it does not end within so many seconds by the clock.
+        """
+        clock = RunningClock()
+        began = clock()
+        while not started():
+            if clock() - began > seconds:
+                raise FlightError(f"did not start up within {seconds:.0f} s", field="start-up")
+            if self._port.answer(patience) is None:
+                self.hold(rail)
+
+    def _take(self) -> Commands:
+        outputs = (0.0,) * 4 if self._before is None else self._outputs()
+        servos = self._servos
+        return Commands(
+            servos.elevator.at_share(outputs[ELEVATOR]),
+            servos.aileron.at_share(outputs[AILERON]),
+            servos.rudder.at_share(outputs[RUDDER]),
+            servos.throttle.at_share(2.0 * outputs[THROTTLE] - 1.0),
+        )
+
+    def _tell(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
+        after = BodyMotion(*motion)
+        before = self._before or after._replace(time=after.time - 1.0 / FRAME_HZ)
+        self._before = after
+        self._port.send(self._sensors.measured(between(before, after)))
+        self._outputs()
+        now = [self._sensors.measured(after)]
+        if self._frame % _FIX_FRAMES == 0:
+            now.append(self._sensors.fix(after))
+        self._port.send(*now)

@@ -1,0 +1,62 @@
+"""PX4's program: what stands in the folder that it starts in, and how it is started there."""
+
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from flight.autopilots.px4_sitl.autopilot import STARTUP, startup_files
+from flight.autopilots.sitl.exchange import LOOPBACK
+from flight.autopilots.sitl.process import Launch
+from world.errors import FlightError
+
+# Of our airframe, among PX4's own.
+_AIRFRAME = 22000
+# Its start-up script's last words.
+STARTED = "Startup script returned successfully"
+# What it puts into the folder of temporary files of all, named by its instance.
+_LEFT = ("px4_lock-", "px4-sock-")
+
+
+def px4_launch(
+    binary: Path, parameters: Mapping[str, float], simulator_port: int, own_port: int, link_port: int
+) -> Callable[[Path], Launch]:
+    """How PX4's program is started in a folder.
+
+    parameters: by name.
+    simulator_port: on this machine, where it finds the physics (TCP).
+    own_port, link_port: where it listens for MAVLink, and where it sends it to (UDP).
+
+    Raises FlightError for a program without its start-up files.
+    """
+    source = startup_files(binary)
+    if source is None:
+        allowed = f"its start-up files are expected beside it, as the folder {STARTUP} of its build"
+        raise FlightError(f"{binary}: {allowed}", file=binary, field=STARTUP, allowed=allowed)
+
+    def prepare(folder: Path) -> Launch:
+        scripts = Path(shutil.copytree(source, folder / STARTUP)) / "init.d-posix"
+        lines = [". ${R}etc/init.d/rc.fw_defaults", *(f"param set {k} {v:.9g}" for k, v in parameters.items())]
+        _write(scripts / "airframes" / f"{_AIRFRAME}_planfly", *lines)
+        _write(
+            scripts / "px4-rc.simulator",
+            "param set MAV_SYS_ID 1",
+            "param set IMU_INTEG_RATE 250",
+            f"simulator_mavlink start -c {simulator_port}",
+        )
+        _write(scripts / "px4-rc.mavlink", f"mavlink start -x -u {own_port} -o {link_port} -t {LOOPBACK} -r 4000000 -f")
+        # Of several instances on a machine each has a number; a port is nobody else's.
+        environment = {"PX4_SYS_AUTOSTART": str(_AIRFRAME), "PX4_SIM_MODEL": "planfly"}
+        return Launch(("-d", "-i", str(simulator_port), "-w", str(folder)), environment, "log/**/*.ulg")
+
+    return prepare
+
+
+def _write(file: Path, *lines: str) -> None:
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("\n".join(("#!/bin/sh", *lines, "")), encoding="utf-8")
+
+
+def remove_left(simulator_port: int, temporary: Path = Path("/tmp")) -> None:
+    """Remove what a program that has ended leaves outside its folder."""
+    for name in _LEFT:
+        (temporary / f"{name}{simulator_port}").unlink(missing_ok=True)

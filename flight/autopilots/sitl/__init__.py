@@ -1,0 +1,1 @@
+"""What the programs of autopilots share that fly in lockstep with our physics."""

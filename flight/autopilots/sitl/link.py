@@ -1,0 +1,229 @@
+"""The MAVLink connection to an autopilot's program: messages sent, and what its messages have told so far."""
+
+import socket
+import struct
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.autopilots.sitl.exchange import LOOPBACK
+
+# We are a ground station.
+_SYSTEM, _COMPONENT = 255, mavlink.MAV_COMP_ID_MISSIONPLANNER
+_LARGEST = 65536
+
+
+@dataclass(slots=True)
+class AutopilotNews:
+    """What an autopilot's messages have told; None and empty for what it has not.
+
+    vehicle: MAV_TYPE.  autopilot: MAV_AUTOPILOT.  mode: its own number.
+    ekf: flags of EKF_STATUS_REPORT or ESTIMATOR_STATUS.
+    mission_item: the number of the item that it flies.
+    texts: STATUSTEXT, in order.
+    parameters: by name, as it has them.
+    acknowledged: the result by command, MAV_RESULT.
+    requested: the mission item it last asked for.  mission_result: MAV_MISSION_RESULT of the upload.
+    version: AUTOPILOT_VERSION.flight_sw_version.
+    """
+
+    vehicle: int | None = None
+    autopilot: int | None = None
+    mode: int | None = None
+    armed: bool = False
+    ekf: int = 0
+    mission_item: int = -1
+    texts: list[str] = field(default_factory=list)
+    parameters: dict[str, float] = field(default_factory=dict)
+    acknowledged: dict[int, int] = field(default_factory=dict)
+    requested: int | None = None
+    mission_result: int | None = None
+    version: int | None = None
+
+
+# How a parameter is told that is no float: PX4 sends the bytes of the integer, ArduPilot the float of the same value.
+_INTEGERS = {
+    mavlink.MAV_PARAM_TYPE_UINT8: "<B3x", mavlink.MAV_PARAM_TYPE_INT8: "<b3x",
+    mavlink.MAV_PARAM_TYPE_UINT16: "<H2x", mavlink.MAV_PARAM_TYPE_INT16: "<h2x",
+    mavlink.MAV_PARAM_TYPE_UINT32: "<I", mavlink.MAV_PARAM_TYPE_INT32: "<i",
+}  # fmt: skip
+
+
+class AutopilotLink(ABC):
+    """A connection to the autopilot's program, on this machine.
+
+    port: ours.  news: what has been told.
+    """
+
+    port: int
+
+    def __init__(self) -> None:
+        self.news = AutopilotNews()
+        self._mav = mavlink.MAVLink(None, _SYSTEM, _COMPONENT)
+        self._mav.robust_parsing = True
+        self._handlers = {
+            "HEARTBEAT": self._heartbeat,
+            "STATUSTEXT": self._text,
+            "EKF_STATUS_REPORT": self._ekf,
+            "ESTIMATOR_STATUS": self._ekf,
+            "MISSION_CURRENT": self._mission_current,
+            "PARAM_VALUE": self._parameter,
+            "COMMAND_ACK": self._command_ack,
+            "MISSION_REQUEST": self._mission_request,
+            "MISSION_REQUEST_INT": self._mission_request,
+            "MISSION_ACK": self._mission_ack,
+            "AUTOPILOT_VERSION": self._version,
+        }
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the connection."""
+
+    @abstractmethod
+    def _receive(self) -> bytes:
+        """What has come, without waiting."""
+
+    @abstractmethod
+    def _transmit(self, data: bytes) -> None:
+        """Send bytes; what the program no longer takes is lost."""
+
+    def poll(self) -> None:
+        """Take in what has come, without waiting."""
+        while data := self._receive():
+            try:
+                messages = self._mav.parse_buffer(data) or []
+            except (mavlink.MAVError, struct.error):
+                continue
+            for message in messages:
+                handler = self._handlers.get(message.get_type())
+                if handler is not None:
+                    handler(message)
+
+    def send(self, message: Any) -> None:
+        """Send a message; what the program no longer takes is lost."""
+        data = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) % 256
+        self._transmit(data)
+
+    def _heartbeat(self, message: Any) -> None:
+        if message.get_srcComponent() != mavlink.MAV_COMP_ID_AUTOPILOT1:
+            return
+        self.news.vehicle, self.news.autopilot = int(message.type), int(message.autopilot)
+        self.news.mode = int(message.custom_mode)
+        self.news.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+
+    def _text(self, message: Any) -> None:
+        self.news.texts.append(str(message.text))
+
+    def _ekf(self, message: Any) -> None:
+        self.news.ekf = int(message.flags)
+
+    def _mission_current(self, message: Any) -> None:
+        self.news.mission_item = int(message.seq)
+
+    def _parameter(self, message: Any) -> None:
+        value, form = float(message.param_value), _INTEGERS.get(message.param_type)
+        if form is not None and self.news.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+            (value,) = struct.unpack(form, struct.pack("<f", value))
+        self.news.parameters[str(message.param_id)] = float(value)
+
+    def _command_ack(self, message: Any) -> None:
+        self.news.acknowledged[int(message.command)] = int(message.result)
+
+    def _mission_request(self, message: Any) -> None:
+        self.news.requested = int(message.seq)
+
+    def _mission_ack(self, message: Any) -> None:
+        self.news.mission_result = int(message.type)
+
+    def _version(self, message: Any) -> None:
+        self.news.version = int(message.flight_sw_version)
+
+
+class TcpLink(AutopilotLink):
+    """A socket that the program connects to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._listener.bind((LOOPBACK, 0))
+        self._listener.listen(1)
+        self._listener.setblocking(False)
+        self.port = int(self._listener.getsockname()[1])
+        self._stream: socket.socket | None = None
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._listener.close()
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+
+    def _receive(self) -> bytes:
+        if self._stream is None:
+            try:
+                self._stream, _ = self._listener.accept()
+            except BlockingIOError:
+                return b""
+            self._stream.setblocking(False)
+            self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        try:
+            # Closed by the other side, it is empty; the physics tells why.
+            return self._stream.recv(_LARGEST)
+        except (BlockingIOError, ConnectionResetError):
+            return b""
+
+    def _transmit(self, data: bytes) -> None:
+        if self._stream is None:
+            return
+        try:
+            self._stream.sendall(data)
+        except OSError:
+            return
+
+
+class UdpLink(AutopilotLink):
+    """A socket that the program sends to.
+
+    theirs: the port that it listens on; free now.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind((LOOPBACK, 0))
+        self._socket.setblocking(False)
+        self.port = int(self._socket.getsockname()[1])
+        (self.theirs,) = free_ports(1)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def _receive(self) -> bytes:
+        try:
+            data, sender = self._socket.recvfrom(_LARGEST)
+        except (BlockingIOError, ConnectionRefusedError):
+            return b""
+        # What anybody else sends is nobody's.
+        return data if sender == (LOOPBACK, self.theirs) else b""
+
+    def _transmit(self, data: bytes) -> None:
+        try:
+            self._socket.sendto(data, (LOOPBACK, self.theirs))
+        except OSError:
+            return
+
+
+def free_ports(count: int) -> list[int]:
+    """Ports that nobody has now, for what the program opens and nobody uses."""
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    try:
+        for opened in sockets:
+            opened.bind((LOOPBACK, 0))
+        return [int(opened.getsockname()[1]) for opened in sockets]
+    finally:
+        for opened in sockets:
+            opened.close()

@@ -1,0 +1,199 @@
+"""An autopilot's program: started in a folder of its own, ended with the flight."""
+
+import contextlib
+import ctypes
+import hashlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Self
+
+from flight.autopilots.guard import Guard
+from world.errors import FlightError
+from world.files import temporary_folder
+from world.interruption import uninterrupted
+
+_OUTPUT = "output.txt"
+# Given to end by itself (s), so that its log is whole, before it is killed.
+_GRACE = 2.0
+_PANIC = "PANIC:"
+_PR_SET_PDEATHSIG = 1
+
+
+def check_binary(binary: Path, kind: str) -> str:
+    """SHA-256, as hex, of an autopilot's program.  Raises FlightError, in one line, for what cannot be run.
+
+    kind: which autopilot it is to be.
+
+    >>> try:
+    ...     check_binary(Path("nobody/arduplane"), "ArduPlane")
+    ... except FlightError as error:
+    ...     print(error)
+    nobody/arduplane: no such file; the program of ArduPlane for software in the loop is expected
+    """
+    if not binary.exists():
+        raise FlightError(
+            f"{binary}: no such file; the program of {kind} for software in the loop is expected", file=binary
+        )
+    if not binary.is_file():
+        raise FlightError(f"{binary}: not a file; the program of {kind} is expected", file=binary)
+    if not os.access(binary, os.X_OK):
+        raise FlightError(f"{binary}: not executable (chmod +x)", file=binary)
+    try:
+        return hashlib.sha256(binary.read_bytes()).hexdigest()
+    except OSError as error:
+        raise FlightError(f"{binary}: cannot be read: {error.strerror}", file=binary) from error
+
+
+@dataclass(frozen=True, slots=True)
+class Launch:
+    """How a program is started.
+
+    arguments: after its name.
+    environment: over that of this process.
+    logs: pattern below its folder of its own log.
+    """
+
+    arguments: tuple[str, ...]
+    environment: Mapping[str, str] = field(default_factory=dict)
+    logs: str = "logs/*.BIN"
+
+
+class AutopilotProcess:
+    """The running program; a context manager, after which neither it, nor what it started, nor its folder is left.
+
+    Where we are killed, a guard sees to the same.
+
+    binary: its file, checked by `check_binary`.
+    prepare: puts what the program needs into its folder, and says how it is started there.
+
+    Raises FlightError where it cannot be started.
+    """
+
+    def __init__(self, binary: Path, prepare: Callable[[Path], Launch]) -> None:
+        self.binary = binary
+        self._place = contextlib.ExitStack()
+        self._ended = False
+        guard = self._place.enter_context(Guard())
+        try:
+            self._folder = self._place.enter_context(temporary_folder("planfly-autopilot-"))
+            guard.keep_folder(self._folder)
+            self._launch = prepare(self._folder)
+            self._process = self._spawn(guard)
+        except BaseException:
+            self._place.close()
+            raise
+
+    def _spawn(self, guard: Guard) -> "subprocess.Popen[bytes]":
+        def begin() -> None:
+            """Have the group guarded before the program runs: told afterwards, we may be killed in between."""
+            # Before this Python gives the signal its default, by which a guard that is gone would end us here.
+            signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+            guard.keep_group(os.getpid())
+            signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+            if sys.platform == "linux":
+                _die_with_parent()
+
+        with (self._folder / _OUTPUT).open("wb") as output:
+            try:
+                return subprocess.Popen(
+                    [str(self.binary.resolve()), *self._launch.arguments],
+                    cwd=self._folder,
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    env=os.environ | self._launch.environment,
+                    # Ctrl-C is ours: we end it in order, and what it started: they are a group of their own.
+                    start_new_session=True,
+                    preexec_fn=begin,
+                )
+            except OSError as error:
+                raise FlightError(
+                    f"{self.binary}: not an executable program: {error.strerror}", file=self.binary
+                ) from error
+
+    def __enter__(self) -> Self:
+        """Return the process itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Kill the program and remove its folder."""
+        self._kill()
+        self._place.close()
+
+    def watch(self) -> None:
+        """Raise FlightError where the program has panicked or ended, with its last words."""
+        panic = self._panic()
+        if panic:
+            raise FlightError(f"panicked: {panic}", file=self.binary)
+        code = self._process.poll()
+        if code is None:
+            return
+        how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        words = self.lines()
+        raise FlightError(how + (f": {words[-1]}" if words else ""), file=self.binary, field="exit code", value=code)
+
+    def end(self, answer: Callable[[], bool]) -> None:
+        """Ask the program to end, so that it closes its log; kill it where it does not.
+
+        answer: serves it a frame of physics meanwhile; false where none was asked for.
+        """
+        if self._signal(signal.SIGTERM):
+            until = time.monotonic() + _GRACE
+            while self._lives() and time.monotonic() < until:
+                if not answer():
+                    time.sleep(0.001)
+        self._kill()
+
+    def keep_log(self, target: Path) -> bool:
+        """Move the program's own log to a file; whether there was one."""
+        logs = sorted(self._folder.glob(self._launch.logs))
+        if not logs:
+            return False
+        with uninterrupted():
+            shutil.move(logs[-1], target)
+        return True
+
+    def _signal(self, number: int) -> bool:
+        """Send the program and what it started a signal, 0 for none; whether any of them is there.
+
+        A group that is gone is sent none again: its number may be another's by then.
+        """
+        if not self._ended:
+            try:
+                os.killpg(self._process.pid, number)
+            except ProcessLookupError:
+                self._ended = True
+        return not self._ended
+
+    def _lives(self) -> bool:
+        """Whether the program, or what it started, goes on; one that has ended but was not waited for does not."""
+        self._process.poll()
+        return self._signal(0)
+
+    def _kill(self) -> None:
+        if self._lives():
+            self._signal(signal.SIGKILL)
+        self._process.wait()
+
+    def lines(self) -> list[str]:
+        """What it has printed, without what is blank."""
+        try:
+            text = (self._folder / _OUTPUT).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return []
+        return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+
+    def _panic(self) -> str:
+        return next((line.partition(_PANIC)[2].strip() for line in self.lines() if _PANIC in line), "")
+
+
+def _die_with_parent() -> None:
+    """Have the kernel kill the program when we are killed."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -1,0 +1,143 @@
+"""Which servo output of an autopilot moves what on an aircraft, and how far: its folder's `ardupilot.toml`."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from aircraft.catalog import Aircraft
+from flight.dynamics.state import Commands
+from world.errors import FlightError
+from world.files import read_toml
+
+SERVO_FILE = "ardupilot.toml"
+# What each control is to ArduPilot: SERVOn_FUNCTION (its parameter reference).
+FUNCTIONS = {"elevator": 19, "aileron": 4, "rudder": 21, "throttle": 70}
+# Its values carry this unit, and this takes them to SI.
+_UNITS = {"elevator": "deg", "aileron": "deg", "rudder": "deg", "throttle": ""}
+_SERVO_OUTPUTS = 32
+
+
+@dataclass(frozen=True, slots=True)
+class ServoOutput:
+    """One control's servo: the value is linear in the pulse between its knots, and stays beyond them.
+
+    number: of the output, from 1.
+    pulses: (k,) microseconds, increasing.
+    values: (k,) the control at these pulses: rad as `flight.dynamics.state.Commands` has them, or 0..1 of the throttle.
+    """
+
+    number: int
+    pulses: tuple[float, ...]
+    values: tuple[float, ...]
+
+    @property
+    def rest(self) -> float:
+        """Pulse in the middle of the throw: of the knot whose value is nearest to zero."""
+        return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
+
+    def value(self, pulse: float) -> float:
+        """The control at a pulse, microseconds; at rest where there is none (0).
+
+        >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).value(1700)
+        -0.25
+        """
+        if pulse <= 0.0:
+            pulse = self.rest
+        pulses, values = self.pulses, self.values
+        if pulse <= pulses[0]:
+            return values[0]
+        for k in range(1, len(pulses)):
+            if pulse < pulses[k]:
+                share = (pulse - pulses[k - 1]) / (pulses[k] - pulses[k - 1])
+                return values[k - 1] + share * (values[k] - values[k - 1])
+        return values[-1]
+
+    def at_share(self, share: float) -> float:
+        """The control at a share of the throw, -1..1: 0 is the middle, and each end is as far as its pulse goes.
+
+        >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).at_share(0.5)
+        -0.25
+        """
+        rest = self.rest if len(self.pulses) > 2 else 0.5 * (self.pulses[0] + self.pulses[-1])
+        return self.value(rest + share * (self.pulses[-1] - rest if share > 0.0 else rest - self.pulses[0]))
+
+
+@dataclass(frozen=True, slots=True)
+class ServoMap:
+    """The servos of the four controls."""
+
+    elevator: ServoOutput
+    aileron: ServoOutput
+    rudder: ServoOutput
+    throttle: ServoOutput
+
+    def commands(self, pulses: Sequence[int]) -> Commands:
+        """The controls that an autopilot's pulses (outputs,) ask for, microseconds."""
+        elevator, aileron, rudder, throttle = self.elevator, self.aileron, self.rudder, self.throttle
+        return Commands(
+            elevator.value(pulses[elevator.number - 1]),
+            aileron.value(pulses[aileron.number - 1]),
+            rudder.value(pulses[rudder.number - 1]),
+            throttle.value(pulses[throttle.number - 1]),
+        )
+
+    def parameters(self) -> dict[str, float]:
+        """ArduPilot's parameters that make its outputs these."""
+        found: dict[str, float] = {}
+        for name, function in FUNCTIONS.items():
+            output: ServoOutput = getattr(self, name)
+            prefix = f"SERVO{output.number}_"
+            found[f"{prefix}FUNCTION"] = float(function)
+            found[f"{prefix}MIN"], found[f"{prefix}MAX"] = output.pulses[0], output.pulses[-1]
+            found[f"{prefix}TRIM"] = output.rest
+        return found
+
+
+def load_servo_map(aircraft: Aircraft) -> ServoMap:
+    """Read an aircraft's servos.  Raises FlightError, in one line, for a missing, unknown or bad entry.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> servos = load_servo_map(load_aircraft("aerosonde"))
+    >>> servos.throttle.number, servos.throttle.value(1500)
+    (3, 0.5)
+    """
+    file = aircraft.folder / SERVO_FILE
+    try:
+        table = read_toml(file, "servos")
+    except OSError as error:
+        raise FlightError(
+            f"{file}: {error.strerror}: a real autopilot needs to know which servo moves what on {aircraft.name}",
+            file=file,
+        ) from error
+    except ValueError as error:
+        raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from error
+    if set(table) != set(FUNCTIONS):
+        raise FlightError(f"{file}: tables {', '.join(sorted(table))}: {', '.join(FUNCTIONS)} are expected", file=file)
+    try:
+        outputs = {name: _output(name, entry) for name, entry in table.items()}
+    except ValueError as error:
+        raise FlightError(f"{file}: {error}", file=file) from None
+    return ServoMap(**outputs)
+
+
+def _output(name: str, entry: Any) -> ServoOutput:
+    unit = _UNITS[name]
+    key = f"value_{unit}" if unit else "value"
+    if not isinstance(entry, dict) or set(entry) != {"output", "pulse_us", key}:
+        raise ValueError(f"{name}: keys output, pulse_us and {key} are expected")
+    number, pulses, values = entry["output"], entry["pulse_us"], entry[key]
+    if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _SERVO_OUTPUTS:
+        raise ValueError(f"{name}.output = {number!r}: allowed 1..{_SERVO_OUTPUTS}")
+    for label, numbers in (("pulse_us", pulses), (key, values)):
+        if not (isinstance(numbers, list) and len(numbers) >= 2 and all(map(_is_number, numbers))):
+            raise ValueError(f"{name}.{label} = {numbers!r}: two finite numbers or more are expected")
+    if len(pulses) != len(values) or any(b <= a for a, b in pairwise(pulses)):
+        raise ValueError(f"{name}.pulse_us = {pulses!r}: increasing, and as many as {key}, are expected")
+    factor = math.radians(1.0) if unit else 1.0
+    return ServoOutput(number, tuple(map(float, pulses)), tuple(factor * value for value in values))
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
