@@ -1,4 +1,4 @@
-"""Autopilots that tests fly with: a fake of ours as a program, and the real ArduPlane where there is one."""
+"""Autopilots that tests fly with: fakes of ours as programs, and the real ArduPlane and PX4 where there are any."""
 
 import os
 import shlex
@@ -7,13 +7,26 @@ from pathlib import Path
 
 import pytest
 
-_FAKE = Path(__file__).parent / "flight" / "autopilots" / "arduplane_sitl" / "fake_autopilot.py"
+_AUTOPILOTS = Path(__file__).parent / "flight" / "autopilots"
+_FAKE = _AUTOPILOTS / "arduplane_sitl" / "fake_autopilot.py"
+_FAKE_PX4 = _AUTOPILOTS / "px4_sitl" / "fake_px4.py"
 
 
 def write_fake(folder: Path, fault: str = "none") -> Path:
     """Write a program that fails in one way of the fake autopilot's `FAULTS`; its path."""
-    program = folder / f"autopilot-{fault}"
-    program.write_text(f'#!/bin/sh\nexec {shlex.join([sys.executable, str(_FAKE), fault])} "$@"\n', encoding="utf-8")
+    return _write_program(folder / f"autopilot-{fault}", _FAKE, fault)
+
+
+def write_fake_px4(folder: Path, fault: str = "none") -> Path:
+    """Write a program that fails in one way of the fake PX4's `FAULTS`, with start-up files beside it; its path."""
+    script = folder / "etc" / "init.d-posix" / "rcS"
+    script.parent.mkdir(parents=True, exist_ok=True)
+    script.write_text("#!/bin/sh\n", encoding="utf-8")
+    return _write_program(folder / f"px4-{fault}", _FAKE_PX4, fault)
+
+
+def _write_program(program: Path, fake: Path, fault: str) -> Path:
+    program.write_text(f'#!/bin/sh\nexec {shlex.join([sys.executable, str(fake), fault])} "$@"\n', encoding="utf-8")
     program.chmod(0o755)
     return program
 
@@ -26,8 +39,17 @@ def find_arduplane() -> Path | None:
 
 def need_arduplane() -> Path:
     """The program of a real ArduPlane; a test without one is skipped, in CI too, and a path to nothing fails it."""
-    program = find_arduplane()
+    return _needed(find_arduplane(), "PLANFLY_ARDUPLANE", "an ArduPlane")
+
+
+def need_px4() -> Path:
+    """The program of a real PX4 that ``PLANFLY_PX4`` names, as `need_arduplane` has it."""
+    named = os.environ.get("PLANFLY_PX4")
+    return _needed(Path(named) if named else None, "PLANFLY_PX4", "a PX4")
+
+
+def _needed(program: Path | None, variable: str, kind: str) -> Path:
     if program is None:
-        pytest.skip("PLANFLY_ARDUPLANE names no ArduPlane (a program built for software in the loop)")
-    assert program.is_file(), f"PLANFLY_ARDUPLANE: {program}: no such file"
+        pytest.skip(f"{variable} does not name {kind} (a program built for software in the loop)")
+    assert program.is_file(), f"{variable}: {program}: no such file"
     return program

@@ -272,6 +272,9 @@ class HilLockstep(Lockstep):
         self._sensors = Sensors(home)
         self._before: BodyMotion | None = None
         self._answered = 0
+        # The last answer, and whether a step was taken since.
+        self._last: tuple[float, ...] = (0.0,) * 4
+        self._owes = False
 
     @property
     def _running(self) -> bool:
@@ -279,12 +282,17 @@ class HilLockstep(Lockstep):
         return self._answered >= _IN_A_ROW
 
     def _outputs(self) -> tuple[float, ...]:
-        """The answer to the last step; nothing where there is none yet."""
-        if self._running:
-            return self._port.awaited_answer()
-        answer = self._port.answer(_FIRST_ANSWER)
-        self._answered = 0 if answer is None else self._answered + 1
-        return answer or (0.0,) * 4
+        """The answer to the last step; zeros where there is none yet."""
+        if self._owes:
+            answer = self._port.awaited_answer() if self._running else self._port.answer(_FIRST_ANSWER)
+            self._answered = 0 if answer is None else self._answered + 1
+            self._last, self._owes = answer or self._last, False
+        return self._last
+
+    def _send(self, *messages: Any) -> None:
+        """Have it step."""
+        self._port.send(*messages)
+        self._owes = True
 
     def boot(self, rail: RailEnd, started: Callable[[], bool], patience: float, seconds: float) -> None:
         """Have PX4 start with its clock standing still: a step only where it waits for one.
@@ -301,7 +309,7 @@ class HilLockstep(Lockstep):
                 self.hold(rail)
 
     def _take(self) -> Commands:
-        outputs = (0.0,) * 4 if self._before is None else self._outputs()
+        outputs = self._outputs()
         servos = self._servos
         return Commands(
             servos.elevator.at_share(outputs[ELEVATOR]),
@@ -314,9 +322,9 @@ class HilLockstep(Lockstep):
         after = BodyMotion(*motion)
         before = self._before or after._replace(time=after.time - 1.0 / FRAME_HZ)
         self._before = after
-        self._port.send(self._sensors.measured(between(before, after)))
+        self._send(self._sensors.measured(between(before, after)))
         self._outputs()
         now = [self._sensors.measured(after)]
         if self._frame % _FIX_FRAMES == 0:
             now.append(self._sensors.fix(after))
-        self._port.send(*now)
+        self._send(*now)

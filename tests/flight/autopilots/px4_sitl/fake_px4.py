@@ -101,7 +101,7 @@ class FakePx4(Fake):
     def sense(self, sensed: Any, time: float) -> None:
         """Attitude by the gyro from the accelerometer's at rest; everything else as it is told."""
         dt, self.before = time - self.before, time
-        if not self.armed:
+        if not self.armed and self.auto_since == math.inf:
             self.roll = math.atan2(-sensed.yacc, -sensed.zacc)
             self.pitch = math.atan2(sensed.xacc, math.hypot(sensed.yacc, sensed.zacc))
             # At rest nobody flies level with an elevator: forces are gravity's alone.
@@ -182,7 +182,7 @@ class FakePx4(Fake):
                 result = mavlink.MAV_RESULT_DENIED
             else:
                 self.mode = mode
-                self.auto_since = time if mode == MISSION else math.inf
+                self.auto_since = time if mode == MISSION else self.auto_since
         elif message.command == mavlink.MAV_CMD_REQUEST_MESSAGE:
             version = [0] * 8
             self.send(
