@@ -191,7 +191,7 @@ def fly_and_judge(
     """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
-    autopilot: the program of ArduPlane (SITL) or another autopilot, which then flies; its own log is kept beside ours.
+    autopilot: the program of ArduPlane or PX4, which then flies; its own log is kept beside ours.
     off_nominal: how the flight differs from what guidance knows; none of a program's.
     reference: whether the flights below are flown; whether it is flyable does not depend on them.
     limits: how long it may fly, and how large its log may grow.

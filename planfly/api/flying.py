@@ -56,7 +56,7 @@ class FlownMission:
     ended: how it ended, "completed" or the reason why not.
     events: what the log holds beside the rows.
     log: the file that it is recorded in; None where none was asked for, or nothing flown.
-    autopilot_log: ArduPilot SITL's own log beside it, if it flew.
+    autopilot_log: the log of the autopilot's program beside it, if one flew.
     """
 
     setup: FlightSetup
@@ -198,7 +198,7 @@ def fly(
     terrain: an elevation file in place of the scenario's.  fence: files of fences and zones beside its own.
     seed: of the turbulence; None takes the plan's, the scenario's, or 1.
     wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: as of `planfly.plan`.
-    autopilot: the program of ArduPilot SITL, which then flies.
+    autopilot: the program of ArduPlane or PX4, which then flies.
     log_hz: rows a second in the log.  max_hours, max_log: where a flight ends that would go on, h and MB.
 
     A plan that cannot be flown is a verdict, not an error; bad input raises a `planfly.PlanflyError`.

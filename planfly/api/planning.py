@@ -104,7 +104,7 @@ def changed_scenario(
     """A scenario in other weather, or flown otherwise; None keeps what it has.
 
     wind: speed, m/s, and where it comes from, degrees.  aircraft: a name, or a folder.  airspeed: m/s.
-    params: a file of the autopilot's parameters.  autopilot_law: whose law flies.  autopilot: an ArduPlane's program.
+    params: a file of the autopilot's parameters.  autopilot_law: whose law flies.  autopilot: an autopilot's program.
     Raises ScenarioError for what a scenario file may not have either.
 
     >>> changed = changed_scenario(load_scenario("tight"), wind=(8.0, 270.0), airspeed=28.0)

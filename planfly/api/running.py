@@ -92,7 +92,7 @@ class _Task:
     airframe: its aircraft.
     command: the line that repeats it, for the report.
     folder: where the results go.
-    program: of ArduPilot SITL, None for planfly's own simulation.
+    program: of an autopilot, None for planfly's own simulation.
     limits: how long it may fly, and how large its log may grow.
     every: of so many rows one goes into the log.
     """

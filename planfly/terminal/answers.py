@@ -534,7 +534,7 @@ class FlyAnswer:
     log: str | None
     """The flight log, null where nothing was flown."""
     autopilot_log: str | None
-    """ArduPilot SITL's own."""
+    """The program's own."""
     warnings: list[str]
     verdict: VerdictDocument
 

@@ -197,7 +197,8 @@ def flight_options(parser: CommandParser) -> None:
     steering_options(parser).add_argument(
         "--autopilot",
         metavar="PATH",
-        help="fly ArduPilot SITL in planfly's physics: the path of the arduplane program (extra planfly[live])",
+        help="fly ArduPlane or PX4 itself in planfly's physics: the path of its program, built for software in the"
+        " loop (extra planfly[live])",
     )
     limits = parser.group("limits of the flight")
     limits.add_argument(

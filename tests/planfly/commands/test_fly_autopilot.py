@@ -12,7 +12,7 @@ import pytest
 
 from logs.recording.reader import read_log
 from planfly.cli import main
-from tests.autopilots import need_arduplane, write_fake
+from tests.autopilots import need_arduplane, write_fake, write_fake_px4
 from tests.soak import some
 
 ROOT = Path(__file__).parents[3]
@@ -52,6 +52,28 @@ def test_a_flight_is_logged_judged_and_judged_again(
     assert main(["check", str(log), "--json", str(again)]) == code
     assert json.loads(again.read_text(encoding="utf-8")) == recorded.recorded_verdict
     assert recorded.recorded_verdict["flown_by"]["changed"] == {"NAVL1_PERIOD": 17.0, "ROLL_LIMIT_DEG": 35.0}
+
+
+def test_a_program_with_px4s_start_up_files_is_flown_as_px4(
+    mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whatever law the scenario names."""
+    params, log = tmp_path / "mine.params", tmp_path / "f.mcap"
+    params.write_text("1\t1\tFW_R_LIM\t35.0\t9\n1\t1\tBAT1_N_CELLS\t3\t6\n", encoding="utf-8")
+    program = write_fake_px4(tmp_path)
+    code = main(["fly", str(mission), "--autopilot", str(program), "--params", str(params), "--log", str(log)])
+    printed = capsys.readouterr().out
+    assert "Flown by: PX4 1.16.0 (sha256 " in printed
+    assert "changed: FW_R_LIM 35" in printed
+    assert f"{tmp_path / 'f.ulg'} (the autopilot's own)" in printed
+    assert (tmp_path / "f.ulg").read_bytes() == b"ULogfake"
+    recorded = read_log(log)
+    assert recorded.ended == "completed"
+    assert recorded.setup.autopilot.name == "px4"
+    assert recorded.setup.autopilot.version == "PX4 1.16.0"
+    assert recorded.setup.autopilot.program is not None
+    assert recorded.setup.autopilot.program.unused == ("BAT1_N_CELLS",)
+    assert main(["check", str(log)]) == code
 
 
 FAULTS = [

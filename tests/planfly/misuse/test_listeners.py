@@ -11,8 +11,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from flight.autopilots.arduplane_sitl.link import AutopilotLink
 from flight.autopilots.arduplane_sitl.physics import PhysicsPort
+from flight.autopilots.px4_sitl.physics import SimulatorPort
+from flight.autopilots.sitl.link import TcpLink, UdpLink
 from logs.recording.example_log import write_example_log
 from planfly.campaigns.worker_pool import Workers, child_processes, child_start_method, connected
 from planfly.cli import main
@@ -26,10 +27,10 @@ PAGE = ROOT / "docs" / "network-security.md"
 # What opens a socket, in a source; and the files that may, with the commands of the table whose listeners they hold.
 OPENS = re.compile(r"socket\.socket\(|create_server\(|start_server\(|\.LocalCluster\(|HTTPServer\(|Listener\(")
 HOLD = {
-    "flight/autopilots/arduplane_sitl/link.py": "`fly`, `run` with `--autopilot`",
     "flight/autopilots/arduplane_sitl/physics.py": "`fly`, `run` with `--autopilot`",
-    # Asks the system for ports that are free, and closes them.
-    "flight/autopilots/arduplane_sitl/process.py": "`fly`, `run` with `--autopilot`",
+    "flight/autopilots/px4_sitl/physics.py": "`fly`, `run` with `--autopilot ./px4`",
+    # Of both; it also asks the system for ports that are free, and closes them.
+    "flight/autopilots/sitl/link.py": "`fly`, `run` with `--autopilot`",
     "flight/live/link.py": "`serve`",
     # Looks at the sockets that its process was given.
     "planfly/campaigns/fork_server.py": "`campaign`, `winds`",
@@ -94,11 +95,15 @@ def test_a_replay(tmp_path: Path, command: str) -> None:
             process.kill()
 
 
-def test_an_autopilot() -> None:
+@pytest.mark.parametrize(
+    ("command", "sockets"),
+    [("--autopilot", (PhysicsPort, TcpLink)), ("--autopilot ./px4", (SimulatorPort, UdpLink))],
+)
+def test_an_autopilot(command: str, sockets: tuple[type[PhysicsPort | SimulatorPort], type[TcpLink | UdpLink]]) -> None:
     before = listening(psutil.Process().pid)
-    physics, link = PhysicsPort(), AutopilotLink()
+    physics, link = (opened() for opened in sockets)
     try:
-        assert listening(psutil.Process().pid) - before == table()["`fly`, `run` with `--autopilot`"]
+        assert listening(psutil.Process().pid) - before == table()[f"`fly`, `run` with `{command}`"]
     finally:
         physics.close()
         link.close()
