@@ -51,7 +51,7 @@ def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
 
     >>> north, east, down = earth_field(47.4, 8.5)
     >>> round(north, 2), abs(east) < 0.03, round(down, 2)
-    (0.21, True, 0.43)
+    (0.22, True, 0.43)
     """
     declination, inclination, strength = mavextra.get_mag_field_ef(lat_deg, lon_deg)
     declination, inclination = math.radians(declination), math.radians(inclination)
