@@ -158,6 +158,7 @@ class SimulatorPort:
         self._mav = mavlink.MAVLink(None, 1, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._mav.robust_parsing = True
         self._answers: list[tuple[float, ...]] = []
+        self._wait = 0.0
         # A sleeping laptop is no silence.
         self._clock = RunningClock()
 
@@ -179,6 +180,7 @@ class SimulatorPort:
                 if self._clock() - began > seconds:
                     message = f"did not connect to the simulator within {seconds:.0f} s"
                     raise FlightError(message, field="simulator") from None
+        self._stream.setblocking(True)
         self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def send(self, *messages: Any) -> None:
@@ -197,13 +199,13 @@ class SimulatorPort:
 
         Raises FlightError for a program that ends.
         """
-        began = self._clock()
-        while not self._answers:
-            left = patience - (self._clock() - began)
-            if left <= 0.0 or not self._read(min(left, _LOOK)):
-                self.watch()
-            if left <= 0.0:
-                return None
+        if not self._answers and not (self._read(patience) and self._answers):
+            began = self._clock()
+            while not self._answers:
+                if not self._read(patience):
+                    self.watch()
+                    if patience <= _LOOK or self._clock() - began > patience:
+                        return None
         return self._answers.pop(0)
 
     def awaited_answer(self) -> tuple[float, ...]:
@@ -214,13 +216,17 @@ class SimulatorPort:
         return answer
 
     def _read(self, patience: float) -> bool:
-        """Take in what comes within so many seconds; whether anything did."""
+        """Take in what comes within so many seconds, or `_LOOK` if that is less; whether anything did."""
         if self._stream is None:
             raise ValueError("PX4 has not connected")
-        self._stream.settimeout(patience)
+        wait = min(patience, _LOOK)
+        if wait != self._wait:
+            # The kernel's own timeout: one system call an answer.
+            self._wait = wait
+            self._stream.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("@ll", 0, round(wait * 1e6)))
         try:
             data = self._stream.recv(_LARGEST)
-        except (TimeoutError, ConnectionResetError):
+        except (BlockingIOError, ConnectionResetError):
             return False
         if not data:
             # Closed by the other side: it is ending.
