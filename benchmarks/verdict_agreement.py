@@ -1,27 +1,28 @@
-"""The verdict by ArduPlane's law against the verdict on ArduPlane's own flight of the same mission.
+"""The verdict by an autopilot's law against the verdict on the autopilot's own flight of the same mission.
 
-``python -m benchmarks.verdict_agreement [--missions N] [--from SEED] [--json FILE]`` makes missions that keep one
-limit by a little, or exceed it (`tests.field_missions.close_mission`), flies each by the law, with satellites'
-errors, and with the program that PLANFLY_ARDUPLANE names, both in the same air, judges both flights by the same rules,
-and counts where the answers differ.  ``--ordinary N`` instead flies ordinary missions by the law alone, and counts
-which of them it calls not flyable.
+``python -m benchmarks.verdict_agreement [--law LAW] [--missions N] [--from SEED] [--json FILE]`` makes missions that
+keep one limit by a little, or exceed it (`tests.field_missions.close_mission`), flies each by the law, with satellites'
+errors, and with the program that PLANFLY_ARDUPLANE (or PLANFLY_PX4) names, both in the same air, judges both flights by
+the same rules, and counts where the answers differ.  ``--ordinary N`` instead flies ordinary missions by the law alone,
+and counts which of them it calls not flyable.
 """
 
 import argparse
 import json
+import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.against_arduplane import BINARY
-from flight.autopilots.arduplane_sitl.flight import fly_autopilot
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import Airframe, load_airframe
-from planfly.pipeline import make_setup
+from planfly.api.planning import flight_entries
+from planfly.arguments import CHOICES
+from planfly.pipeline import fly_and_judge, make_setup
 from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
 
 # By so much at least clearance is lost, or a sphere entered, to count as grave, m.
@@ -57,21 +58,22 @@ def by_law(made: FieldMission) -> tuple[Verdict, float]:
     return judge_flight(setup, flown.track, flown.ended), float(flown.track.energy[-1])
 
 
-def by_program(made: FieldMission) -> tuple[Verdict, bool]:
+def by_program(made: FieldMission, program: Path) -> tuple[Verdict, bool]:
     """Verdict on the program's flight, and whether it lost clearance or entered a sphere by more than `GRAVE`."""
     setup, airframe = setup_of(made)
-    flown, setup = fly_autopilot(setup, airframe.aircraft, BINARY)
+    flown = fly_and_judge(setup, airframe, None, autopilot=program)
     threats, position = made.scenario.threats, flown.track.position
     away = np.sqrt(((position[:, None] - threats.position[None]) ** 2).sum(axis=2)) - threats.kill_radius
     least = made.scenario.limits.min_clearance_m - GRAVE
     low = float(position[:, 2].min()) - GROUND < least
-    return judge_flight(setup, flown.track, flown.ended), low or bool((away < -GRAVE).any())
+    return flown.verdict, low or bool((away < -GRAVE).any())
 
 
-def compare(seed: int) -> Answer:
+def compare(seed: int, law_name: str, program: Path) -> Answer:
     """Fly the mission of a seed by both."""
-    made = close_mission(seed, energy=lambda ordinary: by_law(ordinary)[1])
-    (law, _), (real, lost) = by_law(made), by_program(made)
+    flight = {name: value for name, value in flight_entries(autopilot_law=law_name).items() if value is not None}
+    made = close_mission(seed, energy=lambda ordinary: by_law(ordinary)[1], **flight)
+    (law, _), (real, lost) = by_law(made), by_program(made, program)
     agree = law.flyable == real.flyable
     return Answer(made.name, law.headline, real.headline, agree, law.flyable and lost)
 
@@ -79,6 +81,9 @@ def compare(seed: int) -> Answer:
 def main() -> None:
     """Fly, print, and sum up."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.verdict_agreement")
+    parser.add_argument(
+        "--law", choices=CHOICES["autopilot_law"], default="ardupilot", help="compared with its program"
+    )
     parser.add_argument("--missions", type=int, default=100)
     parser.add_argument("--from", dest="first", type=int, default=0, help="seed of the first mission")
     parser.add_argument("--ordinary", type=int, help="so many ordinary missions, by the law alone")
@@ -87,9 +92,10 @@ def main() -> None:
     if args.ordinary is not None:
         _ordinary(args.first, args.ordinary)
         return
+    program = Path(os.environ["PLANFLY_PX4" if args.law.startswith("px4") else "PLANFLY_ARDUPLANE"])
     answers = []
     for seed in range(args.first, args.first + args.missions):
-        answers.append(compare(seed))
+        answers.append(compare(seed, args.law, program))
         one = answers[-1]
         print(f"{one.name:14s} {'same' if one.agree else 'DIFFER'}  law: {one.law}  real: {one.real}", flush=True)
     print(

@@ -1,8 +1,9 @@
-"""Default plans on three terrains, flown by ArduPlane's law or by the program itself: what harm comes of it.
+"""Default plans on three terrains, flown by an autopilot's law or by the program itself: what harm comes of it.
 
-``python -m benchmarks.planned_for_ardupilot [--plans N] [--from NUMBER] [--autopilot PATH]`` plans random scenarios
-(`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, satellites' errors), flies each, and prints
-the margins that the certificate promised and that the flight kept, and in the end how many came to harm.
+``python -m benchmarks.planned_for_autopilots [--law LAW] [--plans N] [--from NUMBER] [--autopilot PATH]`` plans random
+scenarios (`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, satellites' errors) for a law,
+flies each, and prints the margins that the certificate promised and that the flight kept, and in the end how many came
+to harm, with moderate turbulence by itself.
 """
 
 import argparse
@@ -12,8 +13,11 @@ from pathlib import Path
 
 from flight.mission.from_plan import plan_mission
 from planfly.airframe import load_airframe
+from planfly.api.planning import flight_entries
+from planfly.arguments import CHOICES
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from tests.autopilot_plans import CLEARANCE, Harm, harm_of, plan_scenario
+from world.scenario import with_flight
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,16 +27,17 @@ class Flown:
     wrong: str
     harm: Harm | None
     longer: float
+    turbulence: str
 
 
-def fly(number: int, autopilot: Path | None) -> Flown:
+def fly(number: int, law: str, autopilot: Path | None) -> Flown:
     """Plan and fly the scenario of this number, and print a line about it."""
-    scenario = plan_scenario(number)
+    scenario = with_flight(plan_scenario(number), **flight_entries(autopilot_law=law))
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, number + 1)
     if not plan.safe:
         print(f"{scenario.name:10s} no plan: {'; '.join(plan.certificate.problems[:2])}", flush=True)
-        return Flown("no plan", None, math.nan)
+        return Flown("no plan", None, math.nan, scenario.wind.turbulence)
     exact = replace(airframe, limits=replace(airframe.limits, tracking=None))
     longer = float(plan.objectives[0] / make_plan(scenario, exact, number + 1).objectives[0])
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
@@ -49,21 +54,25 @@ def fly(number: int, autopilot: Path | None) -> Flown:
         f" spheres {promised.kill_distance:7.1f} {harm.sphere:7.1f} off the legs {harm.aside:5.1f}  {wrong}",
         flush=True,
     )
-    return Flown(wrong, harm, longer)
+    return Flown(wrong, harm, longer, wind.turbulence)
 
 
 def main() -> None:
     """Fly, print, and sum up."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.planned_for_ardupilot")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.planned_for_autopilots")
+    parser.add_argument(
+        "--law", choices=CHOICES["autopilot_law"], default="ardupilot", help="planned for, and flown by"
+    )
     parser.add_argument("--plans", type=int, default=100)
     parser.add_argument("--from", dest="first", type=int, default=0, help="number of the first scenario")
-    parser.add_argument("--autopilot", type=Path, help="the program of a real ArduPlane (default: its law)")
+    parser.add_argument("--autopilot", type=Path, help="the program of the autopilot itself (default: its law)")
     args = parser.parse_args()
-    flown = [fly(number, args.autopilot) for number in range(args.first, args.first + args.plans)]
+    flown = [fly(number, args.law, args.autopilot) for number in range(args.first, args.first + args.plans)]
     made = [one for one in flown if one.harm is not None]
     longer = sorted(one.longer for one in made)
     print(
-        f"{len(made)} of {len(flown)} planned, {sum(one.wrong != '' for one in made)} came to harm;"
+        f"{len(made)} of {len(flown)} planned, {sum(one.wrong != '' for one in made)} not flyable,"
+        f" of those in moderate turbulence {sum(one.wrong != '' for one in made if one.turbulence == 'moderate')};"
         f" least clearance margin {min(one.harm.clearance for one in made if one.harm) - CLEARANCE:.1f} m,"
         f" least distance to a sphere {min(one.harm.sphere for one in made if one.harm):.1f} m;"
         f" plans longer by the reserve: median {longer[len(longer) // 2]:.4f}, most {longer[-1]:.4f}"
