@@ -13,21 +13,31 @@ from types import TracebackType
 from typing import Self
 
 # It reads what it is told until the line "done" or, where we are gone, the end; it then kills the group, first so that
-# nothing is written any more, and removes the folder.
+# nothing is written any more, and removes the folder and the files.
 _GUARD = """
 import os, shutil, signal, sys, time
-group, folder = 0, ""
+group, folder, files = 0, "", []
 for line in sys.stdin:
     word, _, value = line.rstrip("\\n").partition(" ")
     if word == "done":
         sys.exit()
-    group, folder = (int(value), folder) if word == "group" else (group, value)
+    if word == "group":
+        group = int(value)
+    elif word == "folder":
+        folder = value
+    else:
+        files.append(value)
 for _ in range(100):
     if group:
         try:
             os.killpg(group, signal.SIGKILL)
         except OSError:
             group = 0
+    for file in files:
+        try:
+            os.remove(file)
+        except OSError:
+            pass
     if not folder or not os.path.lexists(folder):
         break
     shutil.rmtree(folder, ignore_errors=True)
@@ -59,6 +69,10 @@ class Guard:
     def keep_folder(self, folder: Path) -> None:
         """Guard a folder, whose name has no line break."""
         self._tell(f"folder {folder}")
+
+    def keep_file(self, file: Path) -> None:
+        """Guard a file that may come to be there, whose name has no line break."""
+        self._tell(f"file {file}")
 
     def keep_group(self, group: int) -> None:
         """Guard a process group."""

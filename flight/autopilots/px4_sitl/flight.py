@@ -13,7 +13,7 @@ from flight.autopilots.px4_sitl.autopilot import Px4Sitl
 from flight.autopilots.px4_sitl.parameters import GivenParameters, given_parameters
 from flight.autopilots.px4_sitl.physics import HilLockstep, SimulatorPort
 from flight.autopilots.px4_sitl.preflight import Px4Preflight, version_text
-from flight.autopilots.px4_sitl.process import STARTED, px4_launch, remove_left
+from flight.autopilots.px4_sitl.process import STARTED, px4_launch
 from flight.autopilots.sitl.exchange import FRAME_HZ
 from flight.autopilots.sitl.flight import SitlFlight
 from flight.autopilots.sitl.link import AutopilotLink, UdpLink
@@ -56,7 +56,6 @@ class Px4Flight(SitlFlight):
             port = stack.enter_context(contextlib.closing(SimulatorPort()))
             link = stack.enter_context(contextlib.closing(UdpLink()))
             self._link = link
-            stack.callback(remove_left, port.port)
             launch = px4_launch(binary, given.given, port.port, link.theirs, link.port)
             process = stack.enter_context(AutopilotProcess(binary, launch))
             self._process, port.watch = process, process.watch

@@ -13,8 +13,8 @@ from world.errors import FlightError
 _AIRFRAME = 22000
 # Its start-up script's last words.
 STARTED = "Startup script returned successfully"
-# What it puts into the folder of temporary files of all, named by its instance.
-_LEFT = ("px4_lock-", "px4-sock-")
+# What it puts into the system's folder of temporary files, whichever is set, named by its instance.
+_TEMPORARY, _LEFT = Path("/tmp"), ("px4_lock-", "px4-sock-")
 
 
 def px4_launch(
@@ -46,7 +46,8 @@ def px4_launch(
         _write(scripts / "px4-rc.mavlink", f"mavlink start -x -u {own_port} -o {link_port} -t {LOOPBACK} -r 4000000 -f")
         # Of several instances on a machine each has a number; a port is nobody else's.
         environment = {"PX4_SYS_AUTOSTART": str(_AIRFRAME), "PX4_SIM_MODEL": "planfly"}
-        return Launch(("-d", "-i", str(simulator_port), "-w", str(folder)), environment, "log/**/*.ulg")
+        leaves = tuple(_TEMPORARY / f"{name}{simulator_port}" for name in _LEFT)
+        return Launch(("-d", "-i", str(simulator_port), "-w", str(folder)), environment, "log/**/*.ulg", leaves)
 
     return prepare
 
@@ -54,9 +55,3 @@ def px4_launch(
 def _write(file: Path, *lines: str) -> None:
     file.parent.mkdir(exist_ok=True)
     file.write_text("\n".join(("#!/bin/sh", *lines, "")), encoding="utf-8")
-
-
-def remove_left(simulator_port: int, temporary: Path = Path("/tmp")) -> None:
-    """Remove what a program that has ended leaves outside its folder."""
-    for name in _LEFT:
-        (temporary / f"{name}{simulator_port}").unlink(missing_ok=True)

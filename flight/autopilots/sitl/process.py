@@ -58,11 +58,13 @@ class Launch:
     arguments: after its name.
     environment: over that of this process.
     logs: pattern below its folder of its own log.
+    leaves: files outside of that folder that it makes and leaves.
     """
 
     arguments: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict)
     logs: str = "logs/*.BIN"
+    leaves: tuple[Path, ...] = ()
 
 
 class AutopilotProcess:
@@ -85,6 +87,9 @@ class AutopilotProcess:
             self._folder = self._place.enter_context(temporary_folder("planfly-autopilot-"))
             guard.keep_folder(self._folder)
             self._launch = prepare(self._folder)
+            for file in self._launch.leaves:
+                guard.keep_file(file)
+                self._place.callback(file.unlink, missing_ok=True)
             self._process = self._spawn(guard)
         except BaseException:
             self._place.close()

@@ -29,14 +29,18 @@ def test_where_its_owner_is_gone_it_ends_the_group_and_removes_the_folder(tmp_pa
     folder, group = tmp_path / "folder", group_of_two(tmp_path)
     (folder / "logs").mkdir(parents=True)
     (folder / "logs" / "1.BIN").write_text("log")
+    (tmp_path / "lock").touch()
     guard = Guard()
     guard.keep_folder(folder)
+    guard.keep_file(tmp_path / "lock")
+    guard.keep_file(tmp_path / "never made")
     guard.keep_group(group.pid)
     # As the system does for an owner that was killed.
     guard._words.close()
     assert group.wait(20.0) == -signal.SIGKILL
     guard._process.wait(20.0)
     assert not folder.exists()
+    assert not (tmp_path / "lock").exists()
 
 
 def test_a_guard_that_is_gone_harms_nobody(tmp_path: Path) -> None:

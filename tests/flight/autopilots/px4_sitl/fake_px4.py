@@ -199,6 +199,8 @@ def main() -> None:
         parser.add_argument(option)
     parser.add_argument("-d", action="store_true")
     args = parser.parse_args()
+    # As PX4 does, and leaves it.
+    Path(f"/tmp/px4_lock-{args.i}").touch()
     FakePx4(args.fault, args).run()
 
 

@@ -57,7 +57,10 @@ def fly(setup: FlightSetup, program: Path, log: Path | None = None) -> tuple[Sim
         flown = fly_to_end(flight, None, None)
         if log is not None:
             assert flight.keep_log(log)
-        return flown, flight.setup
+        lock = Path(f"/tmp/px4_lock-{flight._lockstep._port.port}")
+        assert lock.exists()
+    assert not lock.exists()
+    return flown, flight.setup
 
 
 @pytest.mark.parametrize("fault", some(["none", "slow-start"], 2))
