@@ -59,7 +59,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_run_leaves_every_file(demo: Path) -> None:
-    assert sorted(path.name for path in demo.iterdir()) == sorted(set(RUN_FILES) - {"flight.BIN"})
+    assert sorted(path.name for path in demo.iterdir()) == sorted(set(RUN_FILES) - {"flight.BIN", "flight.ulg"})
     assert all(path.stat().st_size > 500 for path in demo.iterdir())
     assert (demo / "map.png").read_bytes().startswith(b"\x89PNG")
     page = (demo / "report.html").read_text(encoding="utf-8")
