@@ -10,7 +10,6 @@ from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import AutopilotProgram, StoredAutopilot, describe_program
 from flight.autopilots.program import ProgramAutopilot, ProgramFlight
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.sitl.servos import SERVO_FILE, load_servo_map
 from flight.simulation.setup import FlightSetup
 
 # Beside its program (or one folder up, as a build leaves it), and in there the script that it starts with.
@@ -54,11 +53,8 @@ class Px4Sitl(ProgramAutopilot, Px4):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """The servo map, if it is missing."""
-        if (aircraft.folder / SERVO_FILE).exists():
-            load_servo_map(aircraft)
-            return []
-        return [f"{aircraft.folder / SERVO_FILE}: missing: --autopilot needs to know which servo moves what"]
+        """None of its own: the servo map is the one that ArduPlane's program needs, and names."""
+        return []
 
     @property
     def law(self) -> Px4:
