@@ -11,15 +11,16 @@ from world.kernels import compiled, inner
 
 Floats = NDArray[np.float64]
 
-# Squared share of the longest column at which what a column has beside those before it is noise, not a direction.
-_DEPENDENT = 1e-18
+# Squared share of the longest column at which what a column has beside those before it is noise, not a direction.  The
+# finite differences of a trim leave up to 1e-8 of it in the column of a surface that an aircraft does not have.
+_DEPENDENT = 1e-12
 
 
 def least_squares(basis: Floats, values: Floats) -> Floats:
     """Coefficients (k,) that bring basis (n, k) closest to values (n,).
 
     By modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6).  The coefficient
-    of a column that depends on those before it, to 1e-9 of the longest, is 0.
+    of a column that depends on those before it, to 1e-6 of the longest, is 0.
 
     >>> least_squares(np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]), np.array([1.0, 3.0, 5.0])).round(9).tolist()
     [1.0, 2.0]
