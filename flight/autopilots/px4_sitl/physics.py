@@ -183,11 +183,14 @@ class SimulatorPort:
         self._stream.setblocking(True)
         self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def send(self, *messages: Any) -> None:
-        """Send messages together."""
+    def packed(self, *messages: Any) -> bytes:
+        """Messages together, as they are sent."""
+        return b"".join(message.pack(self._mav) for message in messages)
+
+    def send(self, data: bytes) -> None:
+        """Send packed messages."""
         if self._stream is None:
             raise ValueError("PX4 has not connected")
-        data = b"".join(message.pack(self._mav) for message in messages)
         try:
             self._stream.sendall(data)
         except OSError:
@@ -295,9 +298,9 @@ class HilLockstep(Lockstep):
             self._last, self._owes = answer or self._last, False
         return self._last
 
-    def _send(self, *messages: Any) -> None:
+    def _send(self, data: bytes) -> None:
         """Have it step."""
-        self._port.send(*messages)
+        self._port.send(data)
         self._owes = True
 
     def boot(self, rail: RailEnd, started: Callable[[], bool], patience: float, seconds: float) -> None:
@@ -328,9 +331,11 @@ class HilLockstep(Lockstep):
         after = BodyMotion(*motion)
         before = self._before or after._replace(time=after.time - 1.0 / FRAME_HZ)
         self._before = after
-        self._send(self._sensors.measured(between(before, after)))
-        self._outputs()
+        self._send(self._port.packed(self._sensors.measured(between(before, after))))
+        # While it takes that step.
         now = [self._sensors.measured(after)]
         if self._frame % _FIX_FRAMES == 0:
             now.append(self._sensors.fix(after))
-        self._send(*now)
+        data = self._port.packed(*now)
+        self._outputs()
+        self._send(data)

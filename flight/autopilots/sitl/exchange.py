@@ -274,9 +274,10 @@ class Lockstep(ABC):
 
         def fly(count: int) -> int:
             for _ in range(count):
+                # While it makes up its mind.
+                pack(readings, 0, *[getter() for getter in read])
                 commands = take()
                 pack_commands(asked, 0, *commands)
-                pack(readings, 0, *[getter() for getter in read])
                 if status := tick():
                     return status
                 *_, north, east, down, under = output()
