@@ -332,7 +332,7 @@ class HilLockstep(Lockstep):
         before = self._before or after._replace(time=after.time - 1.0 / FRAME_HZ)
         self._before = after
         self._send(self._port.packed(self._sensors.measured(between(before, after))))
-        # While it takes that step.
+        # Packed while PX4 computes that step.
         now = [self._sensors.measured(after)]
         if self._frame % _FIX_FRAMES == 0:
             now.append(self._sensors.fix(after))

@@ -274,7 +274,7 @@ class Lockstep(ABC):
 
         def fly(count: int) -> int:
             for _ in range(count):
-                # While it makes up its mind.
+                # Taken while the autopilot computes its answer, which they do not depend on.
                 pack(readings, 0, *[getter() for getter in read])
                 commands = take()
                 pack_commands(asked, 0, *commands)
