@@ -109,13 +109,13 @@ def test_px4s_link_flies_the_mission_to_its_end(fake_px4: MakeFake, tmp_path: Pa
 def test_what_goes_wrong_with_px4_is_one_line_that_names_it(
     fake_px4: MakeFake, monkeypatch: pytest.MonkeyPatch, fault: str, said: str
 ) -> None:
-    if "1 s" in said:
+    # Of the three patiences the one that runs out; on a loaded machine a program takes longer than that to connect.
+    if fault == "silent":
         monkeypatch.setattr(physics, "SILENCE", 1.0)
+    elif fault == "does-not-connect":
         monkeypatch.setattr(px4_flight, "_CONNECTS", 1.0)
+    elif fault == "never-starts":
         monkeypatch.setattr(px4_flight, "_STARTS", 1.0)
-    if fault in ("silent", "crash", "crash-in-air"):
-        # Its first steps are told from those that were lost.
-        monkeypatch.setattr(px4_flight, "_STARTS", 60.0)
     program = fake_px4(fault)
     with pytest.raises(FlightError) as failed:
         fly(make_setup(), program)
