@@ -23,7 +23,7 @@ from world.errors import ArgumentError
 
 if TYPE_CHECKING:
     from planfly import Judged, Verdict
-    from planfly.terminal.answers import VerdictsDocument
+    from planfly.terminal.verdict_answers import VerdictsDocument
 
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
@@ -92,7 +92,7 @@ def _check_for(args: argparse.Namespace) -> int:
 
 
 def _documents(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
-    from planfly.terminal.answers import VerdictsDocument, verdict_document
+    from planfly.terminal.verdict_answers import VerdictsDocument, verdict_document
 
     documents = {name: verdict_document(verdict) for name, verdict in verdicts.items()}
     return VerdictsDocument(exit_code=code, mission=mission, verdicts=documents)

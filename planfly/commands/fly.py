@@ -62,7 +62,8 @@ def fly(args: argparse.Namespace) -> int:
 
 
 def _answer(mission: str, flown: "FlownMission", code: int) -> object:
-    from planfly.terminal.answers import FlyAnswer, verdict_document
+    from planfly.terminal.answers import FlyAnswer
+    from planfly.terminal.verdict_answers import verdict_document
 
     return FlyAnswer(
         exit_code=code,

@@ -90,7 +90,8 @@ def plan(args: argparse.Namespace) -> int:
 
 def _answer(made: "Plan", target: "Path", code: int) -> object:
     from planfly.api.planning import conditions_of_plan
-    from planfly.terminal.answers import PlanAnswer, conditions_document
+    from planfly.terminal.answers import PlanAnswer
+    from planfly.terminal.verdict_answers import conditions_document
     from planner.plan import Objective
 
     return PlanAnswer(

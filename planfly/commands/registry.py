@@ -21,7 +21,8 @@ class Command(NamedTuple):
     """A command of the line.
 
     section: the heading that it stands below in ``planfly --help``.
-    answer: what it answers with --json, a class of `planfly.terminal.answers`; "" for a command without it.
+    answer: what it answers with --json, a class of `planfly.terminal.answers`, or "MODULE.CLASS" of one beside it; ""
+        for a command without it.
     module, function: in this package; "" where they have the command's name.
     """
 
@@ -46,9 +47,9 @@ COMMANDS = (
     Command("export", _FLY, "ExportAnswer"),
     Command("fly", _FLY, "FlyAnswer"),
     Command("serve", _FLY),
-    Command("check", _LOOK, "CheckDocument"),
-    Command("returns", _LOOK, "ReturnsAnswer"),
-    Command("survey", _LOOK, "SurveyAnswer"),
+    Command("check", _LOOK, "verdict_answers.CheckDocument"),
+    Command("returns", _LOOK, "returns_answers.ReturnsAnswer"),
+    Command("survey", _LOOK, "survey_answers.SurveyAnswer"),
     Command("report", _LOOK, "ReportAnswer"),
     Command("compare", _LOOK, "CompareAnswer"),
     Command("replay", _LOOK, "ReplayAnswer"),
@@ -123,11 +124,11 @@ def answer_schema(name: str) -> dict[str, Any]:
     # Imported here: nobody else needs schemas.
     from pydantic import TypeAdapter
 
-    from planfly.terminal import answers
-
     if name not in answering_commands():
         raise KeyError(name)
-    made = TypeAdapter(getattr(answers, _named(name).answer)).json_schema(mode="serialization")
+    module, _, answer = _named(name).answer.rpartition(".")
+    beside = import_module(f"planfly.terminal.{module or 'answers'}")
+    made = TypeAdapter(getattr(beside, answer)).json_schema(mode="serialization")
     return {"$schema": _DRAFT, **made, "title": f"planfly {name} --json"}
 
 

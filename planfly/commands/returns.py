@@ -92,14 +92,14 @@ def returns(args: argparse.Namespace) -> int:
 
 def _answer(what: str, found: "ReturnsFound", code: int) -> object:
     from logs.verdict.conditions import setup_conditions
-    from planfly.terminal.answers import (
+    from planfly.terminal.returns_answers import (
         CauseEntry,
         ReturnsAnswer,
-        conditions_document,
         glides_entry,
         return_entry,
         suggestion_entry,
     )
+    from planfly.terminal.verdict_answers import conditions_document
 
     returns, no_return = found.returns, found.returns.point_of_no_return
     return ReturnsAnswer(

@@ -58,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _answer(result: "RunResult", refined: bool, code: int) -> object:
-    from planfly.terminal.answers import RoundAnswer, RunAnswer, verdict_document
+    from planfly.terminal.answers import RoundAnswer, RunAnswer
+    from planfly.terminal.verdict_answers import verdict_document
 
     rounds = [
         RoundAnswer(round=one.number, changes=list(one.changes), summary=one.verdict.headline) for one in result.rounds

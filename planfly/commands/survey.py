@@ -82,14 +82,14 @@ def survey(args: argparse.Namespace) -> int:
 
 def _answer(what: str, found: "SurveyFound", code: int) -> object:
     from logs.verdict.conditions import setup_conditions
-    from planfly.terminal.answers import (
+    from planfly.terminal.survey_answers import (
         SurveyAnswer,
-        conditions_document,
         near_miss_entry,
         overlap_entry,
         photo_line_entry,
         survey_remedy_entry,
     )
+    from planfly.terminal.verdict_answers import conditions_document
 
     return SurveyAnswer(
         exit_code=code,

@@ -1,0 +1,255 @@
+"""What ``planfly returns`` answers with ``--json``."""
+
+import math
+from typing import Literal
+
+from pydantic.dataclasses import dataclass
+
+from logs.verdict.returns.glides_text import glide_range_text, glides_headline
+from logs.verdict.returns.judge_glides import MARGIN
+from logs.verdict.returns.judge_returns import ReturnRange
+from logs.verdict.returns.returns_text import headline, range_text
+from planfly.api.returning import ReturnsFound, Suggested
+from planfly.terminal.verdict_answers import STRICT, ConditionsDocument
+from world.frames import to_geo
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class CauseEntry:
+    """What can take the aircraft off its mission."""
+
+    name: str
+    does: str
+    """return, land, autoland, on, circle, glide, parachute, terminate, level, guided, landed or never."""
+    parameter: str
+    """That decides it; empty where none does."""
+    value: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ReturnEntry:
+    """Seconds in a row whose returns go to the same place and come to the same; numbers are of the worst of them."""
+
+    first_s: float
+    last_s: float
+    count: int
+    kind: str
+    """ground, threat, zone, lost, energy, unknown, unsure, low or safe."""
+    target: str
+    """home, or a rally point by its number, or a landing sequence by its first item."""
+    reason: str
+    """Why there; empty where there is nothing to choose."""
+    worst_at_s: float
+    clearance_m: float | None
+    clearance_east_m: float | None
+    clearance_north_m: float | None
+    outside_m: float | None
+    """Least distance outside a missile's sphere; null where there is none."""
+    threat: str | None
+    zone: str | None
+    energy_wh: float | None
+    left_wh: float | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class RallyEntry:
+    """A rally point."""
+
+    lat_deg: float
+    lon_deg: float
+    over_home_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ReturnSuggestion:
+    """What would help."""
+
+    parameters: dict[str, float]
+    rally: list[RallyEntry] | None
+    """In place of the mission's rally points; null leaves those."""
+    safe: int
+    unsafe: int
+    headline: str
+    """What the returns come to with it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class GlideEntry:
+    """Seconds in a row from which the same can be reached without the engine; numbers are of the one with the least."""
+
+    first_s: float
+    last_s: float
+    count: int
+    reach: str
+    """home, site, flat, nothing or unknown."""
+    site: int | None
+    """Which of the sites; null for none."""
+    least_at_s: float
+    left_m: float | None
+    """Height left over, negative where it is missing; null where no way leads anywhere."""
+    flat_east_m: float | None
+    """Flat ground that can be reached; null for none."""
+    flat_north_m: float | None
+    own: str
+    """What ArduPlane's own return comes to: arrives, low, ground, threat, unknown or not flown."""
+    own_target: str
+    own_over_m: float | None
+    """Height over the ground at its target; null where it does not arrive."""
+    own_short_m: float | None
+    """From where it comes down to its target; null where it does not."""
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class GlideSiteEntry:
+    """A place that can be glided to."""
+
+    kind: str
+    """home, rally or landing."""
+    number: int
+    """Of the rally point, or the mission item."""
+    east_m: float
+    north_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class GlidesEntry:
+    """What can be reached without the engine."""
+
+    headline: str
+    not_judged: str
+    """terrain or far; empty where it is judged."""
+    airspeed_mps: float
+    """Equivalent, that glides are flown at."""
+    margin_m: float
+    cell_m: float | None
+    sites: list[GlideSiteEntry]
+    home: int
+    """From how many places home can be reached; the next four are of those from which it cannot."""
+    site: int
+    flat: int
+    nothing: int
+    unknown: int
+    own_arrives: int
+    """From how many ArduPlane's own return arrives."""
+    ranges: list[GlideEntry]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ReturnsAnswer:
+    """planfly returns: the returns in ranges of seconds, the worst first."""
+
+    schema: Literal["planfly.returns/1"] = "planfly.returns/1"
+    exit_code: int
+    what: str
+    headline: str
+    safe: bool
+    conditions: ConditionsDocument
+    every_s: float
+    least_clearance_m: float
+    causes: list[CauseEntry]
+    rtl_autoland: int | None
+    """ArduPlane's parameter; null by another autopilot's law."""
+    not_judged: list[str]
+    """What leaves the returns open: terrain, law, autoland, return path or landing; empty where nothing does."""
+    ranges: list[ReturnEntry]
+    no_return: str
+    """By energy: never, later (than no_return_s), at once; or why it is not known: battery, used or arrives."""
+    no_return_s: float | None
+    engine_out: GlidesEntry
+    suggestions: list[ReturnSuggestion]
+    """Of --suggest."""
+    notes: list[str]
+
+
+def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
+    """A suggestion as an answer has it."""
+    rally = None
+    if one.remedy.rally is not None:
+        rally = []
+        for point in one.remedy.rally:
+            lat, lon = (float(value) for value in to_geo(found.setup.scenario.origin, point.east, point.north))
+            rally.append(
+                RallyEntry(lat_deg=round(lat, 7), lon_deg=round(lon, 7), over_home_m=round(point.up - point.base, 1))
+            )
+    return ReturnSuggestion(
+        parameters=one.remedy.parameters,
+        rally=rally,
+        safe=one.returns.count("safe"),
+        unsafe=len(one.returns.each) - one.returns.count("safe"),
+        headline=headline(one.returns),
+    )
+
+
+def _tenths(value: float) -> float | None:
+    """A number as an answer has it; None for none."""
+    return round(value, 1) if math.isfinite(value) else None
+
+
+def glides_entry(found: ReturnsFound) -> GlidesEntry:
+    """What can be reached without the engine as an answer has it."""
+    glides = found.glides
+    entries = []
+    for group in glides.ranges:
+        one = group.least
+        entries.append(
+            GlideEntry(
+                first_s=round(group.first, 2),
+                last_s=round(group.last, 2),
+                count=group.count,
+                reach=one.reach,
+                site=group.site if group.site >= 0 else None,
+                least_at_s=round(one.time, 2),
+                left_m=_tenths(glides.spare(one)),
+                flat_east_m=_tenths(one.flat_at[0]),
+                flat_north_m=_tenths(one.flat_at[1]),
+                own=one.own.end,
+                own_target=one.own.target.name,
+                own_over_m=_tenths(one.own.over),
+                own_short_m=_tenths(one.own.short),
+                text=glide_range_text(group, glides),
+            )
+        )
+    return GlidesEntry(
+        headline=glides_headline(glides),
+        not_judged=glides.not_judged,
+        airspeed_mps=glides.airspeed,
+        margin_m=MARGIN,
+        cell_m=_tenths(glides.cell),
+        sites=[
+            GlideSiteEntry(kind=one.kind, number=one.number, east_m=round(one.east, 1), north_m=round(one.north, 1))
+            for one in glides.sites
+        ],
+        own_arrives=glides.arrivals,
+        home=glides.count("home"),
+        site=glides.count("site"),
+        flat=glides.count("flat"),
+        nothing=glides.count("nothing"),
+        unknown=glides.count("unknown"),
+        ranges=entries,
+    )
+
+
+def return_entry(found: ReturnsFound, group: ReturnRange) -> ReturnEntry:
+    """A range of returns as an answer has it."""
+    one, scenario, number = group.worst, found.setup.scenario, _tenths
+
+    return ReturnEntry(
+        first_s=round(group.first, 2),
+        last_s=round(group.last, 2),
+        count=group.count,
+        kind=one.kind,
+        target=one.target.name,
+        reason=one.target.reason,
+        worst_at_s=round(one.time, 2),
+        clearance_m=number(one.clearance),
+        clearance_east_m=number(one.clearance_at[0]),
+        clearance_north_m=number(one.clearance_at[1]),
+        outside_m=number(one.outside),
+        threat=scenario.threats.names[one.threat] if one.kind == "threat" else None,
+        zone=found.returns.airspace.zones[one.zone].name if one.zone >= 0 else None,
+        energy_wh=number(one.energy),
+        left_wh=number(one.left),
+        text=range_text(group, found.returns, scenario),
+    )

@@ -1,0 +1,146 @@
+"""What ``planfly survey`` answers with ``--json``."""
+
+import math
+from typing import Literal
+
+from pydantic.dataclasses import dataclass
+
+from flight.mission.surveys import PhotoLine
+from flight.simulation.setup import FlightSetup
+from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
+from planfly.survey_remedies import NearMiss, SurveyRemedy
+from planfly.terminal.verdict_answers import STRICT, ConditionsDocument
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class PhotoLineEntry:
+    """A photo line, as flown; all but its items null where it was not.  Shares are of its length."""
+
+    first_item: int
+    last_item: int
+    length_m: float | None
+    usable: float | None
+    away: float | None
+    """Not flown along, or too far beside the line; of the rest, banked too much; then too far off its height over
+    ground; then with the camera off."""
+    banked: float | None
+    high: float | None
+    dark: float | None
+    lost_m: list[tuple[float, float]]
+    """Stretches that cannot be used, from its begin."""
+    photos: int | None
+    missed: int | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class SurveyRemedyEntry:
+    """A change with which the survey was flown, and all lines can be used."""
+
+    kind: str
+    """side, turn-around, every, course, parameter or airspeed."""
+    name: str
+    """Of the parameter."""
+    current: float
+    value: float
+    unit: str
+    turn_around_m: float | None
+    """Of another layout."""
+    lead_in_m: float
+    """Before its first line, where that is more."""
+    length_m: float
+    """Of the way."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class OverlapEntry:
+    """The least overlap of a survey's photos that can be used, as shares of a photo; null where it is not known."""
+
+    front: float | None
+    """Of a photo and the next on its line."""
+    front_asked: float | None
+    front_line: int | None
+    """The line's number, from 1."""
+    side: float | None
+    """Of photos of neighbouring lines."""
+    side_asked: float | None
+    side_lines: tuple[int, int] | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class NearMissEntry:
+    """What was tried, came nearest, and does not pass."""
+
+    what: str
+    usable: int
+    lines: int
+    headline: str
+    """Of the verdict on its flight."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class SurveyAnswer:
+    """planfly survey: each survey's photo lines, in flying order."""
+
+    schema: Literal["planfly.survey/1"] = "planfly.survey/1"
+    exit_code: int
+    what: str
+    headline: str
+    usable: bool
+    conditions: ConditionsDocument
+    surveys: list[list[PhotoLineEntry]]
+    overlaps: list[OverlapEntry | None]
+    """Of each survey; null where its camera is not known."""
+    remedies: list[SurveyRemedyEntry]
+    """Of --suggest."""
+    nearest: NearMissEntry | None
+    """Where it found none."""
+    files: list[str]
+
+
+def photo_line_entry(setup: FlightSetup, line: PhotoLine, one: LineMeasure | None) -> PhotoLineEntry:
+    """A photo line as an answer has it."""
+    first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
+
+    def share(value: float | None) -> float | None:
+        return None if value is None else round(value, 4)
+
+    return PhotoLineEntry(
+        first_item=first,
+        last_item=last,
+        length_m=None if one is None else round(one.length, 1),
+        usable=share(None if one is None else one.good),
+        away=share(None if one is None else one.away),
+        banked=share(None if one is None else one.banked),
+        high=share(None if one is None else one.high),
+        dark=share(None if one is None else one.dark),
+        lost_m=[] if one is None else [(round(low, 1), round(high, 1)) for low, high in one.lost],
+        photos=None if one is None else one.photos,
+        missed=None if one is None else one.missed,
+    )
+
+
+def overlap_entry(one: OverlapMeasure) -> OverlapEntry:
+    """A survey's overlap as an answer has it."""
+    low, high = sorted(one.pair)
+    return OverlapEntry(
+        front=None if one.front is None else round(one.front, 4),
+        front_asked=one.camera.front,
+        front_line=None if one.front is None else one.line + 1,
+        side=None if one.side is None else round(one.side, 4),
+        side_asked=one.camera.side,
+        side_lines=None if one.side is None else (low + 1, high + 1),
+    )
+
+
+def near_miss_entry(one: NearMiss) -> NearMissEntry:
+    """What came nearest as an answer has it."""
+    return NearMissEntry(what=one.what, usable=one.usable, lines=one.lines, headline=one.verdict.headline)
+
+
+def survey_remedy_entry(one: SurveyRemedy) -> SurveyRemedyEntry:
+    """What would help as an answer has it."""
+    return SurveyRemedyEntry(
+        kind=one.kind, name=one.name, current=round(one.current, 3), value=round(one.value, 3), unit=one.unit,
+        turn_around_m=None if math.isnan(one.turn_around) else round(one.turn_around, 1), lead_in_m=one.lead_in,
+        length_m=round(one.length, 1),
+    )  # fmt: skip
