@@ -111,6 +111,19 @@ class MissionChecks(NamedTuple):
     stated: bool = False
 
 
+class LandingGlide(NamedTuple):
+    """The way down to a landing point: straight to where the flare begins, and from there to the ground.
+
+    slope: m of height per m of way.
+    flare_height: of the flare's beginning over the landing point, m; 0 where none is known of.
+    flare_distance: of the flare's beginning before the landing point, m.
+    """
+
+    slope: float
+    flare_height: float = 0.0
+    flare_distance: float = 0.0
+
+
 class Candidate(NamedTuple):
     """A parameter that may decide a flight that fails.
 
@@ -316,6 +329,25 @@ class Autopilot(ABC):
     def airspeed_factor(self, amsl: float) -> float:
         """True airspeed that it flies by the commanded one, at a height (m AMSL)."""
         return 1.0
+
+    def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
+        """The way down to a landing point from the waypoint before it: straight to the point, and no flare is told.
+
+        height, run: of that waypoint over the landing point and before it, m, both positive.
+        tail_wind: m/s, negative from ahead.  amsl: height of the landing point, m.
+
+        >>> from flight.autopilots.planfly.autopilot import PlanflyGuidance
+        >>> PlanflyGuidance().landing_glide(50.0, 1000.0, 0.0, 0.0)
+        LandingGlide(slope=0.05, flare_height=0.0, flare_distance=0.0)
+        """
+        return LandingGlide(height / run)
+
+    def go_around_height(self, asked: float, takeoff: float) -> float | None:
+        """Height over home (m) that it climbs to on its landing course before it goes around; None where that is open.
+
+        asked: by the landing item, m, 0 for nothing.  takeoff: of the mission's take-off over home, m, 0 for none.
+        """
+        return None
 
     @property
     def speed_limits(self) -> SpeedLimits | None:

@@ -17,6 +17,9 @@ SCHEMA = "planfly.verdict/3"
 UNKNOWN_AIRCRAFT = "unknown aircraft"
 # And of one whose way a flight tells, and geometry does not.
 UNKNOWN_WAY = "unknown way"
+# And of a way from the ground or to it that may not be free.
+GROUND_WAY = "ground way"
+_OPEN = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, GROUND_WAY)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +51,8 @@ class Finding:
     suggestions: of a failed finding, the smallest changes of the plan that would pass it, the least change first.
     brief: the reason in a few words, for a headline.
     placed: whether the reason begins with the place.
-    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT` or `UNKNOWN_WAY` of what those leave open; ""
-    otherwise.
+    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY` or `GROUND_WAY` of what those
+    leave open; "" otherwise.
     facts: what was measured beside it and is no fault.
     """
 
@@ -222,12 +225,12 @@ def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
 
 
 def left_open(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings that are not judged because the aircraft is not known well enough, or a way without a flight.
+    """The findings that are not judged because the aircraft or a way is not known well enough.
 
     >>> left_open([make_finding("slope", Place("leg", 1), ok=None, reason="", check=UNKNOWN_AIRCRAFT)])[0].place.index
     1
     """
-    return tuple(item for item in findings if item.ok is None and item.check in (UNKNOWN_AIRCRAFT, UNKNOWN_WAY))
+    return tuple(item for item in findings if item.ok is None and item.check in _OPEN)
 
 
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:

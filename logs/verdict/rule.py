@@ -97,6 +97,7 @@ class Rule:
     phrase: a failed finding in a few words; "" or None for noun, place and numbers.
     unjudged: what was not judged, as a flyable verdict says it; "" for nothing.  unjudged_of: what is counted then.
     explained: whether the summary says why it was not judged.
+    warns: whether what it finds is a warning, which decides no verdict.
     """
 
     name: str
@@ -117,6 +118,7 @@ class Rule:
     unjudged: str = ""
     unjudged_of: str = "legs"
     explained: bool = False
+    warns: bool = False
 
     @property
     def word(self) -> str:

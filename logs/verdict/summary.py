@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
-from logs.verdict.findings import UNKNOWN_WAY, Finding, Verdict, left_open
+from logs.verdict.findings import GROUND_WAY, UNKNOWN_AIRCRAFT, UNKNOWN_WAY, Finding, Verdict, left_open
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
 from logs.verdict.rules.mission_rule import lacks_landing
@@ -41,7 +41,7 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
-    """What the aircraft is not known well enough for, or only a flight tells, in words; "" for nothing.
+    """What the aircraft is not known well enough for, only a flight tells, or may be in the way; "" for nothing.
 
     >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
     >>> from logs.verdict.places import Place
@@ -56,8 +56,9 @@ def undecided_text(findings: Sequence[Finding]) -> str:
         if item.check == UNKNOWN_WAY
     ]
     circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
-    known = _unknown_of_aircraft([item for item in open_findings if item.check != UNKNOWN_WAY])
-    return "; ".join(filter(None, [known, circles]))
+    known = _unknown_of_aircraft([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
+    ground = [item.brief for item in open_findings if item.check == GROUND_WAY]
+    return "; ".join(filter(None, [known, circles, *ground]))
 
 
 def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
@@ -187,6 +188,11 @@ def summary_lines(
     lack = lacks_landing(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
     if lack and not any(item.rule == "mission" for item in findings):
         lines.append(f"PX4 would not take it: {lack}")
+    lines += [
+        f"{RULES[item.rule].title.capitalize()}: {item.reason}"
+        for item in findings
+        if RULES[item.rule].warns and item.ok is None
+    ]
     lines += _less_error(findings, setup)
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")

@@ -199,6 +199,29 @@ PHOTO_OVERLAP = 0.1
 # drawn: a turn back onto a line beside the one before takes 1 + sqrt(3) radii, and rolling takes the rest.
 TURN_AROUND_RADII = 3.25
 
+# The ways from the ground and to it
+
+# m.  So far from home no ground stands in the way of a climb-out: rail or runway are there, and it is less than what
+# two pixels of the usual elevation files tell apart.
+LAUNCH_RUN = 50.0
+# m.  So high over the ground at home an aircraft climbs at the least before it sinks to its first waypoint: below that
+# ArduPlane flies no slope (`Plane::setup_glide_slope`).
+FIRST_CLIMB = 20.0
+# Share of the steepest climb at the commanded airspeed.  A take-off climbs no less: ArduPlane's of an Aerosonde came to
+# 0.76 of it and more.
+LEAST_CLIMB = 0.7
+# m.  An aircraft that meets the ground so near before its landing point has landed: on ground that rises by 5 to 8 %
+# ArduPlane touched down 28 to 47 m early.
+EARLY_TOUCH = 60.0
+# m.  A glide may be flown so much lower than it is laid out: ArduPlane's were 2.3 m lower at the most.
+GLIDE_ERROR = 5.0
+# m.  So far above the landing point that counts; below, the flare may begin.
+ABOVE_FLARE = 15.0
+# m.  A landing point so far above the ground is none: the aircraft flares there, and falls.
+HIGH_POINT = 10.0
+# m.  Least height above ground of a go-around's way: it turns on it, and turns are not laid out.
+GO_AROUND_ROOM = 20.0
+
 # The track beside its route
 
 # m.  A waypoint further than this from the track draws no row to itself.

@@ -73,7 +73,7 @@ def _state(rule: Rule, findings: list[Finding]) -> str:
     unknown = [finding for finding in findings if finding.ok is None]
     judged = len(findings) - len(unknown)
     if not judged:
-        return f"not judged: {unknown[0].reason}"
+        return f"{'warning' if rule.warns else 'not judged'}: {unknown[0].reason}"
     text = f"{judged - failed} of {judged} ok"
     closest = closest_to_limit(findings)
     if closest is None or closest.margin is None or rule.margin is None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
+from flight.autopilots.arduplane.landing import go_around_height, landing_airspeed, landing_glide
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick
 from flight.autopilots.arduplane.navigator import REACHED_HEIGHT, turn_distance
 from flight.autopilots.arduplane.parameters import (
@@ -23,7 +24,15 @@ from flight.autopilots.arduplane.parameters import (
     stored_parameters,
 )
 from flight.autopilots.arduplane.tracking_error import tracking_error
-from flight.autopilots.autopilot import Autopilot, Floats, SpeedLimits, StoredAutopilot, StoredParameters, Tick
+from flight.autopilots.autopilot import (
+    Autopilot,
+    Floats,
+    LandingGlide,
+    SpeedLimits,
+    StoredAutopilot,
+    StoredParameters,
+    Tick,
+)
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
@@ -132,6 +141,15 @@ class ArduPlane(Autopilot):
     def airspeed_factor(self, amsl: float) -> float:
         """True by equivalent airspeed."""
         return float(true_by_equivalent(amsl))
+
+    def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
+        """By LAND_FLARE_*, LAND_WIND_COMP, TECS_LAND_SINK and TECS_LAND_ARSPD."""
+        airspeed = landing_airspeed(self.parameters, tail_wind) * self.airspeed_factor(amsl)
+        return landing_glide(height, run, airspeed + tail_wind, self.parameters)
+
+    def go_around_height(self, asked: float, takeoff: float) -> float | None:
+        """The landing item's first number, or the take-off's height, or 30 m."""
+        return go_around_height(asked, takeoff)
 
     @property
     def return_rules(self) -> ReturnRules:

@@ -101,6 +101,12 @@ DEFINITIONS = {
     "rally_limit": Definition("RALLY_LIMIT_KM", 5.0, 0.0, 20_000.0, _KILOMETRE),
     "rally_includes_home": Definition("RALLY_INCL_HOME", 0.0, 0.0, 1.0),
     "rtl_autoland": Definition("RTL_AUTOLAND", 0.0, 0.0, 4.0),
+    "flare_time": Definition("LAND_FLARE_SEC", 2.0, 0.0, 60.0),
+    "flare_height": Definition("LAND_FLARE_ALT", 3.0, 0.0, 1000.0),
+    "flare_weight": Definition("LAND_FLARE_AIM", 50.0, 0.0, 100.0, _PERCENT),
+    "landing_sink": Definition("TECS_LAND_SINK", 0.25, 0.0, 100.0),
+    "landing_airspeed": Definition("TECS_LAND_ARSPD", -1.0, -1.0, 500.0),
+    "landing_head_wind": Definition("LAND_WIND_COMP", 50.0, 0.0, 100.0, _PERCENT),
     "throttle_failsafe": Definition("THR_FAILSAFE", 1.0, 0.0, 2.0),
     "short_failsafe": Definition("FS_SHORT_ACTN", 0.0, 0.0, 4.0),
     "long_failsafe": Definition("FS_LONG_ACTN", 0.0, 0.0, 5.0),
@@ -160,6 +166,10 @@ class ArduPilotParameters:
         straight to it, 3 says that sequence is for go-arounds only, 4 goes by the mission's return path.
     terrain_follow: bits of the modes that follow the terrain.
     low_voltage, critical_voltage: V.  low_charge, critical_charge: mAh; 0 or less triggers nothing.
+    flare_time: s before the touch-down that the glide aims to flare at.  flare_height: m; half the most that the flare
+        begins at.  flare_weight: share of the flare that is flown with the sink of its end.
+    landing_sink: m/s, at the flare's end.  landing_airspeed: m/s, negative for the mean of cruise and minimum.
+    landing_head_wind: share of the head wind by which that is raised, up to the cruise airspeed.
     throttle_failsafe to fence_auto_enable: when it leaves its mission by itself, and what it does then; see
         `flight.autopilots.arduplane.failsafes`.
     """
@@ -214,6 +224,12 @@ class ArduPilotParameters:
     rally_limit: float = field(init=False)
     rally_includes_home: float = field(init=False)
     rtl_autoland: float = field(init=False)
+    flare_time: float = field(init=False)
+    flare_height: float = field(init=False)
+    flare_weight: float = field(init=False)
+    landing_sink: float = field(init=False)
+    landing_airspeed: float = field(init=False)
+    landing_head_wind: float = field(init=False)
     throttle_failsafe: float = field(init=False)
     short_failsafe: float = field(init=False)
     long_failsafe: float = field(init=False)

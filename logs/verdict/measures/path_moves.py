@@ -106,17 +106,27 @@ def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) 
     last = legs - 1 if last is None else last
     begin = 0 if first <= 0 else int(aligned.rows[first])
     end = len(aligned.track) if last >= legs - 1 else int(aligned.rows[last + 1]) + 1
-    position, time = aligned.track.position[begin:end], aligned.track.time[begin:end]
-    step = np.diff(position, axis=0)
+    moves = straight_moves(aligned.track.position[begin:end], aligned.track.time[begin:end])
+    moves["leg"] = np.searchsorted(aligned.rows[1:-1], np.arange(begin, begin + len(moves)), side="right")
+    return moves
+
+
+def straight_moves(points: Floats, time: Floats) -> Records:
+    """Moves from each point to the next, all of leg 0.  points: (n, 3) m.  time: (n,) s.
+
+    >>> moves = straight_moves(np.array([[0.0, 0.0, 50.0], [30.0, 40.0, 60.0]]), np.array([0.0, 2.0]))
+    >>> float(moves[0].length), float(moves[0].course_east), float(moves[0].climb), float(moves[0].lasts)
+    (50.0, 0.6, 10.0, 2.0)
+    """
+    step = np.diff(points, axis=0)
     moves: Records = np.zeros(len(step), MOVE)
     for axis, name in enumerate(("east", "north", "up")):
-        moves[name] = position[:-1, axis]
+        moves[name] = points[:-1, axis]
     run = np.hypot(step[:, 0], step[:, 1])
     moves["course_east"] = np.divide(step[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
     moves["course_north"] = np.divide(step[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
     moves["length"], moves["climb"] = run, step[:, 2]
     moves["time"], moves["lasts"] = time[:-1], np.diff(time)
-    moves["leg"] = np.searchsorted(aligned.rows[1:-1], np.arange(begin, begin + len(step)), side="right")
     return moves
 
 

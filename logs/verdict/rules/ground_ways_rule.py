@@ -1,0 +1,516 @@
+"""The climb-out, approach and go-around rules: what stands in the way up from home, and down to the landing point.
+
+A flight of ours begins and ends in the air.  These ways are not flown: they are laid out from the mission's items and
+judged against ground, missile spheres and zones, whether the mission was flown or not.
+
+Where a mission takes off, the aircraft climbs from the ground at home towards the next place.  What it hits at its
+steepest climb fails; what it would hit at `LEAST_CLIMB` of it is left open.  Where it does not take off, somebody flies
+the aircraft to its first waypoint, perhaps by another way: what is hit on the straight one is left open.
+
+The approach is the glide that the autopilot lays out (`Autopilot.landing_glide`).  A go-around climbs along the landing
+course to a height over home, whatever the height of the field, and flies back to where the landing begins (ArduPlane's
+`AP_Landing::restart_landing_sequence` and `type_slope_verify_abort_landing`, libraries/AP_Landing).
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import groupby
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import TAKEOFFS, Command, MissionItem
+from flight.mission.placing import SAME_PLACE, landing_starts, return_places
+from flight.mission.return_path import nearest_landing
+from logs.verdict.findings import GROUND_WAY, Finding, Message, make_finding, message
+from logs.verdict.measures.path_moves import straight_moves
+from logs.verdict.measures.path_sweeps import path_spheres
+from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.measures.zone_visits import path_zones
+from logs.verdict.places import Place
+from logs.verdict.rule import Margin, Rule, located
+from logs.verdict.tolerances import (
+    ABOVE_FLARE,
+    EARLY_TOUCH,
+    FIRST_CLIMB,
+    GLIDE_ERROR,
+    GO_AROUND_ROOM,
+    HIGH_POINT,
+    LAUNCH_RUN,
+    LEAST_CLIMB,
+    ON_THE_SPOT,
+    ROUNDING,
+)
+from logs.verdict.wording import place_text, shortened
+from world.airspace.zone_kernels import zone_records
+from world.frames import to_map
+from world.terrain import Terrain
+
+Floats = NDArray[np.float64]
+# Heights (m AMSL) at runs (m from a way's beginning) that rise.
+Profile = list[tuple[float, float]]
+
+# Degrees between two courses that a launch is tried on; heights over home that a go-around is tried with, m.
+_COURSE_STEP = 10
+_HEIGHT_STEP, _HIGHEST = 5.0, 1000.0
+
+
+# ----------------------------------------------------------------------
+# A straight way on the map, and what is in it.
+
+
+class _Way(NamedTuple):
+    """A way of n points: (n, 3) m, and the run to each, (n,) m."""
+
+    points: Floats
+    run: Floats
+
+    def between(self, first: float, last: float) -> "_Way":
+        """The part between two runs, m."""
+        inner = self.run[(self.run > first) & (self.run < last)]
+        at = np.concatenate([[first], inner, [max(first, last)]])
+        return _Way(np.stack([np.interp(at, self.run, self.points[:, k]) for k in range(3)], axis=1), at)
+
+
+def _straight(begin: Sequence[float] | Floats, course: float, profile: Profile) -> _Way:
+    """A way on one course (rad) from a place (east, north, m)."""
+    run, up = np.array(profile, dtype=np.float64).T
+    east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
+    return _Way(np.stack([east, north, up], axis=1), run)
+
+
+def _clearance(ground: Terrain, way: _Way) -> tuple[float, float]:
+    """Least height above ground on a way and the run where that is, m; NaN where the ground is not known all along."""
+    found = [ground.clearance(*way.points[k : k + 2]) for k in range(len(way.run) - 1)]
+    low = np.array([clearance for clearance, _ in found])
+    k = int(np.argmin(low))  # of a NaN, where there is one
+    return float(low[k]), float(way.run[k] + found[k][1] * (way.run[k + 1] - way.run[k]))
+
+
+def _entered(requirements: RouteRequirements, way: _Way) -> str:
+    """The missile's sphere or the zone that a way enters, in words; "" for none.
+
+    A zone that the way begins in is none: whoever stands there knows.  Nor is one to stay in that has a floor.
+    """
+    scenario, airspace = requirements.setup.scenario, requirements.airspace
+    if not scenario.external:
+        threats = scenario.threats
+        visits = path_spheres(way.points, way.run, threats.position, threats.kill_radius, threats.kill_scale)
+        for m in np.flatnonzero(visits.inside > 0.0).tolist():
+            return place_text(Place("missile", m, name=scenario.spec.threats[m].name or ""))
+    asked = [z for z, zone in enumerate(airspace.zones) if zone.kind == "exclusion" or zone.floor is None]
+    if asked:
+        records = zone_records([airspace.zones[z] for z in asked])
+        met = path_zones(straight_moves(way.points, way.run), records, scenario.terrain)
+        for z, visit in zip(asked, met, strict=True):
+            if visit.depth > ROUNDING and visit.entry_time > 0.0:
+                return place_text(airspace.place(z))
+    return ""
+
+
+class _Met(NamedTuple):
+    """What a way meets.
+
+    clearance: least height above ground, m; NaN where that is not known.  at: the run where that is, m.
+    entered: the sphere or zone that it enters, "" for none.
+    """
+
+    clearance: float
+    at: float
+    entered: str
+
+    @property
+    def free(self) -> bool:
+        """Whether it meets neither ground nor sphere nor zone; False where the ground is not known."""
+        return self.clearance >= 0.0 and not self.entered
+
+    def told(self, subject: str, where: str) -> Message:
+        """What it meets, in words.  where: what its runs count from."""
+        if self.entered:
+            return message(f"{subject} enters {self.entered}")
+        return message(f"{subject} meets the ground", f", {-self.clearance:.0f} m into it {self.at:.0f} m {where}")
+
+
+def _is_judged(requirements: RouteRequirements) -> bool:
+    """Whether ways are laid out: of missions over known ground, but for planfly's own plans and imported flights."""
+    setup = requirements.setup
+    return setup.scenario.terrain is not None and setup.plan is None and setup.source is None
+
+
+def _climb(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
+    """Steepest climb on a course (rad) at a height (m AMSL), and what of it is certain: m of height per m of way."""
+    speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
+    steepest, certain = (one.slopes(course, amsl, speed)[0] for one in (limits, limits.surely()))
+    return math.tan(steepest), math.tan(certain)
+
+
+def _first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
+    """The first waypoint that is an item's, and that item where it is a take-off."""
+    route = requirements.setup.route
+    first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
+    found = [one for one in requirements.setup.mission.items if one.seq == int(route.items[first])]
+    return first, found[0] if found and found[0].command in TAKEOFFS else None
+
+
+# ----------------------------------------------------------------------
+# The climb-out.
+
+
+def climbout_findings(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
+) -> list[Finding]:
+    """One finding of a mission with a home: of the way from the ground there to its first place.
+
+    Nothing where that place is over home, or the aircraft takes off straight up.
+    """
+    home, ground = requirements.setup.mission.home, requirements.setup.scenario.terrain
+    if not _is_judged(requirements) or home is None or ground is None:
+        return []
+    east, north = to_map(requirements.setup.scenario.origin, home.lat_deg, home.lon_deg)
+    begin = (float(east), float(north))
+    first, takeoff = _first_item(requirements)
+    here, low = requirements.points[first], float(ground.height(*begin))
+    place = requirements.waypoint(first)
+    if takeoff is not None:
+        if takeoff.command == Command.NAV_VTOL_TAKEOFF:
+            return []
+        course, run = float(requirements.courses[0]), float(requirements.runs[0])
+    else:
+        course, run = math.atan2(here[0] - begin[0], here[1] - begin[1]), math.dist(here[:2], begin)
+        if run < SAME_PLACE:
+            return []
+    if math.isnan(low):
+        return [make_finding("climbout", place, ok=None, reason="the ground at home is not known", unit="m")]
+    steepest, certain = _climb(requirements, max(0, first - 1), course, low)
+    if not steepest > 0.0:
+        reason = "the aircraft cannot climb there at this speed and in this wind"
+        return [make_finding("climbout", place, ok=None, reason=reason, unit="m")]
+    if takeoff is None:
+        way = _straight(begin, course, _way_up(low, float(here[2]), run, steepest))
+        return [_by_hand(place, _look(requirements, way))]
+    up, slope = float(requirements.points[0, 2]), math.tan(float(requirements.slopes[0]))
+    if up <= low:
+        reason = f"the take-off's height is not above the ground at home, which is at {low:.0f} m AMSL"
+        return [make_finding("climbout", place, ok=None, reason=reason, unit="m")]
+    met, least = (
+        _look(requirements, _straight(begin, course, _take_off(low, up, run, slope, climb)))
+        for climb in (steepest, max(1e-3, LEAST_CLIMB * certain))
+    )
+    return [_launched(requirements, place, met, least, (begin, low, up), certain == steepest)]
+
+
+def _way_up(low: float, up: float, run: float, climb: float) -> Profile:
+    """Profile from the ground (m AMSL) to a place so high (m AMSL) and so far away (m): at once up, and then on."""
+    top = max(up, low + FIRST_CLIMB)
+    reached = (top - low) / climb
+    if reached >= run:
+        return [(0.0, low), (run, low + climb * run)]
+    return [(0.0, low), (reached, top), (run, up)]
+
+
+def _take_off(low: float, up: float, run: float, slope: float, climb: float) -> Profile:
+    """Profile from the ground until it is on the first leg.
+
+    low: of the ground, up: that the leg begins at over home and the take-off climbs to, m AMSL.  run: of the leg, m.
+    slope: of the leg, climb: m per m.
+    """
+    reached = (up - low) / climb
+    if reached < run:
+        on_leg = (up - low) / (climb - slope) if climb > slope else math.inf
+        reached = min(run, max(reached, on_leg))
+    return [(0.0, low), (reached, low + climb * reached)]
+
+
+def _look(requirements: RouteRequirements, way: _Way) -> _Met:
+    """What a way up from home meets, beyond `LAUNCH_RUN` of ground."""
+    ground, end = requirements.setup.scenario.terrain, float(way.run[-1])
+    entered = _entered(requirements, way)
+    if ground is None or end <= LAUNCH_RUN:
+        return _Met(math.inf, 0.0, entered)
+    return _Met(*_clearance(ground, way.between(LAUNCH_RUN, end)), entered)
+
+
+def _by_hand(place: Place, met: _Met) -> Finding:
+    """Of a mission that begins in the air: the way to its first waypoint."""
+    subject = f"the way up from home to {_item_text(place)}"
+    if math.isnan(met.clearance) and not met.entered:
+        reason, check, ok = f"the ground below {subject} is not known", "", None
+    elif met.free:
+        reason, check, ok = f"straight from home: {_room(met)}; not flown: the flight begins in the air", "", True
+    else:
+        fault = met.told(subject, "from home, at the steepest climb")
+        return _finding("climbout", place, met, None, fault, GROUND_WAY)
+    return _finding("climbout", place, met, ok, message(reason), check)
+
+
+def _launched(
+    requirements: RouteRequirements,
+    place: Place,
+    met: _Met,
+    least: _Met,
+    launch: tuple[tuple[float, float], float, float],
+    is_known: bool,
+) -> Finding:
+    """Of a mission that takes off: the climb towards its next place.
+
+    met, least: at the steepest climb, and at the least.
+    launch: where (east, north, m), from which ground and to which height (m AMSL).
+    is_known: whether the aircraft's climb is certain.
+    """
+    to_item = requirements.leg(0).to_item
+    subject = f"the climb from home towards {'the next place' if to_item is None else f'item {to_item}'}"
+    if math.isnan(met.clearance) and not met.entered:
+        reason = message(f"the ground below {subject} is not known")
+        return _finding("climbout", place, met, None, reason)
+    if not met.free:
+        fault = met.told(subject, "from home, at the steepest climb")
+        other = _other_courses(requirements, *launch)
+        fault = message(fault.brief, fault.text[len(fault.brief) :] + other)
+        return _finding("climbout", place, met, False if is_known else None, fault, "" if is_known else GROUND_WAY)
+    if not least.free and not math.isnan(least.clearance):
+        fault = least.told(f"{subject}, at {100.0 * LEAST_CLIMB:.0f} % of the steepest,", "from home")
+        return _finding("climbout", place, met, None, fault, GROUND_WAY)
+    return _finding("climbout", place, met, True, message(f"towards the next place: {_room(met)}"))
+
+
+def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], low: float, up: float) -> str:
+    """Courses on which a launch climbs to the take-off's height and meets nothing, in words; "" for none."""
+
+    def is_free(course: float) -> bool:
+        climb, _ = _climb(requirements, 0, course, low)
+        if not climb > 0.0:
+            return False
+        return _look(requirements, _straight(begin, course, [(0.0, low), ((up - low) / climb, up)])).free
+
+    courses = list(range(0, 360, _COURSE_STEP))
+    free = [is_free(math.radians(course)) for course in courses]
+    if not any(free):
+        return "; launched on no course would it climb free"
+    # Begin behind a course that is not free, so that no range is cut at north.
+    start = free.index(False) if False in free else 0
+    turned = [(courses[k % len(courses)], free[k % len(courses)]) for k in range(start, start + len(courses))]
+    ranges = [[course for course, _ in group] for is_one, group in groupby(turned, key=lambda one: one[1]) if is_one]
+    widest = max(ranges, key=len)
+    if len(widest) == 1:
+        return f"; launched on {widest[0]:03d}° it would climb free"
+    return f"; launched on {widest[0]:03d}° to {widest[-1]:03d}° it would climb free"
+
+
+# ----------------------------------------------------------------------
+# The approach.
+
+
+def _landing(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
+    """The waypoint that a mission lands at by a glide, and its item; None for none."""
+    lands = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
+    found = [(k, lands[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in lands]
+    return found[-1] if found else None
+
+
+def approach_findings(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
+) -> list[Finding]:
+    """One finding of a mission that lands: of the glide from the last waypoint to the landing point."""
+    found, ground, setup = _landing(requirements), requirements.setup.scenario.terrain, requirements.setup
+    if found is None or ground is None or not _is_judged(requirements):
+        return []
+    at, leg = found[0], found[0] - 1
+    place, item = requirements.waypoint(at), _item_text(requirements.waypoint(at))
+    begin, point = requirements.points[leg], requirements.points[at]
+    run, course, low = float(requirements.runs[leg]), float(requirements.courses[leg]), setup.route.landing_ground
+    high, under = float(begin[2]), float(ground.height(float(point[0]), float(point[1])))
+    if math.isnan(low) or math.isnan(under) or run < ON_THE_SPOT:
+        reason = "the height of the ground at the landing point is not known"
+        return [make_finding("approach", place, ok=None, reason=reason, unit="m")]
+    if high <= low:
+        reason = "it begins no higher than the landing point"
+        return [make_finding("approach", place, ok=None, reason=reason, unit="m")]
+    glide = setup.autopilot.landing_glide(high - low, run, setup.scenario.wind.along(course, low)[0], low)
+    flare = (run - glide.flare_distance, low + glide.flare_height)
+    way = _straight(begin, course, [(0.0, high), *([flare] if glide.flare_distance > 0.0 else []), (run, low)])
+    last = run - EARLY_TOUCH
+    met = _Met(math.inf, 0.0, _entered(requirements, way))
+    if last > 0.0:
+        met = met._replace(**dict(zip(("clearance", "at"), _clearance(ground, way.between(0.0, last)), strict=True)))
+    met = met._replace(at=run - met.at)
+    subject = f"the glide to {item}"
+    if math.isnan(met.clearance) and not met.entered:
+        return [_finding("approach", place, met, None, message(f"the ground below {subject} is not known"))]
+    told = met.told(subject, "before the landing point")
+    # A landing point below the ground has the glide meet that early: it is the point's height, or the ground's.
+    if met.entered or met.clearance + max(0.0, under - low) < 0.0:
+        return [_finding("approach", place, met, False, told)]
+    if met.clearance < 0.0:
+        fault = message(f"the landing point of {item} is {under - low:.0f} m below the ground", f": {told.text}")
+        return [_finding("approach", place, met, None, fault, GROUND_WAY)]
+    if low - under > HIGH_POINT:
+        fault = message(f"the landing point of {item} is {low - under:.0f} m above the ground")
+        return [_finding("approach", place, met, None, fault, GROUND_WAY)]
+    until = run - glide.flare_distance - max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope
+    room = _clearance(ground, way.between(0.0, until))[0] if until > 0.0 else math.inf
+    if room < GLIDE_ERROR:
+        fault = message(
+            f"{subject} passes the ground by {room:.1f} m",
+            f", and may be flown {GLIDE_ERROR:.0f} m lower than laid out",
+        )
+        return [_finding("approach", place, met, None, fault, GROUND_WAY)]
+    reason = f"glides down at {math.degrees(math.atan(glide.slope)):.1f}°"
+    if glide.flare_distance > 0.0:
+        reason += (
+            f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
+        )
+    reason += f"; {_room(met)} until {EARLY_TOUCH:.0f} m before it; not flown: the flight ends in the air"
+    return [_finding("approach", place, met, True, message(reason))]
+
+
+# ----------------------------------------------------------------------
+# The go-around.
+
+
+class _GoAround(NamedTuple):
+    """A go-around from a landing point.
+
+    point: the landing point on the ground, target: where the landing begins, (3,) m.
+    course: of the landing, rad.  leg: whose airspeed is flown.  home: height that its own counts from, m AMSL.
+    """
+
+    point: Floats
+    target: Floats
+    course: float
+    leg: int
+    home: float
+
+
+def go_around_findings(
+    requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
+) -> list[Finding]:
+    """One finding of a mission that lands and has a home: a warning where its go-around comes near to the ground."""
+    found, ground, setup = _landing(requirements), requirements.setup.scenario.terrain, requirements.setup
+    if found is None or ground is None or not _is_judged(requirements) or setup.mission.home is None:
+        return []
+    at, item = found
+    origin, point = setup.scenario.origin, requirements.points[at]
+    home = return_places(setup.mission, origin, ground)[0].up
+    first, takeoff = _first_item(requirements)
+    height = setup.autopilot.go_around_height(
+        item.params[0], 0.0 if takeoff is None else float(requirements.points[first, 2]) - home
+    )
+    under = float(ground.height(float(point[0]), float(point[1])))
+    if height is None or math.isnan(under):
+        return []
+    field = np.array([point[0], point[1], under])
+    start = nearest_landing((float(point[0]), float(point[1]), under), landing_starts(setup.mission, origin, ground))
+    target = requirements.points[at - 1] if start is None or start.lands else np.array(start.place)
+    asked = _GoAround(field, target, float(requirements.courses[at - 1]), at - 1, home)
+    place, room = requirements.waypoint(at), _go_around_room(requirements, ground, asked, height)
+    if math.isnan(room):
+        return []
+    said = f"it climbs to {height:.0f} m over home, which is {home + height - under:.0f} m over the landing point"
+    if room >= GO_AROUND_ROOM:
+        reason = f"{said}; {room:.0f} m above ground or more on the way back"
+        return [make_finding("go_around", place, ok=True, reason=reason, planned=room, unit="m")]
+    does = "meets the ground" if room < 0.0 else f"comes down to {room:.0f} m above ground"
+    first_step = _HEIGHT_STEP * math.ceil(height / _HEIGHT_STEP + 1e-9)
+    steps = np.arange(first_step, _HIGHEST + 1.0, _HEIGHT_STEP).tolist()
+    enough = next((up for up in steps if _go_around_room(requirements, ground, asked, up) >= GO_AROUND_ROOM), None)
+    would = "no height would do" if enough is None else f"{enough:.0f} m would do (the first number of item {item.seq})"
+    reason = f"{said}, and {does} on the way back; {would}"
+    return [make_finding("go_around", place, ok=None, reason=reason, planned=room, unit="m")]
+
+
+def _go_around_room(requirements: RouteRequirements, ground: Terrain, asked: _GoAround, height: float) -> float:
+    """Least height above ground of a go-around that climbs so high over home (m), m; NaN where that is not known.
+
+    Of the climb along the landing course that height counts only where it meets the ground.
+    """
+    low = float(asked.point[2])
+    top = max(low, asked.home + height)
+    climb = LEAST_CLIMB * _climb(requirements, asked.leg, asked.course, low)[1]
+    if not climb > 0.0:
+        return math.nan
+    ahead = _straight(asked.point, asked.course, [(0.0, low), (max(1.0, (top - low) / climb), top)])
+    end = float(ahead.run[-1])
+    if end > LAUNCH_RUN:
+        met = _clearance(ground, ahead.between(LAUNCH_RUN, end))[0]
+        if not met >= 0.0:
+            return met
+    turned, to = ahead.points[-1], asked.target
+    course, run = math.atan2(to[0] - turned[0], to[1] - turned[1]), math.dist(to[:2], turned[:2])
+    if run < ON_THE_SPOT:
+        return float(turned[2]) - float(ground.height(float(turned[0]), float(turned[1])))
+    if to[2] <= top:
+        profile = [(0.0, top), (run, float(to[2]))]
+    else:
+        back = LEAST_CLIMB * _climb(requirements, asked.leg, course, top)[1]
+        reached = (float(to[2]) - top) / back if back > 0.0 else math.inf
+        profile = [(0.0, top), (run, top + max(0.0, back) * run)]
+        if reached < run:
+            profile = [(0.0, top), (reached, float(to[2])), (run, float(to[2]))]
+    return _clearance(ground, _straight(turned, course, profile))[0]
+
+
+# ----------------------------------------------------------------------
+
+
+def _item_text(place: Place) -> str:
+    """The item of a waypoint, in words."""
+    return "the first place" if place.item is None else f"item {place.item}"
+
+
+def _room(met: _Met) -> str:
+    return "nothing is in the way" if math.isinf(met.clearance) else f"{met.clearance:.0f} m above ground or more"
+
+
+def _finding(rule: str, place: Place, met: _Met, ok: bool | None, said: Message, check: str = "") -> Finding:
+    return make_finding(
+        rule,
+        place,
+        ok=ok,
+        reason=said.text,
+        faults=[] if ok else [said],
+        planned=met.clearance,
+        limit=0.0,
+        source="terrain",
+        tolerance=0.0,
+        margin=None if met.entered else met.clearance,
+        unit="m",
+        method="laid out from the mission's items, exact over the elevation file",
+        check=check,
+    )
+
+
+CLIMBOUT = Rule(
+    name="climbout",
+    title="climb-out",
+    noun="climb-out",
+    asks="Is the way up from home to the mission's first place free of ground, missiles and zones?",
+    margin=Margin("height above ground", "m", 10.0),
+    tolerances=("LAUNCH_RUN", "FIRST_CLIMB", "LEAST_CLIMB", "ROUNDING"),
+    judge=climbout_findings,
+    phrase=lambda item: located("climb-out", item, shortened(item.brief)),
+    unjudged="climb-out",
+    explained=True,
+)
+APPROACH = Rule(
+    name="approach",
+    title="approach",
+    asks="Is the glide to the landing point free of ground, missiles and zones?",
+    margin=Margin("height above ground", "m", 10.0),
+    tolerances=("EARLY_TOUCH", "GLIDE_ERROR", "ABOVE_FLARE", "HIGH_POINT", "ROUNDING"),
+    judge=approach_findings,
+    phrase=lambda item: located("approach", item, shortened(item.brief)),
+    unjudged="approach",
+    explained=True,
+)
+GO_AROUND = Rule(
+    name="go_around",
+    title="go-around",
+    noun="go-around",
+    asks="Would a go-around from the landing stay clear of the ground?",
+    margin=None,
+    tolerances=("GO_AROUND_ROOM", "LEAST_CLIMB", "LAUNCH_RUN"),
+    judge=go_around_findings,
+    warns=True,
+)
