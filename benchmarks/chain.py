@@ -131,7 +131,7 @@ def in_child(*argv: str, rounds: int = 2) -> float:
 def long_flight(folder: Path, laps: int = 5) -> tuple[Path, float]:
     """Fly laps of 13 minutes or so above the demo's ridges, in wind and turbulence: the log, and the hours in it."""
     corners = [(36.273, -84.28), (36.273, -84.22), (36.313, -84.22), (36.313, -84.28)] * laps
-    lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.293\t-84.25\t1150\t1"]
+    lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.273\t-84.28\t1150\t1"]
     lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(corners, 1)]
     mission, log = folder / "laps.waypoints", folder / "laps.mcap"
     mission.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -91,16 +91,21 @@ def _look_ahead(
             here.east = start.east + REACTION * start.velocity_east
             here.north = start.north + REACTION * start.velocity_north
             here.up = start.up - REACTION * max(straight, -start.velocity_up)
+            before = 0.0
             for part in range(_PARTS):
                 over_east, over_north = fast * math.sin(yaw) + wind_east, fast * math.cos(yaw) + wind_north
                 here.course = math.atan2(over_east, over_north)
                 if not _is_clear(here, floor, spheres, radii, glider):
                     break
                 spare, i, j = _best_cell(here, need, worst, glider)
-                if part + 1 == _PARTS or (spare > -math.inf and _is_ahead(here, i, j, side, onward, moves, glider)):
+                rest = _rest_of_turn(here, i, j, side, onward, moves, glider) if spare > -math.inf else before
+                # From part to part the way ahead may change by more than a part: a turn that goes past it has found it.
+                passed = before > 0.0 and -0.5 * math.pi < rest < 0.0
+                if part + 1 == _PARTS or (spare > -math.inf and (passed or -_PART <= rest <= 0.5 * _PART)):
                     if spare > left[n]:
                         left[n], reached[n] = spare, origin[i, j]
                     break
+                before = rest
                 here.east += lasts * over_east
                 here.north += lasts * over_north
                 here.up -= lasts * sink
@@ -143,10 +148,10 @@ def _best_cell(
 
 
 @inner
-def _is_ahead(
+def _rest_of_turn(
     here: Record, i: int, j: int, side: float, onward: Codes, moves: Records, glider: Record
-) -> bool:  # pragma: no cover - compiled
-    """Whether the way that leads on from a cell goes where the turn has come to, or is just being passed."""
+) -> float:  # pragma: no cover - compiled
+    """What is left of a turn to the way that leads on from a cell, rad; negative beyond it, 0 at the way's end."""
     for _ in range(_AHEAD):
         m = onward[i, j]
         if m < 0:
@@ -156,7 +161,6 @@ def _is_ahead(
     away_east = glider.west + j * glider.cell - here.east
     away_north = glider.south + i * glider.cell - here.north
     if math.hypot(away_east, away_north) < 2.0 * glider.cell:
-        return True
-    rest = side * wrap(math.atan2(away_east, away_north) - here.course)
-    ahead: bool = -_PART <= rest <= 0.5 * _PART
-    return ahead
+        return 0.0
+    rest: float = side * wrap(math.atan2(away_east, away_north) - here.course)
+    return rest

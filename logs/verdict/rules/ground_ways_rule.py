@@ -37,10 +37,10 @@ from logs.verdict.tolerances import (
     FIRST_CLIMB,
     GLIDE_ERROR,
     GO_AROUND_ROOM,
-    HIGH_POINT,
     LAUNCH_RUN,
     LEAST_CLIMB,
     ON_THE_SPOT,
+    POINT_ERROR,
     ROUNDING,
 )
 from logs.verdict.wording import place_text, shortened
@@ -339,13 +339,13 @@ def approach_findings(
     if math.isnan(met.clearance) and not met.entered:
         return [_finding("approach", place, met, None, message(f"the ground below {subject} is not known"))]
     told = met.told(subject, "before the landing point")
-    # A landing point below the ground has the glide meet that early: it is the point's height, or the ground's.
-    if met.entered or met.clearance + max(0.0, under - low) < 0.0:
+    # A landing point below the ground has the glide meet that early: by some metres the elevation file may be wrong.
+    if met.entered or met.clearance + min(POINT_ERROR, max(0.0, under - low)) < 0.0:
         return [_finding("approach", place, met, False, told)]
     if met.clearance < 0.0:
         fault = message(f"the landing point of {item} is {under - low:.0f} m below the ground", f": {told.text}")
         return [_finding("approach", place, met, None, fault, GROUND_WAY)]
-    if low - under > HIGH_POINT:
+    if low - under > POINT_ERROR:
         fault = message(f"the landing point of {item} is {low - under:.0f} m above the ground")
         return [_finding("approach", place, met, None, fault, GROUND_WAY)]
     until = run - glide.flare_distance - max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope
@@ -498,7 +498,7 @@ APPROACH = Rule(
     title="approach",
     asks="Is the glide to the landing point free of ground, missiles and zones?",
     margin=Margin("height above ground", "m", 10.0),
-    tolerances=("EARLY_TOUCH", "GLIDE_ERROR", "ABOVE_FLARE", "HIGH_POINT", "ROUNDING"),
+    tolerances=("EARLY_TOUCH", "GLIDE_ERROR", "ABOVE_FLARE", "POINT_ERROR", "ROUNDING"),
     judge=approach_findings,
     phrase=lambda item: located("approach", item, shortened(item.brief)),
     unjudged="approach",

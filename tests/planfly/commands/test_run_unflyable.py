@@ -15,8 +15,8 @@ from world.scenario import load_scenario
 def judge(plan: Plan, airframe: Airframe, first: int, last: int) -> Verdict:
     """The verdict on waypoints first..last of a plan, flown as a mission of their own."""
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
-    # Item 0 sets the speed; item k + 1 is waypoint k.
-    part = dataclasses.replace(mission, items=(mission.items[0], *mission.items[first + 1 : last + 2]))
+    # Item 0 sets the speed; item k + 1 is waypoint k.  Nobody flies there from home.
+    part = dataclasses.replace(mission, home=None, items=(mission.items[0], *mission.items[first + 1 : last + 2]))
     setup = make_setup(plan.scenario, airframe, part, 1)
     return fly_and_judge(setup, airframe, None).verdict
 

@@ -38,9 +38,14 @@ def own_folder_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 @pytest.fixture
 def short_run_in(monkeypatch: pytest.MonkeyPatch) -> None:
     """The fake flies steadily at once, where PX4 needs the run-in to settle."""
+    monkeypatch.setattr(sitl_flight, "RUN_IN", 100.0)
+    monkeypatch.setattr(sitl_flight, "RUN_IN_SECONDS", 4.0)
+
+
+@pytest.fixture
+def short_run_in_but_for_a_soak(request: pytest.FixtureRequest) -> None:
     if not SOAK:
-        monkeypatch.setattr(sitl_flight, "RUN_IN", 100.0)
-        monkeypatch.setattr(sitl_flight, "RUN_IN_SECONDS", 4.0)
+        request.getfixturevalue("short_run_in")
 
 
 def left_behind() -> list[Path]:
@@ -64,7 +69,7 @@ def fly(setup: FlightSetup, program: Path, log: Path | None = None) -> tuple[Sim
 
 
 @pytest.mark.parametrize("fault", some(["none", "slow-start"], 2))
-@pytest.mark.usefixtures("short_run_in")
+@pytest.mark.usefixtures("short_run_in_but_for_a_soak")
 def test_px4s_link_flies_the_mission_to_its_end(fake_px4: MakeFake, tmp_path: Path, fault: str) -> None:
     """The fake finds its way by what the sensors tell it: forces, field, pressures, rates and places must be right."""
     kept = tmp_path / "flight.ulg"

@@ -42,6 +42,9 @@ def test_home_is_in_reach_as_far_as_the_height_lasts(tmp_path: Path) -> None:
     assert {one.reach for one in found.each if one.start[0] > farthest} == {"nothing"}
     near = min(found.each, key=lambda one: abs(one.start[0] - 1500.0))
     assert near.left[0] == pytest.approx(600.0 - 8.0 - 60.0 - 30.0 - 1578.0 / RATIO, abs=30.0)
+    # 50 m further on 5 m less are left, and no start has a turn of its own.
+    left = [one.left[0] for one in home if one.start[0] > 500.0]
+    assert np.diff(left) == pytest.approx(-50.0 / RATIO, abs=10.0)
     assert [one.kind for one in found.sites] == ["home"]
     assert found.airspeed == 18.0
 

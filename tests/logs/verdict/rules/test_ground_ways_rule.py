@@ -256,6 +256,12 @@ def test_a_landing_point_below_or_far_above_the_ground_is_left_open(alt: float, 
     assert (f"the landing point of item 3 is {abs(alt):.0f} m {side} the ground" in found.reason) is (ok is None)
 
 
+@pytest.mark.parametrize(("alt", "ok"), [(-15.5, None), (-17.5, False)])
+def test_far_below_the_ground_a_landing_point_has_the_glide_fail(alt: float, ok: bool | None) -> None:
+    # 60 m before the point the glide is 6 m over it: 10 m in the ground where the point is 16 m below.
+    assert judged("approach", wall(0.0, 100.0), *landing(alt))[0].ok is ok
+
+
 def test_a_landing_point_below_the_ground_excuses_no_wall() -> None:
     up = 92.0 + 600.0 * (108.0 / RUN)
     assert judged("approach", wall(POINT - 600.0, up + 9.0), *landing(-8.0))[0].ok is False
