@@ -217,8 +217,8 @@ EARLY_TOUCH = 60.0
 GLIDE_ERROR = 5.0
 # m.  So far above the landing point that counts; below, the flare may begin.
 ABOVE_FLARE = 15.0
-# m.  By so much home's height and an elevation file may differ at a landing point.  Further above the ground it is none:
-# the aircraft flares there, and falls.  Further below it, the aircraft flies into the ground.
+# m.  By so much home's height and an elevation file may differ at a landing point.  Further above the ground the
+# aircraft flares too early, and falls; further below it, it flies into the ground.
 POINT_ERROR = 10.0
 # m.  Least height above ground of a go-around's way: it turns on it, and turns are not laid out.
 GO_AROUND_ROOM = 20.0

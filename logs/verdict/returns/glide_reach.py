@@ -99,8 +99,8 @@ def _look_ahead(
                     break
                 spare, i, j = _best_cell(here, need, worst, glider)
                 rest = _rest_of_turn(here, i, j, side, onward, moves, glider) if spare > -math.inf else before
-                # From part to part the way ahead may change by more than a part: a turn that goes past it has found it.
-                passed = before > 0.0 and -0.5 * math.pi < rest < 0.0
+                # The way ahead changes on a turn, so that a part may go past it by more than that part.
+                passed = 0.0 < before <= 2.0 * _PART and -2.0 * _PART <= rest < 0.0
                 if part + 1 == _PARTS or (spare > -math.inf and (passed or -_PART <= rest <= 0.5 * _PART)):
                     if spare > left[n]:
                         left[n], reached[n] = spare, origin[i, j]
