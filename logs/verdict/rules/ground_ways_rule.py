@@ -330,11 +330,10 @@ def approach_findings(
     glide = setup.autopilot.landing_glide(high - low, run, setup.scenario.wind.along(course, low)[0], low)
     flare = (run - glide.flare_distance, low + glide.flare_height)
     way = _straight(begin, course, [(0.0, high), *([flare] if glide.flare_distance > 0.0 else []), (run, low)])
-    last = run - EARLY_TOUCH
-    met = _Met(math.inf, 0.0, _entered(requirements, way))
+    last, room, at_run = run - EARLY_TOUCH, math.inf, 0.0
     if last > 0.0:
-        met = met._replace(**dict(zip(("clearance", "at"), _clearance(ground, way.between(0.0, last)), strict=True)))
-    met = met._replace(at=run - met.at)
+        room, at_run = _clearance(ground, way.between(0.0, last))
+    met = _Met(room, run - at_run, _entered(requirements, way))
     subject = f"the glide to {item}"
     if math.isnan(met.clearance) and not met.entered:
         return [_finding("approach", place, met, None, message(f"the ground below {subject} is not known"))]
