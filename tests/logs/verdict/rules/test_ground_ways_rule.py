@@ -88,6 +88,13 @@ def test_beyond_the_climb_the_way_to_the_first_waypoint_is_level() -> None:
         assert judged("climbout", wall(2500.0, top), *FAR)[0].ok is ok
 
 
+def test_a_first_waypoint_that_is_too_near_to_be_reached_has_the_whole_way_climb() -> None:
+    # 300 m over home 600 m away, twice as steep as it can: the rest is climbed there.
+    up = 100.0 + 500.0 * climb()
+    for top, ok in ((up - 2.0, True), (up + 2.0, None)):
+        assert judged("climbout", wall(500.0, top), wp(0, 600, 300), *FAR)[0].ok is ok
+
+
 def test_to_a_first_waypoint_below_home_it_climbs_20_metres_and_sinks() -> None:
     def hilltop(top: float) -> Ground:
         return lambda east, at: np.where(at == 500.0, top, np.where(at < 60.0, 100.0, 0.0)) + 0.0 * east
@@ -142,6 +149,13 @@ def test_a_take_off_climbs_on_until_it_is_on_its_first_leg() -> None:
     assert 100.0 < up - 100.0 < 160.0
     for top, ok in ((up + 1.0, None), (up - 1.0, True)):
         assert judged("climbout", wall(600.0, top), *lines)[0].ok is ok
+
+
+def test_what_stands_in_the_first_leg_is_no_matter_of_the_climb_out() -> None:
+    # At its steepest it is on the leg after 1.2 km, at its least after 1.7 km.
+    found, verdict = judged("climbout", wall(2000.0, 900.0), *TAKEOFF)
+    assert found.ok is True
+    assert of(verdict, "clearance").ok is False
 
 
 def test_a_take_off_with_a_place_of_its_own_climbs_towards_it() -> None:
