@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flight.simulation.track import TRACK_ROW, as_track
-from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.findings import GROUND_WAY, UNKNOWN_AIRCRAFT, Finding, Verdict, make_finding
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import parse_dispersions
@@ -18,6 +18,7 @@ from planfly.campaigns.flight_row import (
     clearance_profile,
     failed_findings,
     fly_one,
+    is_flyable,
     least_margins,
     lost_row,
     narrow_passes,
@@ -30,6 +31,8 @@ from tests.planfly.campaigns.made_campaigns import write_short
 from tests.setups import route_along
 from tests.synthetic import fly_path, make_setup
 from world.scenario import with_wind
+
+CHECKS = (GROUND_WAY, UNKNOWN_AIRCRAFT)
 
 # ----------------------------------------------------------------------
 # Narrow passes, by plain sums: a missile beside a straight track, and findings with little margin.
@@ -201,6 +204,20 @@ def test_a_flight_that_failed_nothing_but_is_not_whole_names_completion() -> Non
     assert failed_findings(verdict) == (("completion", Place("flight")),)
     finding = make_finding("turn", Place("waypoint", 1), ok=False, reason="x")
     assert failed_findings(replace(verdict, findings=(finding,))) == (("turn", Place("waypoint", 1)),)
+
+
+def test_a_way_from_the_ground_that_is_left_open_counts_for_no_flight() -> None:
+    ways = [make_finding("climbout", Place("waypoint", 0), ok=None, reason="x", check=check) for check in CHECKS]
+    verdict = Verdict((ways[0],), flyable=False, complete=True, lines=("x",), level="flown", unjudged="x")
+    assert is_flyable(verdict)
+    assert failed_findings(verdict) == ()
+    for other in (
+        replace(verdict, findings=tuple(ways)),
+        replace(verdict, findings=(ways[0], make_finding("turn", Place("waypoint", 1), ok=False, reason="x"))),
+        replace(verdict, complete=False),
+    ):
+        assert not is_flyable(other)
+        assert failed_findings(other)
 
 
 def test_a_lost_flight_keeps_its_draw(base: CampaignBase) -> None:
