@@ -113,7 +113,7 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, progress: Progress |
         return AirframeAnswer(False, f"not flyable: not started: {error.reason}", (("completion", FLIGHT),))
     verdict = judge_flight(ideal, flown.track, flown.ended)
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
-    return AirframeAnswer(verdict.flyable, verdict.headline, failed)
+    return AirframeAnswer(verdict.flies, verdict.headline, failed)
 
 
 def find_deciding_parameter(
@@ -125,12 +125,12 @@ def find_deciding_parameter(
     its law: of a program's flight they say something where the law's own flight fails as well, and
     nothing where it passes.
     """
-    if setup.autopilot.parameters is None or verdict.flyable:
+    if setup.autopilot.parameters is None or verdict.flies:
         return None
     findings = verdict.findings
     if setup.autopilot.program is not None:
         own = _flown_by_law(setup, setup.autopilot.law, aircraft, progress)
-        if own.flyable:
+        if own.flies:
             return None
         findings = own.findings
     # The corridor is as wide as it was, whatever radius is tried.
@@ -141,7 +141,7 @@ def find_deciding_parameter(
 
     def passes(law: Autopilot) -> bool:
         flown = _flown_by_law(same, law, aircraft, progress)
-        return flown.flyable and has_room(flown.findings, findings)
+        return flown.flies and has_room(flown.findings, findings)
 
     return deciding_parameter(setup.autopilot, findings, passes)
 
@@ -188,7 +188,7 @@ def judge_with_reference_flights(
     except _GivenUp:
         return judge_flight(setup, track, ended), None
     verdict = judge_flight(setup, track, ended, reference=reference)
-    if reference.airframe is not None and reference.airframe.flyable and not verdict.flyable:
+    if reference.airframe is not None and reference.airframe.flyable and not verdict.flies:
         with contextlib.suppress(_GivenUp):
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, watch))
             verdict = judge_flight(setup, track, ended, reference=reference)

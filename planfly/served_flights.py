@@ -191,7 +191,7 @@ class ServedFlights:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
         texts = mission_texts(setup, verdict)
-        judged = MissionJudged(request.number, True, verdict.flyable, texts, home, items, start)
+        judged = MissionJudged(request.number, True, verdict.flies, texts, home, items, start)
         return PreparedFlight(setup, flight.map), judged
 
     def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:

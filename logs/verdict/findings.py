@@ -138,6 +138,18 @@ class Verdict:
         return bool(self.unjudged) and not self.failed
 
     @property
+    def flies(self) -> bool:
+        """Whether it is flyable, but for ways from the ground or to it that are left open: no flight flies those.
+
+        >>> open_way = make_finding("climbout", Place("waypoint", 0), ok=None, reason="", check=GROUND_WAY)
+        >>> verdict = Verdict((open_way,), flyable=False, complete=True, lines=(), level="flown", unjudged="a way")
+        >>> verdict.flies, replace(verdict, complete=False).flies
+        (True, False)
+        """
+        ground = all(item.check == GROUND_WAY for item in left_open(self.findings))
+        return self.flyable or (self.complete and self.undecided and ground)
+
+    @property
     def headline(self) -> str:
         """The answer in a line."""
         return self.lines[0] if self.lines else ""

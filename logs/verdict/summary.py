@@ -209,7 +209,7 @@ def summary_lines(
 def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup) -> list[str]:
     """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides."""
     answers = {level.name: level.flyable for level in levels}
-    if answers.get("autopilot") is not False or not answers.get("airframe"):
+    if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
     whose = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameters are flown by the law, whoever flew.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flight.mission.route import Route
 from flight.simulation.track import Track
-from logs.verdict.findings import GROUND_WAY, Finding, Verdict, closest_to_limit, left_open
+from logs.verdict.findings import Finding, Verdict, closest_to_limit
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
 from logs.verdict.rules.registry import RULES
@@ -243,7 +243,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     some = len(track) > 0
     return FlightRow(
         draw=draw,
-        outcome="flyable" if is_flyable(flown.verdict) else "not flyable",
+        outcome="flyable" if flown.verdict.flies else "not flyable",
         ended=flown.ended,
         failed=failed_findings(flown.verdict),
         margins=least_margins(flown.verdict.findings),
@@ -256,19 +256,10 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     )
 
 
-def is_flyable(verdict: Verdict) -> bool:
-    """Whether a flight counts as flyable: also where nothing but a way from the ground or to it is left open.
-
-    That way is the mission's, and no flight's: none of them flies it.
-    """
-    ground = all(item.check == GROUND_WAY for item in left_open(verdict.findings))
-    return verdict.flyable or (verdict.complete and verdict.undecided and ground)
-
-
 def failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
     """Rule and place of each finding that failed; where none did and the flight is not whole, completion's."""
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
-    if failed or is_flyable(verdict):
+    if failed or verdict.flies:
         return failed
     return (("completion", Place("flight")),)
 

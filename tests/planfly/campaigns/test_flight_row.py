@@ -18,7 +18,6 @@ from planfly.campaigns.flight_row import (
     clearance_profile,
     failed_findings,
     fly_one,
-    is_flyable,
     least_margins,
     lost_row,
     narrow_passes,
@@ -209,14 +208,14 @@ def test_a_flight_that_failed_nothing_but_is_not_whole_names_completion() -> Non
 def test_a_way_from_the_ground_that_is_left_open_counts_for_no_flight() -> None:
     ways = [make_finding("climbout", Place("waypoint", 0), ok=None, reason="x", check=check) for check in CHECKS]
     verdict = Verdict((ways[0],), flyable=False, complete=True, lines=("x",), level="flown", unjudged="x")
-    assert is_flyable(verdict)
+    assert verdict.flies
     assert failed_findings(verdict) == ()
     for other in (
         replace(verdict, findings=tuple(ways)),
         replace(verdict, findings=(ways[0], make_finding("turn", Place("waypoint", 1), ok=False, reason="x"))),
         replace(verdict, complete=False),
     ):
-        assert not is_flyable(other)
+        assert not other.flies
         assert failed_findings(other)
 
 
