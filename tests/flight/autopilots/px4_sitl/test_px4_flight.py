@@ -103,7 +103,8 @@ def test_px4s_link_flies_the_mission_to_its_end(fake_px4: MakeFake, tmp_path: Pa
             ("copter", "is no PX4: its heartbeat says vehicle type 2"),
             ("ardupilot", "is no PX4: its heartbeat says autopilot 3; 12, PX4, is expected"),
             ("no-ekf", "did not come to know where it is (EKF) within 60 s"),
-            ("refuses", "refused the mission at item 2 (DO_CHANGE_SPEED): MAV_MISSION_UNSUPPORTED"),
+            # Without home, which ArduPlane counts, item 1 sets the speed.
+            ("refuses", "refused the mission at item 2 (NAV_WAYPOINT): MAV_MISSION_UNSUPPORTED"),
             ("will-not-arm", "refused arming (command 400) within 5 s; it last said: Arming denied: no will"),
             ("stays-in-manual", "refused MISSION (DO_SET_MODE) within 5 s"),
         ],
