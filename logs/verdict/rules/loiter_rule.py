@@ -73,29 +73,42 @@ def fold_loiters(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Findings with those at a loiter's corners replaced by one, and those of its legs by the worst of each rule."""
-    found, at_once = list(findings), requirements.setup.autopilot.loiter_rules.at_middle
+    at_once = requirements.setup.autopilot.loiter_rules.at_middle
+    kept: list[Finding | None] = list(findings)
+    # Looked up by rule and place: a mission of jumps has hundreds of circles, and each thousands of findings.
+    positions: dict[tuple[str, Place], list[int]] = {}
+    for k, item in enumerate(findings):
+        positions.setdefault((item.rule, item.place), []).append(k)
+
+    def left(rules: Sequence[str], places: Sequence[Place]) -> list[tuple[int, Finding]]:
+        """Positions and findings of these rules at these places, in order, but for those that were replaced."""
+        every = sorted(k for rule in rules for place in places for k in positions.get((rule, place), ()))
+        return [(k, item) for k in every if (item := kept[k]) is not None and item.rule in rules]
+
     for circle in circles(requirements):
         # Where the mission ends on its circle, that end is on it too.
         here = requirements.setup.route.items[circle.last : circle.last + 2]
         last = circle.last + 1 if at_once and len(here) == 2 and here[0] == here[1] else circle.last
-        corners = {requirements.waypoint(i) for i in range(circle.first, last + 1)}
-        legs = {requirements.leg(leg) for leg in range(circle.first, circle.last)}
-        at = [item for item in found if item.rule in ("turn", "waypoint") and item.place in corners]
+        at = left(("turn", "waypoint"), [requirements.waypoint(i) for i in range(circle.first, last + 1)])
+        for k, _ in at:
+            kept[k] = None
         if at:
-            found[found.index(at[0])] = _loiter(requirements, aligned, circle, at)
-            found = [item for item in found if not any(item is other for other in at[1:])]
+            kept[at[0][0]] = _loiter(requirements, aligned, circle, [item for _, item in at])
+        legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
-            mine = [item for item in found if item.rule == rule and item.place in legs]
-            if at_once and any(item.ok is not None for item in mine):
-                # Left before it came to these: what was flown there is judged on the others.
-                unflown = [item for item in mine if item.ok is None]
-                found = [item for item in found if not any(item is other for other in unflown)]
-                mine = [item for item in mine if item.ok is not None]
+            mine = left((rule,), legs)
+            if at_once and any(item.ok is not None for _, item in mine):
+                # Left before it came to the others: what was flown there is judged on these.
+                for k, item in mine:
+                    kept[k] = item if item.ok is not None else None
+                mine = [one for one in mine if one[1].ok is not None]
             if len(mine) > 1:
-                worst = min(mine, key=_badness)
-                one = replace(worst, reason=f"{worst.reason}; the worst of the circle's {len(mine)} legs")
-                found = [one if item is worst else item for item in found if item is worst or item not in mine]
-    return tuple(found)
+                at_worst, worst = min(mine, key=lambda one: _badness(one[1]))
+                for k, _ in mine:
+                    kept[k] = None
+                reason = f"{worst.reason}; the worst of the circle's {len(mine)} legs"
+                kept[at_worst] = replace(worst, reason=reason)
+    return tuple(item for item in kept if item is not None)
 
 
 def _badness(item: Finding) -> tuple[int, float]:
