@@ -213,7 +213,7 @@ LEAST_CLIMB = 0.7
 # m.  An aircraft that meets the ground so near before its landing point has landed: on ground that rises by 5 to 8 %
 # ArduPlane touched down 28 to 47 m early.
 EARLY_TOUCH = 60.0
-# m.  A glide may be flown so much lower than it is laid out: 15 of ArduPlane's, three of them in light turbulence, were
+# m.  A glide may be flown so much lower than it is laid out: 15 of ArduPlane's, some of them in light turbulence, were
 # no more than 3.9 m below the straight line to the landing point.
 GLIDE_ERROR = 5.0
 # m.  So far above the landing point that counts; below, the flare may begin.
