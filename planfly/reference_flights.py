@@ -113,7 +113,9 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft, progress: Progress |
         return AirframeAnswer(False, f"not flyable: not started: {error.reason}", (("completion", FLIGHT),))
     verdict = judge_flight(ideal, flown.track, flown.ended)
     failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
-    return AirframeAnswer(verdict.flies, verdict.headline, failed)
+    # What is left open of ways from the ground is no matter of this flight.
+    said = "flyable in the air" if verdict.flies and not verdict.flyable else verdict.headline
+    return AirframeAnswer(verdict.flies, said, failed)
 
 
 def find_deciding_parameter(
