@@ -55,6 +55,8 @@ Profile = list[tuple[float, float]]
 # Degrees between two courses that a launch is tried on; heights over home that a go-around is tried with, m.
 _COURSE_STEP = 10
 _HEIGHT_STEP, _HIGHEST = 5.0, 1000.0
+# m of a way that is looked at in one piece: what is known of the ground before it ends counts by pieces.
+_PIECE = 100.0
 
 
 # ----------------------------------------------------------------------
@@ -82,11 +84,19 @@ def _straight(begin: Sequence[float] | Floats, course: float, profile: Profile) 
 
 
 def _clearance(ground: Terrain, way: _Way) -> tuple[float, float]:
-    """Least height above ground on a way and the run where that is, m; NaN where the ground is not known all along."""
-    found = [ground.clearance(*way.points[k : k + 2]) for k in range(len(way.run) - 1)]
+    """Least height above ground on a way and the run where that is, m.
+
+    NaN where the ground is not known all along, and what is known of it is not met.
+    """
+    first, last = float(way.run[0]), float(way.run[-1])
+    cuts = np.linspace(first, last, max(2, math.ceil((last - first) / _PIECE) + 1))
+    run = np.union1d(cuts, way.run)
+    points = np.stack([np.interp(run, way.run, way.points[:, k]) for k in range(3)], axis=1)
+    found = [ground.clearance(*points[k : k + 2]) for k in range(len(run) - 1)]
     low = np.array([clearance for clearance, _ in found])
-    k = int(np.argmin(low))  # of a NaN, where there is one
-    return float(low[k]), float(way.run[k] + found[k][1] * (way.run[k + 1] - way.run[k]))
+    # Of a NaN, where there is one, but for ground that is met.
+    k = int(np.nanargmin(low)) if (low < 0.0).any() else int(np.argmin(low))
+    return float(low[k]), float(run[k] + found[k][1] * (run[k + 1] - run[k]))
 
 
 def _entered(requirements: RouteRequirements, way: _Way) -> str:
@@ -269,9 +279,11 @@ def _launched(
         other = _other_courses(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other)
         return _finding("climbout", place, met, False if is_known else None, fault, "" if is_known else GROUND_WAY)
-    if not least.free and not math.isnan(least.clearance):
-        fault = least.told(f"{subject}, at {100.0 * LEAST_CLIMB:.0f} % of the steepest,", "from home")
-        return _finding("climbout", place, met, None, fault, GROUND_WAY)
+    at_least = f"{subject}, at {100.0 * LEAST_CLIMB:.0f} % of the steepest,"
+    if math.isnan(least.clearance) and not least.entered:
+        return _finding("climbout", place, met, None, message(f"{at_least} leads to where the ground is not known"))
+    if not least.free:
+        return _finding("climbout", place, met, None, least.told(at_least, "from home"), GROUND_WAY)
     return _finding("climbout", place, met, True, message(f"towards the next place: {_room(met)}"))
 
 

@@ -204,6 +204,20 @@ def test_a_missile_in_the_way_up_counts_as_ground_does() -> None:
         assert (found.ok, "enters Alfa (missile)" in found.reason) == (ok, True)
 
 
+def test_ground_that_is_met_counts_where_that_beyond_it_is_not_known() -> None:
+    def cut(top: float, known: float) -> Ground:
+        return lambda east, at: np.where(at > known, np.nan, np.where(at == 500.0, top, 100.0)) + 0.0 * east
+
+    # At its steepest it climbs to 300 m over home in 1.2 km, at the least in 1.7 km.
+    steepest, least = 100.0 + 500.0 * climb(), 100.0 + 0.7 * 500.0 * climb()
+    assert judged("climbout", cut(steepest + 5.0, 800.0), *TAKEOFF)[0].ok is False
+    left_open, _ = judged("climbout", cut(least + 5.0, 1450.0), *TAKEOFF)
+    assert (left_open.ok, left_open.check) == (None, "ground way")
+    unknown, _ = judged("climbout", cut(100.0, 1450.0), *TAKEOFF)
+    assert (unknown.ok, unknown.check) == (None, "")
+    assert unknown.reason.endswith("at 70 % of the steepest, leads to where the ground is not known")
+
+
 def test_where_no_way_up_is_known_there_is_no_finding_or_it_is_not_judged() -> None:
     level = wall(0.0, 100.0)
 
