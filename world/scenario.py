@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from world.airfield import AskedReturns, LandingStrip, Launch, make_home, make_landing, make_launch, make_returns
 from world.airspace.zone_files import FileZones, read_zone_files
 from world.airspace.zone_times import is_active, parse_span
 from world.airspace.zones import Zone
@@ -18,7 +19,8 @@ from world.airspace.zones_on_map import FAR, check_ends, make_zones, near_zones
 from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
 from world.files import did_you_mean, whole_path
-from world.frames import GeoOrigin, to_geo, to_map
+from world.frames import GeoOrigin, to_geo
+from world.map_positions import check_inside, make_threats, map_position
 from world.raster import RasterFile, open_tiles, read_terrain, tile_bounds
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
 from world.scenario_tables import (
@@ -29,7 +31,6 @@ from world.scenario_tables import (
     LimitsTable,
     OriginTable,
     PlannerTable,
-    PointTable,
     ScenarioFile,
     TerrainTable,
     ThreatTable,
@@ -38,76 +39,10 @@ from world.scenario_tables import (
     names_folder,
 )
 from world.terrain import Peak, Terrain, flat_terrain, peaks_terrain
-from world.threats import Threats, threat_label
+from world.threats import Threats
 from world.wind import Wind
 
 Floats = NDArray[np.float64]
-
-# ----------------------------------------------------------------------
-# Positions of a scenario file on the map: its ends, and its threats on their ground.
-
-
-def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
-    """East, north, up (3,) m of a position; a height above ground is counted from the terrain.
-
-    key, source: of the table and its file, for messages.  Raises ScenarioError where there is no terrain to count from.
-    """
-    if table.east_m is not None and table.north_m is not None:
-        east, north = table.east_m, table.north_m
-    else:
-        point = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
-        east, north = float(point[0]), float(point[1])
-    if table.amsl_m is not None:
-        return np.array([east, north, table.amsl_m])
-    under = float(ground.height(east, north)) if ground is not None else math.nan
-    if math.isnan(under):
-        raise ScenarioError(
-            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
-            " no terrain there to count a height from; give amsl_m",
-            file=source,
-            field=key,
-        )
-    return np.array([east, north, under + (table.height_m or 0.0)])
-
-
-def check_inside(
-    key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
-) -> None:
-    """Raise ScenarioError for an end (3,) outside the area (2, 2), floor and ceiling (m AMSL), or in the ground."""
-    for axis, name in enumerate(("east", "north")):
-        low, high = bounds[axis]
-        if not low <= point[axis] <= high:
-            shown, allowed = f"{name} {point[axis]:.0f} m", f"outside the area {low:.0f}..{high:.0f}"
-            raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=shown)
-    amsl = f"{point[2]:.0f} m AMSL"
-    if not floor <= point[2] <= ceiling:
-        allowed = f"outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
-        raise ScenarioError.at(source, key, float(point[2]), allowed, shown=amsl)
-    if ground is not None:
-        under = float(ground.height(point[0], point[1]))
-        if point[2] <= under:
-            allowed = f"not above the terrain, which is at {under:.0f} m"
-            raise ScenarioError.at(source, key, float(point[2]), allowed, shown=amsl)
-
-
-def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
-    """Place the threats of a scenario file on the map, each on the ground unless it gives a height.
-
-    Raises ScenarioError for one that stands where there is no terrain, and gives no height above mean sea level.
-    """
-    positions = np.zeros((len(tables), 3))
-    for k, table in enumerate(tables):
-        on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
-        positions[k] = map_position(on_ground, f"threats[{k}]", source, origin, ground)
-    return Threats(
-        names=tuple(threat_label(table.name or "", k) for k, table in enumerate(tables)),
-        position=positions,
-        kill_radius=np.array([table.kill_radius_m or 0.0 for table in tables]),
-        detection_radius=np.array([table.detection_radius_m or 0.0 for table in tables]),
-        kill_scale=np.array([table.kill_scale_m or 0.0 for table in tables]),
-        detection_scale=np.array([table.detection_scale_m or 0.0 for table in tables]),
-    )
-
 
 # ----------------------------------------------------------------------
 # The scenario itself, from an embedded name, a file, a plan or a log.
@@ -131,6 +66,10 @@ class Scenario:
     zones: of airspace, to keep out of or to stay in.
     external: made around a mission file that came without a scenario: its bounds are no limit and its empty
     threats say nothing.
+    home: (3,) where the aircraft stands on the ground before the flight; None where none is stated.
+    launch, landing: how it leaves the ground at home and where it lands; None for a flight that begins, or ends, in
+    the air.
+    returns: what is asked and set of returns; None for nothing.
     """
 
     name: str
@@ -151,10 +90,14 @@ class Scenario:
     wind: Wind
     external: bool = False
     zones: tuple[Zone, ...] = ()
+    home: Floats | None = None
+    launch: Launch | None = None
+    landing: LandingStrip | None = None
+    returns: AskedReturns | None = None
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
-        for name in ("bounds", "start", "destination"):
+        for name in ("bounds", "start", "destination", *(("home",) if self.home is not None else ())):
             array = np.array(getattr(self, name), dtype=np.float64)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -420,6 +363,10 @@ def _assemble(
         wind=wind,
         external=external,
         zones=zones,
+        home=make_home(spec.home, source, origin, ground, bounds, start),
+        launch=make_launch(spec.launch),
+        landing=make_landing(spec.landing, source, origin, ground, bounds),
+        returns=make_returns(spec.returns, source, origin, ground),
     )
 
 

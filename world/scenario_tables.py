@@ -249,22 +249,32 @@ class AreaTable(ScenarioTable):
         return self
 
 
-class PointTable(ScenarioTable):
-    """A position: east_m, north_m or lat_deg, lon_deg; amsl_m or height_m above ground."""
+def _one_position(table: "PositionTable") -> None:
+    """Refuse a position that is not given once, in metres or in degrees."""
+    metres = (table.east_m is not None, table.north_m is not None)
+    degrees = (table.lat_deg is not None, table.lon_deg is not None)
+    if not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
+        raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+
+
+class PositionTable(ScenarioTable):
+    """A place on the map: east_m, north_m or lat_deg, lon_deg."""
 
     east_m: Metres | None = None
     north_m: Metres | None = None
     lat_deg: Latitude | None = None
     lon_deg: Longitude | None = None
+
+
+class PointTable(PositionTable):
+    """A position: east_m, north_m or lat_deg, lon_deg; amsl_m or height_m above ground."""
+
     amsl_m: Amsl | None = None
     height_m: Height | None = None
 
     @model_validator(mode="after")
     def _one_form(self) -> "PointTable":
-        metres = (self.east_m is not None, self.north_m is not None)
-        degrees = (self.lat_deg is not None, self.lon_deg is not None)
-        if not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
-            raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+        _one_position(self)
         if self.amsl_m is not None and self.height_m is not None:
             raise ValueError("height_m: give amsl_m or height_m, not both")
         return self
@@ -451,13 +461,86 @@ class WindTable(ScenarioTable):
     seed: Seed | None = None
 
 
-class ReturnsTable(ScenarioTable):
-    """[returns]: what a verdict asks of the way home from everywhere.
+class HomeTable(PositionTable):
+    """[home]: where the mission begins on the ground: a position, or place = "start", below the start."""
 
-    require: "rtl" where every return to launch has to be safe.
+    place: Literal["start"] | None = None
+
+    @model_validator(mode="after")
+    def _one_place(self) -> "HomeTable":
+        if self.place is None:
+            _one_position(self)
+        elif any(value is not None for value in (self.east_m, self.north_m, self.lat_deg, self.lon_deg)):
+            raise ValueError('place: give place = "start" or a position, not both')
+        return self
+
+
+LaunchMethod = Literal["catapult", "hand", "runway"]
+
+
+class LaunchTable(ScenarioTable):
+    """[launch]: how the aircraft leaves the ground at home.
+
+    course_deg: clockwise from north; along the mission's first leg where it is not given.
+    speed_mps: at the end of the launch.  length_m: of rail, throw or runway.  incline_deg: of the launch above level.
+    What is not given is the method's default (`world.airfield`).
     """
 
-    require: Annotated[list[Literal["rtl"]], Field(max_length=1)]
+    method: LaunchMethod
+    course_deg: Course | None = None
+    speed_mps: Annotated[float, within(0.0, 60.0)] | None = None
+    length_m: Annotated[float, within(0.1, 3000.0)] | None = None
+    incline_deg: Annotated[float, within(0.0, 45.0)] | None = None
+
+
+class LandingTable(PositionTable):
+    """[landing]: the strip that the mission ends on.
+
+    course_deg: of the landing, clockwise from north, or "wind" for into the wind.
+    length_m, width_m: of the ground that can be landed on, its middle at the landing point.
+    approach_m: of the straight final before the landing point.
+    slope_deg: of the glide there, below level; where it is not given, one that the autopilot and the aircraft can fly.
+    """
+
+    course_deg: Annotated[float, within(-360.0, 360.0, also=', or "wind"')] | Literal["wind"] = "wind"
+    length_m: Annotated[float, within(20.0, 5000.0)] = 200.0
+    width_m: Annotated[float, within(5.0, 500.0)] = 40.0
+    approach_m: Annotated[float, within(200.0, 5000.0)] = 600.0
+    slope_deg: Annotated[float, within(1.0, 20.0)] | None = None
+
+    @model_validator(mode="after")
+    def _placed(self) -> "LandingTable":
+        _one_position(self)
+        return self
+
+
+class RallyTable(PointTable):
+    """[returns] rally: a point that a return may fly to, at a height above sea or above the ground there."""
+
+    @model_validator(mode="after")
+    def _has_height(self) -> "RallyTable":
+        if self.amsl_m is None and self.height_m is None:
+            raise ValueError("amsl_m: missing; give amsl_m or height_m")
+        return self
+
+
+class ReturnsTable(ScenarioTable):
+    """[returns]: what a verdict asks of the way home from everywhere, and what a planned mission sets for it.
+
+    require: "rtl" where every return to launch has to be safe.
+    rtl_altitude_m: over home, that a return climbs or descends to.
+    rally: points that are nearer than home.
+    """
+
+    require: Annotated[list[Literal["rtl"]], Field(max_length=1)] | None = None
+    rtl_altitude_m: Annotated[float, within(1.0, 9000.0)] | None = None
+    rally: Annotated[list[RallyTable], Field(min_length=1, max_length=100)] | None = None
+
+    @model_validator(mode="after")
+    def _says_something(self) -> "ReturnsTable":
+        if self.require is None and self.rtl_altitude_m is None and self.rally is None:
+            raise ValueError("require: missing; give require, rtl_altitude_m or rally")
+        return self
 
 
 class ScenarioFile(ScenarioTable):
@@ -467,6 +550,7 @@ class ScenarioFile(ScenarioTable):
     zones_file: a file of zones or several; in a made scenario their zones stand among the others, and `zone_notes` says
     what of the files is not taken as it stands.
     at: when it is flown, as `world.airspace.zone_times` reads it: zones that are not active then are left out.
+    home, launch, landing: None for a mission that begins and ends in the air.
     returns: None where nothing is asked of them, as zones.
     """
 
@@ -486,10 +570,23 @@ class ScenarioFile(ScenarioTable):
     planner: PlannerTable = PlannerTable()
     flight: FlightTable = FlightTable()
     wind: WindTable = WindTable()
+    home: HomeTable | None = None
+    launch: LaunchTable | None = None
+    landing: LandingTable | None = None
     returns: ReturnsTable | None = None
 
     @model_validator(mode="after")
     def _area_where_there_is_no_tile(self) -> "ScenarioFile":
         if self.area is None and self.terrain.kind != "dem":
             raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" has no tile to take it from')
+        return self
+
+    @model_validator(mode="after")
+    def _home_where_there_is_a_field(self) -> "ScenarioFile":
+        if self.home is None:
+            for key in ("launch", "landing"):
+                if getattr(self, key) is not None:
+                    raise ValueError(
+                        f"home: missing; [{key}] needs it: heights of take-off and landing count from home"
+                    )
         return self

@@ -142,6 +142,9 @@ def test_every_default() -> None:
             "battery_wh": None,
         },
         "wind": {"speed_mps": 0.0, "from_deg": 0.0, "gradient": 0.0, "turbulence": "none", "seed": None},
+        "home": None,
+        "launch": None,
+        "landing": None,
         "returns": None,
     }
 

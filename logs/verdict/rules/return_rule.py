@@ -70,8 +70,8 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
     starts: makes them, so many seconds apart.
     """
     setup = requirements.setup
-    table = setup.scenario.spec.returns
-    if table is None or "rtl" not in table.require:
+    asked = setup.scenario.returns
+    if asked is None or "rtl" not in asked.require:
         return []
     every = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MOST)))
     ok: bool | None

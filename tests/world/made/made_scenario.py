@@ -49,6 +49,12 @@ def same_scenario(a: Scenario, b: Scenario) -> bool:
     arrays += [
         (getattr(a.threats, name), getattr(b.threats, name)) for name in ("position", "kill_radius", "kill_scale")
     ]
+    same = same and (a.launch, a.landing) == (b.launch, b.landing)
+    if a.home is not None and b.home is not None:
+        arrays.append((a.home, b.home))
+    if a.returns is not None and b.returns is not None:
+        same = same and a.returns.require == b.returns.require and a.returns.rtl_altitude == b.returns.rtl_altitude
+        arrays.append((a.returns.rally, b.returns.rally))
     if a.terrain is not None and b.terrain is not None:
         arrays += [(a.terrain.heights, b.terrain.heights), (a.terrain.to_pixel.rows(), b.terrain.to_pixel.rows())]
     return same and all(np.array_equal(x, y) for x, y in arrays)

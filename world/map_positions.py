@@ -1,0 +1,89 @@
+"""Positions of a scenario file on the map: its ends, its points on the ground, and its threats."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.errors import ScenarioError
+from world.frames import GeoOrigin, to_map
+from world.scenario_tables import PointTable, PositionTable, ThreatTable
+from world.terrain import Terrain
+from world.threats import Threats, threat_label
+
+Floats = NDArray[np.float64]
+
+
+def map_place(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
+    """East and north of a position, m."""
+    if table.east_m is not None and table.north_m is not None:
+        return table.east_m, table.north_m
+    east, north = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
+    return float(east), float(north)
+
+
+def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
+    """East, north, up (3,) m of a position; a height above ground is counted from the terrain.
+
+    key, source: of the table and its file, for messages.  Raises ScenarioError where there is no terrain to count from.
+    """
+    east, north = map_place(table, origin)
+    if table.amsl_m is not None:
+        return np.array([east, north, table.amsl_m])
+    under = float(ground.height(east, north)) if ground is not None else math.nan
+    if math.isnan(under):
+        raise ScenarioError(
+            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
+            " no terrain there to count a height from; give amsl_m",
+            file=source,
+            field=key,
+        )
+    return np.array([east, north, under + (table.height_m or 0.0)])
+
+
+def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
+    """Raise ScenarioError for a place (2,) or (3,) outside the area (2, 2), m."""
+    for axis, name in enumerate(("east", "north")):
+        low, high = bounds[axis]
+        if not low <= point[axis] <= high:
+            shown, allowed = f"{name} {point[axis]:.0f} m", f"outside the area {low:.0f}..{high:.0f}"
+            raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=shown)
+
+
+def check_inside(
+    key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
+) -> None:
+    """Raise ScenarioError for an end (3,) outside the area (2, 2), floor and ceiling (m AMSL), or in the ground."""
+    check_in_area(key, point, source, bounds)
+    amsl = f"{point[2]:.0f} m AMSL"
+    if not floor <= point[2] <= ceiling:
+        allowed = f"outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
+        raise ScenarioError.at(source, key, float(point[2]), allowed, shown=amsl)
+    check_above_ground(key, point, source, ground)
+
+
+def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | None) -> None:
+    """Raise ScenarioError for a point (3,) that is not above the terrain; none is where that is not known."""
+    under = float(ground.height(point[0], point[1])) if ground is not None else math.nan
+    if point[2] <= under:
+        allowed = f"not above the terrain, which is at {under:.0f} m"
+        raise ScenarioError.at(source, key, float(point[2]), allowed, shown=f"{point[2]:.0f} m AMSL")
+
+
+def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
+    """Place the threats of a scenario file on the map, each on the ground unless it gives a height.
+
+    Raises ScenarioError for one that stands where there is no terrain, and gives no height above mean sea level.
+    """
+    positions = np.zeros((len(tables), 3))
+    for k, table in enumerate(tables):
+        on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
+        positions[k] = map_position(on_ground, f"threats[{k}]", source, origin, ground)
+    return Threats(
+        names=tuple(threat_label(table.name or "", k) for k, table in enumerate(tables)),
+        position=positions,
+        kill_radius=np.array([table.kill_radius_m or 0.0 for table in tables]),
+        detection_radius=np.array([table.detection_radius_m or 0.0 for table in tables]),
+        kill_scale=np.array([table.kill_scale_m or 0.0 for table in tables]),
+        detection_scale=np.array([table.detection_scale_m or 0.0 for table in tables]),
+    )
