@@ -97,7 +97,8 @@ class LandingStrip:
     course: of the landing, rad clockwise from north; None for into the wind, see `into`.
     length, width: of the ground that can be landed on, m.
     approach: length of the straight final before the landing point, m.
-    slope: of the glide there, rad below level; None for one that the autopilot and the aircraft can fly.
+    slope: of the glide there, rad below level.
+    Either is None for what a plan finds that the autopilot and the aircraft can fly.
     """
 
     east: float
@@ -105,7 +106,7 @@ class LandingStrip:
     course: float | None = None
     length: float = 200.0
     width: float = 40.0
-    approach: float = 600.0
+    approach: float | None = None
     slope: float | None = None
 
     def into(self, wind: Wind, amsl: float) -> float | None:

@@ -499,13 +499,14 @@ class LandingTable(PositionTable):
     course_deg: of the landing, clockwise from north, or "wind" for into the wind.
     length_m, width_m: of the ground that can be landed on, its middle at the landing point.
     approach_m: of the straight final before the landing point.
-    slope_deg: of the glide there, below level; where it is not given, one that the autopilot and the aircraft can fly.
+    slope_deg: of the glide there, below level.
+    Where these two are not given, a plan takes what the autopilot and the aircraft can fly.
     """
 
     course_deg: Annotated[float, within(-360.0, 360.0, also=', or "wind"')] | Literal["wind"] = "wind"
     length_m: Annotated[float, within(20.0, 5000.0)] = 200.0
     width_m: Annotated[float, within(5.0, 500.0)] = 40.0
-    approach_m: Annotated[float, within(200.0, 5000.0)] = 600.0
+    approach_m: Annotated[float, within(200.0, 5000.0)] | None = None
     slope_deg: Annotated[float, within(1.0, 20.0)] | None = None
 
     @model_validator(mode="after")

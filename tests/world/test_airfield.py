@@ -75,7 +75,7 @@ def test_home_is_on_the_ground_below_the_start() -> None:
 def test_what_is_not_stated_is_left_to_the_method() -> None:
     scenario = field(launch={"method": "hand"}, landing={"east_m": 0, "north_m": 0}, returns={"require": ["rtl"]})
     assert scenario.launch == Launch("hand", None, None, None, math.radians(10.0))
-    assert scenario.landing == LandingStrip(0.0, 0.0, None, 200.0, 40.0, 600.0, None)
+    assert scenario.landing == LandingStrip(0.0, 0.0, None, 200.0, 40.0, None, None)
     assert scenario.returns is not None
     assert scenario.returns.rally.shape == (0, 3)
     assert scenario.returns.rtl_altitude is None
