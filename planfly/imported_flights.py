@@ -221,7 +221,7 @@ def _setup(
             limits,
             autopilot.return_rules,
             autopilot.loiter_rules,
-            autopilot.speeds_by_value,
+            autopilot.reads_as_px4,
         ),
         limits=limits,
         aircraft=aircraft.name,

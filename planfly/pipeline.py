@@ -1,7 +1,7 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -25,6 +25,8 @@ from logs.recording.recorder import thin_track
 from logs.verdict.conditions import Conditions, conditions_of
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.measures.circle_reach import beside_end
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
@@ -130,8 +132,20 @@ def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
 def make_plan(
     scenario: Scenario, airframe: Airframe, seed: int, algorithm: str | None = None, advance: Advance | None = None
 ) -> Plan:
-    """Plan within the scenario's and the aircraft's limits, as far as these are known for certain."""
-    return plan_path(scenario, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
+    """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
+
+    Where the autopilot circles at the mission's end, the certificate names what that may come too near to.
+    """
+    plan = plan_path(scenario, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
+    if not airframe.autopilot.loiter_rules.ends_in_circle:
+        return plan
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+    beside = beside_end(route_requirements(make_setup(scenario, airframe, mission, seed, plan=plan)))
+    if beside is None or not beside[1]:
+        return plan
+    circles = f"{airframe.autopilot.title} circles about the destination, up to {beside[0]:.0f} m from it"
+    problems = (*plan.certificate.problems, f"{circles}: {', '.join(beside[1])}")
+    return replace(plan, certificate=replace(plan.certificate, problems=problems))
 
 
 def make_setup(
@@ -153,7 +167,7 @@ def make_setup(
     fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
     autopilot = airframe.autopilot
-    laws = autopilot.return_rules, autopilot.loiter_rules, autopilot.speeds_by_value
+    laws = autopilot.return_rules, autopilot.loiter_rules, autopilot.reads_as_px4
     if placed is None:
         route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits, *laws)
     else:

@@ -197,8 +197,8 @@ class Autopilot(ABC):
     equivalent_airspeeds: whether commanded airspeeds count as equivalent ones, which are less than true ones at height;
     it then takes over in level flight.
     refuses: whether it takes no mission that PX4's feasibility checks refuse.
-    speeds_by_value: whether it reads nothing but the value of a mission's change of speed, and goes back to its own
-        airspeed for any that is not positive.
+    reads_as_px4: whether it reads nothing but the value of a mission's change of speed, goes back to its own airspeed
+        for any that is not positive, and reads gates.
     height_candidates, side_candidates: parameters that may decide a flight which fails by its height or its track.
     """
 
@@ -209,7 +209,7 @@ class Autopilot(ABC):
     cruise_parameter: ClassVar[str] = ""
     equivalent_airspeeds: ClassVar[bool] = False
     refuses: ClassVar[bool] = False
-    speeds_by_value: ClassVar[bool] = False
+    reads_as_px4: ClassVar[bool] = False
     height_candidates: ClassVar[tuple[Candidate, ...]] = ()
     side_candidates: ClassVar[tuple[Candidate, ...]] = ()
     parameters: Parameters | None = None

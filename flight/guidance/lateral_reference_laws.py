@@ -32,6 +32,8 @@ WAYPOINT = record_dtype(
     ("leaves_on_tangent", np.bool_),  # whether the line to what follows is to begin on its rim, not in its middle
     ("returns", np.bool_),  # whether the leg to it stands for a return; circle, centre and up are then of its target
     ("stop", np.int64),  # which of the route's stops it belongs to: a jump back leads to another of the same item
+    ("gate", np.bool_),  # whether it is a CONDITION_GATE, which is passed and not flown to
+    ("ends", np.bool_),  # whether the mission ends there and goes no further: not to land, not home
     "slope_base",  # m, as of `flight.mission.return_path.ReturnCircle`
 )
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
-from flight.mission.items import Mission, MissionItem
+from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import loiter_of
-from flight.mission.route import Route
+from flight.mission.route import Route, goes_no_further
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
 from world.kernels import Record, compiled, inner, record_dtype
 
@@ -272,7 +272,11 @@ def waypoint_records(route: Route, mission: Mission | None = None) -> Records:
     waypoints["up"] = route.waypoints[:, 2]
     waypoints["item"], waypoints["stop"] = route.items, route.stops
     _set_circles(waypoints[1:-1], route)
-    _set_loiters(waypoints, {} if mission is None else {item.seq: item for item in mission.items})
+    items = {} if mission is None else {item.seq: item for item in mission.items}
+    _set_loiters(waypoints, items)
+    gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
+    waypoints["gate"] = np.isin(route.items, gates)
+    waypoints["ends"][-1] = mission is not None and goes_no_further(route, mission)
     if route.return_to is not None:
         back = waypoints[route.return_from + 1 :]
         back["returns"] = True

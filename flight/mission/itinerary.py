@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from flight.mission.items import (
     CAMERA,
@@ -72,6 +73,18 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     return None
 
 
+class Gate(NamedTuple):
+    """A CONDITION_GATE on the way to a stop: what the mission orders after it counts from when it is passed.
+
+    item: the mission item's seq.  airspeed: m/s until it is passed, NaN for the aircraft's own.
+    """
+
+    item: int
+    lat_deg: float
+    lon_deg: float
+    airspeed: float
+
+
 @dataclass(frozen=True, slots=True)
 class ItineraryStop:
     """A position to fly to.
@@ -83,7 +96,8 @@ class ItineraryStop:
     airspeed: m/s on the leg that ends here, NaN for the aircraft's own.
     acceptance: radius, m, 0 where none is stated.
     loiter: the circle flown about it, None for none.
-    airspeed_by_value: as ``airspeed`` by an autopilot that reads nothing but the value of a change of speed.
+    airspeed_by_value: as ``airspeed`` by an autopilot that reads items as PX4 does.
+    gates: on the way to it, in order.
     """
 
     item: int
@@ -96,6 +110,7 @@ class ItineraryStop:
     acceptance: float = 0.0
     loiter: Loiter | None = None
     airspeed_by_value: float = math.nan
+    gates: tuple[Gate, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +123,8 @@ class Itinerary:
     notes: what is not flown as written, with item numbers.
     endless: seq of a jump without end, -1 for none.
     landing: the place to land at, None for none; the flight ends above it.
-    notes_by_value: as ``notes`` by an autopilot that reads nothing but the value of a change of speed.
+    notes_by_value: as ``notes`` by an autopilot that reads items as PX4 does: of a change of speed the value alone, and
+        gates.
     """
 
     stops: tuple[ItineraryStop, ...]
@@ -145,6 +161,8 @@ def make_itinerary(mission: Mission) -> Itinerary:
             )
         if walk.ended:
             break
+    for gate in walk.gates:
+        walk.notes.by_value.add("CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item)
     for item in mission.items:
         if item.seq not in reached and not (walk.ended and item.command == Command.DO_JUMP):
             walk.notes.add("never reached", item.seq)
@@ -214,6 +232,7 @@ class _Walk:
         self.notes = _BothNotes()
         self.stops: list[ItineraryStop] = []
         self.takeoff: MissionItem | None = None
+        self.gates: list[Gate] = []
         self.ended, self.endless = False, -1
         self.landing: ItineraryStop | None = None
         self.has_home = mission.home is not None
@@ -235,6 +254,8 @@ class _Walk:
             self._change_speed(item)
         elif item.command == Command.DO_LAND_START:
             self.notes.add("DO_LAND_START: a mark, nothing to fly", item.seq)
+        elif item.command == Command.CONDITION_GATE:
+            self._gate(item)
         elif item.command in CAMERA:
             self.notes.add(f"{command_name(item.command)}: the camera's, nothing to fly", item.seq)
         elif item.command != Command.DO_JUMP:
@@ -242,10 +263,19 @@ class _Walk:
 
     def _stop(self, item: MissionItem, acceptance: float = 0.0) -> ItineraryStop:
         lat, lon, loiter = item.lat_deg, item.lon_deg, loiter_of(item)
-        speeds = self.airspeed, self.airspeed_by_value
+        gates, self.gates = tuple(self.gates), []
         return ItineraryStop(
-            item.seq, item.command, lat, lon, item.alt, item.frame, speeds[0], acceptance, loiter, speeds[1]
+            *(item.seq, item.command, lat, lon, item.alt, item.frame),
+            *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates),
         )
+
+    def _gate(self, item: MissionItem) -> None:
+        """Note a gate.  ArduPlane has none; PX4 passes one without a place, or before the start, at once."""
+        self.notes.usual.add(f"{command_name(item.command)}: not flown", item.seq)
+        if item.has_position and self.stops:
+            self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.airspeed_by_value))
+        else:
+            self.notes.by_value.add(f"{command_name(item.command)}: passed at once", item.seq)
 
     def _take_off(self, item: MissionItem) -> None:
         name = command_name(item.command)

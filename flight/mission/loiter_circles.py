@@ -93,11 +93,11 @@ class LoiterRules:
         """What comes after the mission's end, a note for people.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
-        'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: not flown, not judged'
+        'after the last waypoint it circles about that without end, with NAV_LOITER_RAD, 80 m: flown once by its law'
         """
         name = f"{self.radius_name}, " if self.radius_name else ""
         circle = f"with {name}{abs(self.radius):g} m"
-        return f"after the last waypoint it circles about that without end, {circle}: not flown, not judged"
+        return f"after the last waypoint it circles about that without end, {circle}: flown once by its law"
 
 
 # Of an autopilot that has none of its own.

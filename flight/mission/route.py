@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
-from flight.mission.items import LANDINGS, Mission, Notes, command_name
+from flight.mission.items import LANDINGS, PLACES, Command, Mission, Notes, command_name
 from flight.mission.itinerary import Itinerary, ItineraryStop
 from flight.mission.loiter_circles import (
     PLAIN_SLOPE,
@@ -22,7 +22,7 @@ from flight.mission.loiter_circles import (
     Unjoined,
     lay_circles,
 )
-from flight.mission.placing import HIGHEST, LOWEST, PlacedMission, place_stops
+from flight.mission.placing import HIGHEST, LOWEST, SAME_PLACE, PlacedMission, place_stops
 from flight.mission.return_path import (
     USUAL_RULES,
     ReturnAbility,
@@ -33,7 +33,7 @@ from flight.mission.return_path import (
     lay_return,
 )
 from world.errors import MissionError
-from world.frames import GeoOrigin, to_geo
+from world.frames import GeoOrigin, to_geo, to_map
 from world.geometry import fly_by_offset, leg_courses, signed_turns, wrap
 from world.scenario import Scenario
 from world.terrain import Terrain
@@ -97,6 +97,18 @@ class Route:
     def legs(self) -> int:
         """How many legs there are."""
         return len(self.waypoints) - 1
+
+
+def goes_no_further(route: Route, mission: Mission) -> bool:
+    """Whether a route ends at a plain waypoint of its mission: not with a loiter, a landing or a return.
+
+    >>> route = Route(np.eye(3)[:2], np.ones(1), np.zeros(2), np.zeros(2, dtype=bool), np.array([1, 2]), "")
+    >>> goes_no_further(route, Mission(None, ()))
+    False
+    """
+    commands = {item.seq: item.command for item in mission.items}
+    last = commands.get(int(route.items[-1]), -1)
+    return last in PLACES and route.arcs[-1] == route.arcs[-2] == 0.0 and route.return_to is None
 
 
 # ----------------------------------------------------------------------
@@ -229,7 +241,7 @@ def make_route(
     limits: Limits | None = None,
     rules: ReturnRules = USUAL_RULES,
     loiters: LoiterRules = USUAL_LOITERS,
-    speeds_by_value: bool = False,
+    reads_as_px4: bool = False,
 ) -> Route:
     """Route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
 
@@ -239,7 +251,7 @@ def make_route(
     limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
         a spiral (5 %).
     rules, loiters: how whoever flies returns to launch, and flies loiters.
-    speeds_by_value: whether nothing but the value of a change of speed is read, as PX4 does.
+    reads_as_px4: whether nothing but the value of a change of speed is read, and gates are, as PX4 does.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
     has a horizontal length of at least `flight.mission.placing.SAME_PLACE`.  Raises MissionError, naming the item, for
@@ -257,7 +269,7 @@ def make_route(
     'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
     """
     return lay_route(
-        place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules, loiters, speeds_by_value
+        place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules, loiters, reads_as_px4
     )
 
 
@@ -268,7 +280,7 @@ def lay_route(
     limits: Limits | None = None,
     rules: ReturnRules = USUAL_RULES,
     loiters: LoiterRules = USUAL_LOITERS,
-    speeds_by_value: bool = False,
+    reads_as_px4: bool = False,
 ) -> Route:
     """Route through the places of a mission; arguments as of `make_route`.
 
@@ -281,7 +293,8 @@ def lay_route(
     [25.0]
     """
     mission, notes = placed.mission, Notes()
-    kept = [_with_airspeed(place, default_airspeed, speeds_by_value) for place in placed.stops]
+    places = _with_gates(placed, notes) if reads_as_px4 else list(placed.stops)
+    kept = [_with_airspeed(place, default_airspeed, reads_as_px4) for place in places]
     returning = kept.pop() if placed.itinerary.returns else None
     points, unjoined = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
     _note_circles(placed.itinerary, kept, loiters, notes)
@@ -306,7 +319,7 @@ def lay_route(
         fly_over=np.where(arcs > 0.0, False, fly_over | arc_misses(waypoints, airspeed, acceptance, limits)),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_started(placed.itinerary, stops[0], placed.origin, waypoints),
-        notes=(placed.itinerary.notes_by_value if speeds_by_value else placed.itinerary.notes)
+        notes=(placed.itinerary.notes_by_value if reads_as_px4 else placed.itinerary.notes)
         + placed.notes
         + notes.lines(),
         arcs=arcs,
@@ -371,6 +384,44 @@ def _lay_return(
     points += lay_return(points, stop, target, rules, ability)
     circle = ReturnCircle(*target.position, rules.radius or ability.circle, target.slope_base)
     return {"return_from": first, "return_to": circle}
+
+
+def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
+    """The places of a mission with the gates between them at which the airspeed changes, as PX4 passes them.
+
+    Each stands where its plane, at right angles to the way from the gate to the place after it, cuts the leg: an
+    aircraft on its leg passes it there.
+    """
+    out = list(placed.stops[:1])
+    for place in placed.stops[1:]:
+        stop, before, passed = place.stop, out[-1], 0.0
+        for k, gate in enumerate(stop.gates):
+            after = stop.gates[k + 1].airspeed if k + 1 < len(stop.gates) else stop.airspeed_by_value
+            if gate.airspeed == after or (math.isnan(gate.airspeed) and math.isnan(after)):
+                continue
+            if not all(one.stop.loiter is None and one.stop.command in PLACES for one in (before, place)):
+                text = "CONDITION_GATE beside what is no waypoint: the speed after it is flown from the leg's begin"
+                notes.add(text, gate.item)
+                continue
+            share = _gate_share(before.position, place.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg))
+            point = before.position + share * (place.position - before.position)
+            far = min(math.dist(point[:2], one.position[:2]) for one in (out[-1], place)) >= SAME_PLACE
+            if passed < share < 1.0 and far:
+                passed = share
+                at_gate = replace(
+                    stop, item=gate.item, command=int(Command.CONDITION_GATE), airspeed_by_value=gate.airspeed, gates=()
+                )
+                out.append(PlacedStop(at_gate, point))
+        out.append(place)
+    return out
+
+
+def _gate_share(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
+    """How far along the leg from a to b, as a share of it, the plane of a gate (east, north, m) cuts it."""
+    out = b[:2] - np.array([float(gate[0]), float(gate[1])])
+    along = float((b[:2] - a[:2]) @ out)
+    # From b backwards: b itself is as far beyond the plane as the gate is away from it.
+    return 1.0 - float(out @ out) / along if along > 0.0 else 0.0
 
 
 def _with_airspeed(place: PlacedStop, default: float, by_value: bool) -> PlacedStop:

@@ -95,6 +95,8 @@ class Airborne(ABC):
             # An autopilot that returns by a law of its own may circle longer than its path does.
             wider = true_by_equivalent(setup.route.return_to.up) ** 2
             patience += longest_circling(wider * setup.route.return_to.radius)
+        if setup.autopilot.loiter_rules.ends_in_circle and waypoints["ends"][-1]:
+            patience += longest_circling(setup.autopilot.loiter_rules.radius)
         self.max_ticks = int(patience / self.dt)
 
     @property

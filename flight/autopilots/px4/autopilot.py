@@ -43,7 +43,7 @@ _OTHER_RETURNS = {
 }
 
 # What of `flight.autopilots.px4.law.PX4_MEMORY` belongs to the way that is flown, and not to the aircraft.
-_OF_THE_WAY = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "waited")
+_OF_THE_WAY = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "finished", "waited", "end_turned")
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Px4(Autopilot):
     cruise_parameter: ClassVar = "FW_AIRSPD_TRIM"
     equivalent_airspeeds: ClassVar = True
     refuses: ClassVar = True
-    speeds_by_value: ClassVar = True
+    reads_as_px4: ClassVar = True
     height_candidates: ClassVar = HEIGHT_CANDIDATES
     side_candidates: ClassVar = SIDE_CANDIDATES
     parameters: Px4Parameters = field()

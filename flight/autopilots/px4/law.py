@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.px4.lateral import wanted_bank
-from flight.autopilots.px4.navigator import is_last, navigate
+from flight.autopilots.px4.navigator import flown_to, is_last, navigate
 from flight.autopilots.px4.parameters import PX4_PARAMETERS
 from flight.autopilots.px4.tecs import update_tecs
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -26,6 +26,7 @@ from flight.simulation.tick import (
     end_return,
     end_tick,
 )
+from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import Heights
 
@@ -46,7 +47,10 @@ PX4_MEMORY = record_dtype(
     ("circling", np.bool_),  # whether a circle is followed now
     ("returning", np.bool_),  # whether it returns to launch; from_east, from_north and from_up are then where it began
     ("climbed", np.bool_),  # whether it is at the height that it returns at
-    "waited",  # s at the mission's end for its height
+    ("finished", np.bool_),  # whether the mission's last waypoint was reached
+    "waited",  # s at the mission's end
+    "end_bearing",  # rad, from there
+    "end_turned",  # rad, around it
     # Lateral.
     "side_acceleration",  # m/s^2 to the right, as demanded
     "airspeed_for_ground",  # m/s, that the least ground speed takes; 0 for none
@@ -72,8 +76,10 @@ PX4_NUMBERS = PX4.itemsize // 8
 # PX4's flights of the Aerosonde, whose ailerons are fed forward what a roll rate takes and more (FW_RR_FF).
 ROLL_LAG = 0.65
 PITCH_LAG = 1.0
-# A mission whose last height is not reached by then, circling, is over, s.
+# A mission whose last height is not reached by then, or that is not once around its last waypoint, is over, s.
 LONGEST_WAIT = 300.0
+# Its circle about that begins within this share of its radius of the rim.
+_ON_CIRCLE = 0.5
 
 
 @compiled
@@ -139,8 +145,8 @@ def fly_as_px4(
     memory.speed_command = min(parameters.airspeed_max, wanted) * factor
     if own.returning:
         end_return(estimated, waypoints[own.leg + 1], memory, dt)
-    elif own.leg + 2 >= waypoints.shape[0]:
-        _end_mission(estimated, waypoints[own.leg + 1], memory, parameters, own, dt)
+    elif flown_to(waypoints, own) + 1 >= waypoints.shape[0]:
+        _end_mission(estimated, waypoints[waypoints.shape[0] - 1], memory, parameters, own, dt)
     step = parameters.roll_slew * dt
     bank = wanted_bank(own.side_acceleration, parameters)
     own.roll_demand = min(own.roll_demand + step, max(own.roll_demand - step, bank)) if step > 0.0 else bank
@@ -152,18 +158,39 @@ def fly_as_px4(
 def _end_mission(
     estimated: Record, b: Record, memory: Record, parameters: Record, own: Record, dt: float
 ) -> None:  # pragma: no cover - compiled
-    """End the flight past the last waypoint, where its height is reached, or not for as long as is waited for it.
+    """End the flight past the last waypoint b, at its height, or not for as long as is waited for it.
 
-    A circle that is begun before the waypoint, and left at once because the height is there, does not end it.
+    Where the mission goes no further, PX4 circles there without end (`MissionBase::setEndOfMissionItems`): the flight
+    goes once around.  A circle that is begun before the waypoint, and left at once because the height is there, does
+    not end it.
     """
-    here = own.waited > 0.0 or memory.done or own.circling
+    here = own.waited > 0.0 or memory.done or own.circling or own.finished
     if not here or b.circle != 0.0:
         return
     own.waited += dt
     # What circles at the end has not missed it.
     memory.returning = True
-    at_height = abs(estimated.up - b.up) <= parameters.height_acceptance
-    memory.done = (memory.done and at_height) or own.waited > LONGEST_WAIT
+    if b.ends:
+        if own.finished:
+            _turn_about(estimated, b, parameters, own)
+        ended = abs(own.end_turned) >= 2.0 * math.pi
+    else:
+        ended = memory.done and abs(estimated.up - b.up) <= parameters.height_acceptance
+    memory.done = ended or own.waited > LONGEST_WAIT
+
+
+@inner
+def _turn_about(estimated: Record, b: Record, parameters: Record, own: Record) -> None:  # pragma: no cover - compiled
+    """Count how far the aircraft has turned about the last waypoint b, once it is on its circle."""
+    off_east, off_north = estimated.east - b.east, estimated.north - b.north
+    if math.hypot(off_east, off_north) < _ON_CIRCLE * abs(parameters.loiter_radius):
+        return
+    bearing = math.atan2(off_east, off_north)
+    if own.end_turned != 0.0:
+        own.end_turned += wrap(bearing - own.end_bearing)
+    else:
+        own.end_turned = math.copysign(1e-9, parameters.loiter_radius)
+    own.end_bearing = bearing
 
 
 @inner

@@ -11,6 +11,10 @@ at the middle.  It is reached, once, within that radius of its rim and near its 
 left at once for the line from its middle to the next waypoint: on the course there, or for a line that begins at the
 tangent's place on the rim, only where its item asks for that.  LOITER_TIME asks for its height all along; LOITER_TO_ALT
 for the height at which its leg began until its rim is reached, and for its own from then on.
+
+At a gate (CONDITION_GATE) the aircraft flies to the waypoint after it, and what the mission orders between them, a
+change of speed, counts from when it crosses the plane through the gate.  From when the last waypoint is reached, PX4
+circles about it with NAV_LOITER_RAD.
 """
 
 import math
@@ -66,7 +70,10 @@ def navigate(
     parameters: of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
     own: of `flight.autopilots.px4.law.PX4_MEMORY`.  dt: s.
     """
-    b = waypoints[own.leg + 1]
+    target = flown_to(waypoints, own)
+    b = waypoints[target]
+    if target > own.leg + 1 and _past_gate(estimated, waypoints[own.leg + 1], b):
+        own.leg += 1
     if b.returns:
         # A return goes on until the flight ends, in one leg.
         _return(estimated, b, wind_east, wind_north, airspeed_demand, parameters, own)
@@ -74,34 +81,61 @@ def navigate(
     if b.circle != 0.0:
         _loiter(estimated, waypoints, b, wind_east, wind_north, airspeed_demand, parameters, own, dt)
     else:
-        _follow_plain_leg(estimated, waypoints, b, wind_east, wind_north, airspeed_demand, parameters, own, dt)
+        _follow_plain_leg(estimated, waypoints, target, wind_east, wind_north, airspeed_demand, parameters, own, dt)
+
+
+@inner
+def flown_to(waypoints: Records, own: Record) -> int:  # pragma: no cover - compiled
+    """Number of the waypoint that is flown to: gates are passed on the way there, and are nothing to fly to."""
+    target: int = own.leg + 1
+    while waypoints[target].gate:
+        target += 1
+    return target
+
+
+@inner
+def _past_gate(estimated: Record, gate: Record, b: Record) -> bool:  # pragma: no cover - compiled
+    """Whether the plane through a gate is crossed, at right angles to the way from it to the waypoint b after it."""
+    onward_east, onward_north = b.east - gate.east, b.north - gate.north
+    ahead = (estimated.east - gate.east) * onward_east + (estimated.north - gate.north) * onward_north
+    past: bool = ahead >= 0.0
+    return past
 
 
 @inner
 def _follow_plain_leg(
-    estimated: Record, waypoints: Records, b: Record, wind_east: float, wind_north: float, airspeed_demand: float,
+    estimated: Record, waypoints: Records, target: int, wind_east: float, wind_north: float, airspeed_demand: float,
     parameters: Record, own: Record, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Follow the leg to a waypoint b, and circle at it where the aircraft came there too high or too low."""
+    """Follow the leg to a waypoint, and circle at it where the aircraft came there too high or too low.
+
+    A mission's last one is circled about from when it is reached.
+    """
+    b = waypoints[target]
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     early, radius = switch_distance(speed, parameters), parameters.loiter_radius
     distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
     own.nearest = min(own.nearest, distance)
     high_or_low = abs(estimated.up - b.up) > parameters.height_acceptance
     # Once begun, the circle is not left for being wide.
-    own.circling = high_or_low and (own.circling or distance < early)
+    own.circling = own.finished or (high_or_low and (own.circling or distance < early))
     if own.circling:
         follow_circle(estimated, b.east, b.north, radius, wind_east, wind_north, airspeed_demand, parameters, own)
         own.height_asked = b.up
     else:
         follow_leg(estimated, b.east, b.north, wind_east, wind_north, airspeed_demand, parameters, own)
         own.height_asked = leg_height(b.east, b.north, b.up, max(early, abs(radius)), own)
-    if own.leg + 2 >= waypoints.shape[0]:
+    is_end = target + 1 >= waypoints.shape[0]
+    if is_end and not b.ends:
         return
     near = distance <= reach_radius(speed, parameters) or past_waypoint(estimated, b, own)
     own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (near and not high_or_low) else 0.0
-    if own.reached_for > SWITCH_DELAY:
-        begin_leg(estimated, waypoints, own.leg + 1, own)
+    if own.reached_for <= SWITCH_DELAY:
+        return
+    if is_end:
+        own.finished = True
+    else:
+        begin_leg(estimated, waypoints, target, own)
 
 
 @inner
@@ -141,8 +175,9 @@ def _loiter(
 @inner
 def is_last(waypoints: Records, own: Record) -> bool:  # pragma: no cover - compiled
     """Whether nothing comes after what is flown to now, a loiter's own corners left aside."""
-    b = waypoints[own.leg + 1]
-    last: bool = own.leg + 2 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].stop == b.stop)
+    target = flown_to(waypoints, own)
+    b = waypoints[target]
+    last: bool = target + 1 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].stop == b.stop)
     return last
 
 

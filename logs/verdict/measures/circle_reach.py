@@ -10,11 +10,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.mission.route import goes_no_further
 from logs.verdict.measures.path_moves import MOVE
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.zone_visits import path_zones
-from logs.verdict.tolerances import CLEARANCE_TOLERANCE, HEIGHT_TOLERANCE, ROUNDING
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE, HEIGHT_TOLERANCE, ROUNDING, SWING
 from world.kernels import Records
 from world.threats import threat_label
 
@@ -37,6 +38,22 @@ def within_reach(requirements: RouteRequirements, middle: Floats, low: float, hi
         *_zones(requirements, middle, low, high, reach),
         *_edges(requirements, middle, reach),
     ]
+
+
+def beside_end(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
+    """How far (m) the circles about a mission's end may get, and what they could come too near to, in words.
+
+    None where the autopilot does not circle there, and where the mission goes further.
+    """
+    setup, rules = requirements.setup, requirements.setup.autopilot.loiter_rules
+    if not rules.ends_in_circle or not goes_no_further(setup.route, setup.mission):
+        return None
+    up, speed = float(requirements.points[-1, 2]), float(requirements.route.airspeed[-1])
+    held = max(requirements.limits.turn_radius(course, course + math.pi, up, speed) for course in (0.0, math.pi))
+    reach = SWING * max(abs(rules.radius), held)
+    if not math.isfinite(reach):
+        return reach, ["the wind leaves no way around it"]
+    return reach, within_reach(requirements, requirements.points[-1, :2], up, up, reach)
 
 
 def _ground(requirements: RouteRequirements, middle: Floats, low: float, high: float, reach: float) -> list[str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flight.mission.itinerary import loiter_of
 from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.circle_reach import within_reach
+from logs.verdict.measures.circle_reach import beside_end, within_reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
 from logs.verdict.places import Place
@@ -109,6 +109,32 @@ def fold_loiters(
                 reason = f"{worst.reason}; the worst of the circle's {len(mine)} legs"
                 kept[at_worst] = replace(worst, reason=reason)
     return tuple(item for item in kept if item is not None)
+
+
+def end_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
+    """Judge before a flight what stands beside the end of a mission where its autopilot circles; a flight goes around.
+
+    aligned: not read.
+    """
+    beside = beside_end(requirements) if geometric else None
+    if beside is None:
+        return []
+    reach, found = beside
+    reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
+    if found:
+        reason += f": {', '.join(found)}: only a flight tells how near it comes"
+    return [
+        make_finding(
+            "loiter",
+            requirements.waypoint(requirements.legs),
+            ok=None if found else True,
+            reason=reason,
+            method="all that its circles may reach, at the height of the last waypoint",
+            check=UNKNOWN_WAY if found else "",
+        )
+    ]
 
 
 def _badness(item: Finding) -> tuple[int, float]:
@@ -259,6 +285,7 @@ RULE = Rule(
     asks="Can each circle be held at the bank limit in this wind, and was it flown to its end?",
     margin=Margin("radius", "m", 10.0),
     tolerances=("RADIUS_TOLERANCE", "PASS", "BANK_TOLERANCE", "SWING", "WIDER_SHARE"),
+    judge=end_findings,
     merge=fold_loiters,
     log=LogNeeds(aircraft=True),
     phrase=_numbers,

@@ -53,9 +53,60 @@ def test_a_speed_by_its_value_alone_is_that_or_the_autopilots_own(
     change: str, airspeed: float, noted: str | None
 ) -> None:
     items = wp(0, 0), "2 178 0 28 -1 0 0 0 0", wp(0, 900), f"2 178 {change} 0 0 0 0", wp(0, 1800)
-    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, speeds_by_value=True)
+    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, reads_as_px4=True)
     assert flown.airspeed.tolist() == [28.0, airspeed]
     assert flown.notes[-1:] == (() if noted is None else (f"item 4: {noted}",))
+
+
+def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
+    gate, fast, slow = wp(300, 600, command=4501), "2 178 0 28 -1 0 0 0 0", "2 178 0 20 -1 0 0 0 0"
+    items = wp(0, 0), fast, gate, slow, wp(0, 1800)
+    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, reads_as_px4=True)
+    # From the gate to item 5 lead (-300, 1200): at right angles to that, 300^2 / 1200 m sooner on the leg.
+    assert flown.waypoints[:, :2] == pytest.approx(np.array([[0.0, 0.0], [0.0, 525.0], [0.0, 1800.0]]), abs=0.1)
+    assert (flown.airspeed.tolist(), flown.items.tolist(), flown.notes) == ([28.0, 20.0], [1, 3, 5], ())
+    # ArduPlane has no gates.
+    plain = route(*items)
+    assert (plain.airspeed.tolist(), plain.items.tolist()) == ([20.0], [1, 5])
+    assert plain.notes == ("item 3: CONDITION_GATE: not flown",)
+
+
+@pytest.mark.parametrize(
+    ("items", "airspeed", "noted"),
+    [
+        # Behind the leg's begin: passed at once.
+        ((wp(0, 0), wp(0, -300, command=4501), "2 178 0 20 -1 0 0 0 0", wp(0, 1800)), [20.0], []),
+        # Two on one leg, the second one behind the first one's plane.
+        (
+            (
+                *(wp(0, 0), wp(0, 900, command=4501), "2 178 0 28 -1 0 0 0 0"),
+                *(wp(0, 600, command=4501), "2 178 0 20 -1 0 0 0 0", wp(0, 1800)),
+            ),
+            [25.0, 20.0],
+            [],
+        ),
+        ((wp(0, 0), wp(0, 900, command=4501), wp(0, 1800)), [25.0], []),
+        (
+            (wp(0, 0), wp(0, 1800), wp(0, 2000, command=4501)),
+            [25.0],
+            ["item 3: CONDITION_GATE: nothing to fly to comes after it, so it is passed at once"],
+        ),
+        (
+            (wp(0, 0), wp(0, 900, command=4501), "2 178 0 20 -1 0 0 0 0", wp(0, 1800, command=17, p="0 0 100 0")),
+            None,
+            ["item 2: CONDITION_GATE beside what is no waypoint: the speed after it is flown from the leg's begin"],
+        ),
+    ],
+)
+def test_gates_that_leave_their_leg_whole(
+    items: tuple[str, ...], airspeed: list[float] | None, noted: list[str]
+) -> None:
+    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, reads_as_px4=True)
+    assert [note for note in flown.notes if "GATE" in note] == noted
+    if airspeed is None:
+        assert flown.airspeed[0] == 20.0
+    else:
+        assert flown.airspeed.tolist() == airspeed
 
 
 def test_what_is_the_cameras_is_not_called_not_flown() -> None:

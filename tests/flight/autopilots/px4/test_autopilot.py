@@ -56,7 +56,7 @@ def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     assert made.speeds_flown(np.array([10.0, 20.0, 40.0]), 25.0).tolist() == [18.0, 20.0, 31.0]
     assert made.speed_limits is not None
     assert made.speed_limits.nearest
-    assert made.speeds_by_value
+    assert made.reads_as_px4
     assert made.stated_airspeed == (25.0, "FW_AIRSPD_TRIM")
     assert made.stated_bank == pytest.approx(np.radians(40.0))
     assert (made.return_rules.height, made.return_rules.radius) == (100.0, 80.0)

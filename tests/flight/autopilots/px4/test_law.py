@@ -17,7 +17,7 @@ def test_a_leg_is_counted_in_whole_numbers_and_all_else_are_numbers() -> None:
     kinds = {name: PX4_MEMORY[name] for name in field_names(PX4_MEMORY)}
     assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg"}
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
-    assert truths == {"begun", "at_rim", "circling", "returning", "climbed"}
+    assert truths == {"begun", "at_rim", "circling", "returning", "climbed", "finished"}
 
 
 # Waypoints at which PX4 began to circle, until it was within 10 m of the height: after slopes of 12.9 %, which 3 m/s up

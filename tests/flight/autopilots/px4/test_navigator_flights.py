@@ -11,6 +11,7 @@ from flight.autopilots.px4.parameters import load_parameters
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import SimulatedFlight, simulate
+from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_flight
 from tests.mission_lines import ORIGIN, setup_of, wp
 from tests.setups import MakeSetup
@@ -25,6 +26,11 @@ def flown(aerosonde: Aircraft, *lines: str, **values: float) -> tuple[FlightSetu
     )
     setup = replace(made, route=route, autopilot=law)
     return setup, simulate(setup, aerosonde)
+
+
+def until(track: Track, east: float, north: float) -> slice:
+    """The rows until the aircraft is nearest to a place: to a last waypoint, before the circle about that."""
+    return slice(0, int(np.argmin(np.hypot(track.position[:, 0] - east, track.position[:, 1] - north))) + 1)
 
 
 def test_the_circle_at_the_gate_has_the_radius_of_loiters(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
@@ -63,7 +69,8 @@ def test_a_loiter_to_a_height_is_flown_to_level_and_left_at_that_height(aerosond
         aerosonde, wp(0, -1500, 300), wp(0, 0, 450, 31, p=f"0 {radius} 0 0"), wp(2500, 0, 450)
     )  # fmt: skip
     assert result.ended == "completed"
-    position, time = result.track.position, result.track.time
+    rows = until(result.track, 2500.0, 0.0)
+    position, time = result.track.position[rows], result.track.time[rows]
     away = np.hypot(position[:, 0], position[:, 1])
     rim = int(np.argmax(away < radius + 10.0))
     assert np.abs(position[:rim, 2] - 600.0).max() < 3.0
@@ -89,7 +96,7 @@ def test_a_loiter_for_a_time_ends(aerosonde: Aircraft, radius: int, flyable: boo
     track = result.track
     # 1,340 to 1,390 m to the rim, 60 s, 2,121 m on from the middle; and from wherever that finds it, around to there.
     least = (1340.0 + 2121.0 - radius) / 25.7 + 60.0
-    assert least < track.time[-1] < least + 35.0
+    assert least < track.time[until(track, 1500.0, 1500.0)][-1] < least + 35.0
     verdict = judge_flight(setup, track, result.ended)
     assert verdict.flyable is flyable
     # The bank of 30 degrees flies 119 m at the least.
@@ -110,3 +117,56 @@ def test_a_circle_left_on_its_far_side_is_left_within_its_corridor(aerosonde: Ai
     track = result.track
     level = int(np.argmax(track.position[:, 2] > 710.0))
     assert track.time[level] == pytest.approx(110.0 / 3.0 + 3.5, abs=4.0)
+
+
+@pytest.mark.parametrize(("version", "before"), [("1.16", 56.0), ("1.17", 10.0)])
+def test_after_the_last_waypoint_it_goes_once_around(aerosonde: Aircraft, version: str, before: float) -> None:
+    law = Px4(load_parameters(aerosonde, None, version))
+    made = setup_of(wp(0, -1500, 300), wp(0, 0, 300))
+    setup = replace(made, autopilot=law)
+    result = simulate(setup, aerosonde)
+    assert result.ended == "completed"
+    east, north, up = result.track.position.T
+    # It is reached where any other waypoint is: 2.24 s before it up to 1.16, NAV_ACC_RAD (10 m) before it from 1.17 on.
+    turning = int(np.argmax(np.abs(result.track.attitude[:, 0]) > np.radians(5.0)))
+    assert -north[turning] == pytest.approx(before, abs=20.0)
+    bearing = np.unwrap(np.arctan2(east[turning:], north[turning:]))
+    assert 2.0 * np.pi - 0.1 < abs(bearing[-1] - bearing[np.hypot(east, north)[turning:] > 40.0][0]) < 2.0 * np.pi + 0.1
+    # NAV_LOITER_RAD is 80 m, to the right.  At 25.7 m/s a bank of 30 degrees turns with 117 m: a circle of that from
+    # the waypoint leads 233 m away, and a bank that is not all held some metres more.
+    radius = 25.7**2 / (9.80665 * np.tan(np.pi / 6.0))
+    assert radius < np.hypot(east, north)[turning:].max() < 2.1 * radius
+    assert east[turning + 600] > 20.0
+    assert np.abs(up[turning:] - 600.0).max() < 10.0
+    assert judge_flight(setup, result.track, result.ended).flyable
+
+
+def test_what_stands_beside_the_last_waypoint_is_met_in_its_circle(aerosonde: Aircraft) -> None:
+    # Its middle is 200 m beside the leg, and the first circle leads 233 m to that side.
+    missile = {"name": "m", "east_m": 200.0, "north_m": 60.0, "amsl_m": 600.0, "kill_radius_m": 60.0}
+    missile |= {"kill_scale_m": 60.0, "detection_radius_m": 61.0, "detection_scale_m": 60.0}
+    law, way = Px4(load_parameters(aerosonde)), (wp(0, -1500, 300), wp(0, 0, 300), wp(0, 1500, 300))
+    for count, flies in ((2, False), (3, True)):
+        made = setup_of(*way[:count], threats=[missile])
+        setup = replace(made, scenario=replace(made.scenario, external=False), autopilot=law)
+        result = simulate(setup, aerosonde)
+        assert result.ended == "completed"
+        assert judge_flight(setup, result.track, result.ended).flyable is flies
+
+
+def test_a_speed_after_a_gate_counts_from_where_it_is_crossed(aerosonde: Aircraft) -> None:
+    # The gate is 300 m beside the leg; its plane, at right angles to the way from there to item 4, cuts the leg 75 m
+    # sooner.
+    gate, slow = wp(300, 600, command=4501), "2 178 0 20 -1 0 0 0 0"
+    law = Px4(load_parameters(aerosonde, None, "1.17"))
+    made = setup_of(wp(0, 0, 300), gate, slow, wp(0, 1800, 300))
+    laws = law.return_rules, law.loiter_rules, law.reads_as_px4
+    route = make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, *laws)
+    result = simulate(replace(made, route=route, autopilot=law), aerosonde)
+    assert result.ended == "completed"
+    track = result.track
+    slowed = int(np.argmax(np.diff(track.speed_command) < -1.0))
+    assert track.position[slowed, 1] == pytest.approx(525.0, abs=2.0)
+    # Nothing is flown to there, and no leg begins.
+    rows = until(track, 0.0, 1800.0)
+    assert np.abs(track.position[rows, 0]).max() < 2.0
