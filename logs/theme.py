@@ -56,6 +56,13 @@ _FLOWN = Look("#000000", "#f4f4f4", width=1.1)
 _FAIL = Look(_PURPLE, "#e87cc4", width=2.2, size=12.0)
 _ZONE = Look(_BROWN, "#e89090", fill=0.14, hatch="////")
 _SECOND = Look(_BLUE, "#7cc0f5", width=1.8)
+_GREY, _PALE_GREY = "#6b6b6b", "#a9adb5"
+# The way, by what comes of a return from there, and by what can be reached from there without an engine.
+_SAFE = Look(_GREEN, "#2fc79a", width=4.4, halo=True)
+_WRONG = Look(_PURPLE, "#e87cc4", width=4.4, dash=(5.0, 1.0), halo=True)
+_SHORT = Look(_ORANGE, "#ffb938", width=4.4, dash=(9.0, 2.0), halo=True)
+_SPARE = 1.8  # width of a line of what is left over
+_NOT_KNOWN = Look(_GREY, _PALE_GREY, width=4.4, dash=(2.0, 3.0), halo=True)
 
 # What data stands for, by its role.
 LOOKS = {
@@ -72,7 +79,7 @@ LOOKS = {
     "commanded": Look(_ORANGE, "#ffb938", width=2.0),
     "second": _SECOND,
     "other": Look(_VERMILLION, "#ff8033", width=1.4, dash=(5.0, 2.0)),
-    "difference": Look("#6b6b6b", "#a9adb5", width=1.0, fill=0.25),
+    "difference": Look(_GREY, _PALE_GREY, width=1.0, fill=0.25),
     "waypoint": Look(_BLUE, "#7cc0f5", width=1.0, size=4.6, face="paper"),
     "waypoint-small": Look(_BLUE, "#7cc0f5", width=0.5, size=1.6, face="paper"),
     "start": Look("#000000", "#000000", width=1.0, size=9.0, face="highlight", marker="triangle"),
@@ -92,6 +99,29 @@ LOOKS = {
     "pole": Look("#555555", "#a9adb5", width=0.7),
     "level-ground": Look("#8b8b92", "#7d838d", width=0.8, fill=0.1),
     "aircraft": Look("#c8102e", "#ff5a6e", width=2.0),
+    "return-safe": _SAFE,
+    "return-ground": _WRONG,
+    "return-threat": Look(_VERMILLION, "#ff8033", width=4.4, dash=(3.0, 1.5), halo=True),
+    "return-zone": Look(_BROWN, "#e89090", width=4.4, dash=(9.0, 2.0, 2.0, 2.0), halo=True),
+    "return-lost": Look(_BLUE, "#7cc0f5", width=4.4, dash=(6.0, 2.0, 2.0, 2.0), halo=True),
+    "return-energy": Look(_BLUE, "#7cc0f5", width=4.4, dash=(2.0, 1.5), halo=True),
+    "return-low": _SHORT,
+    "return-unknown": _NOT_KNOWN,
+    "return-unsure": Look(_GREY, _PALE_GREY, width=4.4, dash=(6.0, 3.0), halo=True),
+    "return-way": Look("#1d1d1f", "#f4f4f4", width=1.5, dash=(9.0, 2.0), halo=True),
+    "reach-home": _SAFE,
+    "reach-site": Look(_BLUE, "#7cc0f5", width=4.4, dash=(14.0, 2.0), halo=True),
+    "reach-flat": _SHORT,
+    "reach-nothing": _WRONG,
+    "reach-unknown": _NOT_KNOWN,
+    "left-home": Look(_GREEN, "#2fc79a", width=_SPARE),
+    "left-site": Look(_BLUE, "#7cc0f5", width=_SPARE, dash=(8.0, 2.0)),
+    "left-flat": Look(_ORANGE, "#ffb938", width=_SPARE, dash=(4.0, 1.5)),
+    "glide-near": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.58),
+    "glide-middle": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.4),
+    "glide-far": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.22),
+    "landable": Look(_YELLOW, _YELLOW, width=0.0, fill=0.45, hatch="..."),
+    "comes-down": Look("#333333", "#e8e8ea", width=1.0, size=3.4, face="paper"),
 }
 
 # What stands around the data, by its use: light and dark.

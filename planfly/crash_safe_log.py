@@ -12,6 +12,7 @@ from flight.simulation.track import Rows
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Verdict
 from logs.verdict.places import ReferenceFlights
+from logs.verdict.returns.drawn_returns import DrawnReturns
 from world.files import hold
 from world.geometry import leg_runs
 from world.interruption import uninterrupted
@@ -161,11 +162,13 @@ class CrashSafeLog:
         """Record what happened; arguments as of `Recorder.event`."""
         self._recorder.event(time, text, level)
 
-    def finish(self, ended: str, verdict: Verdict, reference: ReferenceFlights | None) -> None:
+    def finish(
+        self, ended: str, verdict: Verdict, reference: ReferenceFlights | None, returns: DrawnReturns | None = None
+    ) -> None:
         """Close the log of a flight that has been judged."""
         with uninterrupted(), self._named_errors():
             self._open = False
-            self._recorder.finish(ended, verdict, reference)
+            self._recorder.finish(ended, verdict, reference, returns)
 
     @contextlib.contextmanager
     def _named_errors(self) -> Iterator[None]:

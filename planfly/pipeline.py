@@ -32,6 +32,7 @@ from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.reference_flights import judge_with_reference_flights
+from planfly.returns_beside import ReturnsBeside, returns_beside
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
@@ -97,6 +98,7 @@ class JudgedFlight:
     verdict: on these rows.
     events: what the log holds beside them.
     reference: what other flights had to say of it; None where none were flown.
+    returns: from a few places of it; None where they were not asked for.
     """
 
     setup: FlightSetup
@@ -105,6 +107,7 @@ class JudgedFlight:
     verdict: Verdict
     events: tuple[LogEvent, ...]
     reference: ReferenceFlights | None = None
+    returns: ReturnsBeside | None = None
 
 
 def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | None = None) -> PlanThenFly:
@@ -200,6 +203,7 @@ def fly_and_judge(
     autopilot: Path | None = None,
     off_nominal: OffNominal | None = None,
     reference: bool = True,
+    returns: bool = False,
     limits: FlightLimits = _USUAL_LIMITS,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
@@ -208,6 +212,7 @@ def fly_and_judge(
     autopilot: the program of ArduPlane or PX4, which then flies; its own log is kept beside ours.
     off_nominal: how the flight differs from what guidance knows; none of a program's.
     reference: whether the flights below are flown; whether it is flyable does not depend on them.
+    returns: whether returns from a few places are judged and drawn in the log, if one is named.
     limits: how long it may fly, and how large its log may grow.
 
     An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
@@ -223,10 +228,12 @@ def fly_and_judge(
     try:
         if autopilot is not None:
             program = program_autopilot(autopilot).flying(setup.autopilot, autopilot)
-            return _fly_program(setup, program, airframe, log, advance, every, limits)
+            return _fly_program(setup, program, airframe, log, advance, every, limits, returns=returns)
         how = off_nominal or OffNominal(Variation())
         flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
-        return _record_and_judge(setup, airframe, flight, log, advance, every, limits, reference=reference)
+        return _record_and_judge(
+            setup, airframe, flight, log, advance, every, limits, reference=reference, returns=returns
+        )
     except StartError as error:
         return _unflown(setup, log, f"not started: {error.reason}")
 
@@ -246,11 +253,13 @@ def _fly_program(
     advance: Advance | None,
     every: int,
     limits: FlightLimits,
+    *,
+    returns: bool,
 ) -> JudgedFlight:
     with program.start(setup, airframe.aircraft) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every, limits)
+            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every, limits, returns=returns)
         except FlightError:
             if log is not None:
                 log.unlink(missing_ok=True)
@@ -279,6 +288,7 @@ def _record_and_judge(
     limits: FlightLimits,
     *,
     reference: bool = True,
+    returns: bool = False,
 ) -> JudgedFlight:
     flight.max_ticks = min(flight.max_ticks, limits.max_ticks(flight.dt))
 
@@ -295,8 +305,10 @@ def _record_and_judge(
         judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended, reference=reference)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        recorder.finish(judged.ended, judged.verdict, judged.reference)
-    return judged
+        beside = returns_beside(setup, judged.track) if returns else None
+        drawn = None if beside is None else beside.plainly_drawn()
+        recorder.finish(judged.ended, judged.verdict, judged.reference, drawn)
+    return replace(judged, returns=beside)
 
 
 def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:

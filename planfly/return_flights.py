@@ -1,4 +1,4 @@
-"""Returns to launch beside a verdict, and one flown in JSBSim by the whole law."""
+"""A return to launch flown in JSBSim by the whole law."""
 
 import math
 from dataclasses import replace
@@ -7,12 +7,8 @@ import numpy as np
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.mission.items import Command, Frame, Mission, MissionItem
-from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
-from flight.simulation.track import Track
-from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, return_world
-from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.judge_returns import ReturnWorld
 from planfly.airframe import load_airframe
 from planfly.pipeline import make_setup
 from world.errors import PlanflyError
@@ -81,38 +77,3 @@ def _mission(world: ReturnWorld, start: Record) -> Mission:
         place_up = point.up - point.base
         rally.append(MissionItem(number, Command.NAV_RALLY_POINT, frame, (0.0,) * 4, lat, lon, place_up))
     return Mission(mission.home, tuple(items), rally=tuple(rally), source=mission.source)
-
-
-# ----------------------------------------------------------------------
-
-
-def return_starts(setup: FlightSetup, track: Track | None, every: float) -> ReturnStarts:
-    """Of the track, or of the planned path where nothing was flown."""
-    if track is not None and len(track):
-        return flown_starts(setup, track, every)
-    return planned_starts(setup, every)
-
-
-# Returns of which the line beside a verdict is made.
-_FEW = 50
-
-
-def returns_line(setup: FlightSetup, track: Track | None) -> str:
-    """Returns from a few places of a flight, or of the planned path, in a line; "" without a home or a terrain.
-
-    Those in JSBSim are left out.
-    """
-    if setup.mission.home is None or setup.scenario.terrain is None:
-        return ""
-    try:
-        world = return_world(setup)
-        seconds = setup.path.length / max(1.0, setup.airspeed)
-        if track is not None and len(track):
-            seconds = float(track.time[-1] - track.time[0])
-        every = max(1.0, seconds / _FEW)
-        found = judge_returns(world, return_starts(setup, track, every), every)
-    except PlanflyError as error:
-        return f"not judged: {error}"
-    own = world.stands_in and not world.other_law
-    stands_in = f" (by ArduPlane's law in place of {setup.autopilot.title}'s)" if own else ""
-    return headline(found) + stands_in

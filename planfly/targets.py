@@ -38,6 +38,12 @@ SURVEY_FILES = (
     *(f"{kind}.waypoints" for kind in ("side", "turn-around", "every", "course", "parameter", "airspeed")),
     "parameter.param",
 )
+# What `planfly.returns` may write.
+RETURN_FILES = (
+    *(f"{name}.png" for name in ("returns", "worst-returns", "return-heights", "glide")),
+    "returns.kml",
+    "returns.mcap",
+)
 # Stretches of a flight that are flown again, and what is written of each: of those after the first with its number.
 REFLOWN = 9
 REFLY_FILES = tuple(

@@ -28,6 +28,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from logs import theme
 from logs.recording.state_channel import length_delimited, repeated_submessages
+from logs.verdict.returns.drawn_returns import DrawnReturns
+from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
 from world.airspace.zones_on_map import zone_walls
 from world.scenario import Scenario
 from world.terrain import Terrain
@@ -56,6 +58,8 @@ _PLAN, _TRACK = theme.rgba("planned", dark=True), theme.rgba("flown", dark=True)
 _KEEP_OUT, _STAY_IN = theme.rgba("zone", dark=True), theme.rgba("highlight", dark=True)
 # A name stands so far above the ground within this of its place, m.
 _LIFT, _NEAR = 40.0, 300.0
+# The way's colour lies so far below the flight, an outline on the ground so far above it, m.
+_BELOW, _OVER_GROUND = 6.0, 4.0
 # Upright lines of one outline of a zone, about.
 MAX_POSTS = 24
 
@@ -242,6 +246,42 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
                 entity.lines[-1].points.extend(_points(path))
         entity.texts.append(_name(_above_ground(walls[0][0, 1], scenario.terrain), zone.name))
     return _update(entity)
+
+
+def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) -> bytes:
+    """The way coloured by what comes of returns, the ways of the worst with their numbers, and the glide's footprint.
+
+    The colour of the way lies below it, so that the plan and the track stay visible.
+    """
+    entity = _entity(time_ns, "returns")
+    for kind, ones in drawn.by_kind:
+        points = np.array([one.start for one in ones]) - np.array([0.0, 0.0, _BELOW])
+        _add_line(entity, f"return-{kind}", points, 6.0)
+    for number, worst in enumerate(drawn.worst, 1):
+        _add_line(entity, "return-way", worst.way)
+        entity.texts.append(_name(worst.at + np.array([0.0, 0.0, _LIFT]), f"return {number}"))
+    footprint = drawn.glides.footprint
+    if footprint is not None and terrain is not None:
+        for band in footprint.bands():
+            _add_parts(entity, BAND_ROLES[band.up_to], band.parts, terrain)
+        _add_parts(entity, "landable", footprint.landings(), terrain)
+    return _update(entity)
+
+
+def _add_parts(entity: SceneEntity, role: str, parts: Sequence[Part], terrain: Terrain) -> None:
+    """Outlines on the ground."""
+    for part in parts:
+        for ring in part:
+            up = terrain.height(ring[:, 0], ring[:, 1])
+            known = np.isfinite(up)
+            _add_line(entity, role, np.column_stack([ring, up + _OVER_GROUND])[known])
+
+
+def _add_line(entity: SceneEntity, role: str, points: Floats, thickness: float = 3.0) -> None:
+    line = _line(theme.rgba(role, dark=True))
+    line.thickness = thickness
+    line.points.extend(_points(points))
+    entity.lines.append(line)
 
 
 # ----------------------------------------------------------------------

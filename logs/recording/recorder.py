@@ -55,12 +55,15 @@ from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.reference_flights import reference_flights_json
+from logs.verdict.returns.drawn_returns import DrawnReturns
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
 # A log has it where its scenario has zones.
 ZONES_TOPIC = "/scene/zones"
+# A log has it where returns were judged when it was written.
+RETURNS_TOPIC = "/scene/returns"
 
 _BUFFER = 2**20
 _NO_ROWS: Rows = np.empty(0, dtype=TRACK_ROW)
@@ -112,6 +115,7 @@ class Recorder:
         self._skipped: Rows | None = None  # the newest row, if it was not recorded
         self._received = 0  # rows, recorded or not
         attachments = pack_setup(setup)
+        self._terrain = setup.scenario.terrain
         self._pending: list[Rows] = []  # rows to record
         self._events: list[MessageRecords] = []
         self._written = 0  # rows
@@ -203,14 +207,22 @@ class Recorder:
         message = scene.log_message(log_time, text, level).SerializeToString(deterministic=True)
         self._events.append(single_record(self._channels[EVENT_TOPIC], log_time, message))
 
-    def finish(self, ended: str, verdict: Verdict | None = None, reference: ReferenceFlights | None = None) -> None:
-        """Write how the flight ended, its verdict and what other flights had to say of it, and close the file."""
+    def finish(
+        self,
+        ended: str,
+        verdict: Verdict | None = None,
+        reference: ReferenceFlights | None = None,
+        returns: DrawnReturns | None = None,
+    ) -> None:
+        """Write how the flight ended, its verdict, what other flights had to say of it and returns; close the file."""
         if self._skipped is not None:
             self._append(self._skipped)
             self._skipped = None
         self._emit(None)
         end = max(self._last_ns, EPOCH_NS)
         self._write([*self._poses.whole(end)])
+        if returns is not None:
+            self._add_scene(RETURNS_TOPIC, scene.returns_scene(EPOCH_NS, returns, self._terrain))
         if reference is not None:
             self._attach(REFERENCE_FILE, reference_flights_json(reference).encode(), end)
         if verdict is not None:
@@ -243,11 +255,20 @@ class Recorder:
         }
         zoned = with_fence_zones(setup).scenario
         if zoned.zones:
-            descriptor = SceneUpdate.DESCRIPTOR
-            channel = self._writer.channel(ZONES_TOPIC, descriptor.full_name, schema_of(descriptor))
-            self._channels[ZONES_TOPIC] = channel
+            self._scene_channel(ZONES_TOPIC)
             scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, zoned, setup.route.waypoints)
         self._write([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
+        self._writer.flush()
+
+    def _scene_channel(self, topic: str) -> int:
+        """The number of a topic that not every log has."""
+        descriptor = SceneUpdate.DESCRIPTOR
+        self._channels[topic] = self._writer.channel(topic, descriptor.full_name, schema_of(descriptor))
+        return self._channels[topic]
+
+    def _add_scene(self, topic: str, update: bytes) -> None:
+        """What a viewer shows from the flight's start on, though it is known at its end alone."""
+        self._write([single_record(self._scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 
     def _close(self) -> None:

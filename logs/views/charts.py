@@ -177,6 +177,18 @@ def filled_series(name: str, role: str, along: Floats, values: ArrayLike) -> Lay
     return Layer("band", name, role, along[rows], column[rows], np.zeros(len(rows)))
 
 
+def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Lines (k, 2) one behind another, a gap behind each: x and y of one layer.
+
+    >>> x, y = parted([np.zeros((2, 2)), np.ones((1, 2))])
+    >>> x.tolist()
+    [0.0, 0.0, nan, 1.0, nan]
+    """
+    gap = np.full((1, 2), np.nan)
+    together = np.vstack([piece for part in parts if len(part) for piece in (part, gap)] or [np.zeros((0, 2))])
+    return together[:, 0], together[:, 1]
+
+
 def held_band(held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
     """Stretches of a long axis (t,) that a panel shades over all its height."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(np.int8)))

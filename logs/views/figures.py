@@ -12,12 +12,17 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Verdict
 from logs.verdict.measures.route_requirements import with_fence_zones
+from logs.verdict.returns.drawn_returns import DrawnReturns
+from logs.verdict.returns.glides_text import glides_headline
+from logs.verdict.returns.returns_text import headline
 from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
 from logs.views.failures import failures
+from logs.views.glides import glide_chart
 from logs.views.map import MapChart, flight_map, map_json
 from logs.views.moments import waypoint_names
 from logs.views.profile import profile_chart
+from logs.views.returns import return_heights_chart, returns_map, worst_returns_chart
 from logs.views.scene import SceneView, scene_data
 from logs.views.surveys import survey_chart
 from logs.views.time_series import control_chart, energy_chart, exposure_chart, time_chart
@@ -35,11 +40,13 @@ class Subject:
 
     setup: with the mission's fence among the zones.
     track: with at least one row; None for a plan that was not flown.
+    returns: None where none were judged.
     """
 
     setup: FlightSetup
     track: Track | None
     verdict: Verdict
+    returns: DrawnReturns | None = None
 
     @property
     def things(self) -> str:
@@ -96,8 +103,37 @@ def _of_flight(build: Callable[[FlightSetup, Track], Chart | None]) -> Callable[
     return lambda subject: None if subject.track is None else build(subject.setup, subject.track)
 
 
+# What is drawn of returns, by the figure's name.
+RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], View | None]] = {
+    "returns": lambda setup, drawn, _: returns_map(setup, drawn),
+    "worst-returns": lambda setup, drawn, _: worst_returns_chart(setup, drawn),
+    "return-heights": return_heights_chart,
+    "glide": lambda setup, drawn, _: glide_chart(setup, drawn),
+}
+
+
+def return_views(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> dict[str, View]:
+    """Descriptions of what is drawn of returns, by name; what has no data is left out."""
+    setup = with_fence_zones(setup)
+    found = ((name, build(setup, drawn, track)) for name, build in RETURN_FIGURES.items())
+    return {name: view for name, view in found if view is not None and drawn.returns.each}
+
+
+def _of_returns(name: str) -> Callable[[Subject], View | None]:
+    def view(subject: Subject) -> View | None:
+        if subject.returns is None or not subject.returns.returns.each:
+            return None
+        return RETURN_FIGURES[name](subject.setup, subject.returns, subject.track)
+
+    return view
+
+
 def _text(words: str) -> Callable[[Subject], str]:
     return lambda _: words
+
+
+def _sentence(line: str) -> str:
+    return f"{line[:1].upper()}{line[1:]}. "
 
 
 def _map_caption(subject: Subject) -> str:
@@ -144,6 +180,43 @@ FIGURES = (
         caption=_text(
             "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's, and of a waypoint "
             "what counts as reached. Ringed: fails."
+        ),
+    ),
+    FigureEntry(
+        "returns", "Returns to launch", _of_returns("returns"), file=False,
+        alternative=_text("Map, north up: the way coloured by what comes of a return from there; the worst returns."),
+        caption=lambda subject: (
+            ("" if subject.returns is None else _sentence(headline(subject.returns.returns)))
+            + "The worst are drawn, and stand in profile below by their numbers."
+        ),
+    ),
+    FigureEntry(
+        "worst-returns", "The worst returns", _of_returns("worst-returns"), file=False,
+        alternative=_text("Heights of the worst returns along their ways: terrain, required clearance and spheres."),
+        caption=_text("Flown on a point mass by ArduPlane's law, in the mean wind, from where each turns back."),
+    ),
+    FigureEntry(
+        "return-heights", "Called home, or without its engine", _of_returns("return-heights"), file=False,
+        alternative=_text(
+            "Over time: the flight's height by what comes of a return, the least height from which one is safe, and "
+            "the height that a glide without the engine has left over."
+        ),
+        caption=_text(
+            "Least height: where a return from the flight's own height is not safe, the nearest above it from which "
+            "one is; elsewhere, how low the flight may come before that changes. Left over: the flight's height less "
+            "what a glide needs to get there; below zero it does not."
+        ),
+    ),
+    FigureEntry(
+        "glide", "Without its engine", _of_returns("glide"), file=False,
+        alternative=_text(
+            "Map, north up: from how low above ground home is in reach of a glide, flat ground, and the way coloured "
+            "by what is in reach from there."
+        ),
+        caption=lambda subject: (
+            ("" if subject.returns is None else _sentence(glides_headline(subject.returns.glides)))
+            + "Blue: from so low above ground home, or another place that was chosen, is in reach, as far as 3 km "
+            "around the way. Flat ground is flat by the elevation file, which knows no trees, houses or water."
         ),
     ),
     FigureEntry(
@@ -204,9 +277,11 @@ FIGURES = (
 )  # fmt: skip
 
 
-def subject_of(setup: FlightSetup, track: Track | None, verdict: Verdict) -> Subject:
+def subject_of(
+    setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
+) -> Subject:
     """What figures are drawn of; a track without a row is none."""
-    return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict)
+    return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict, returns)
 
 
 def figure_views(subject: Subject) -> dict[str, View]:

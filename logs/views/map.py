@@ -22,6 +22,9 @@ _ASPECTS, _RIM, _MISSION_RIM = (0.4, 1.25), 0.015, 0.1
 # Beyond these numbers waypoints are numbered in steps, and their dots are small; points of a track.
 _MAX_NUMBERS, _MAX_DOTS, _MAX_POINTS = 40, 80, 6000
 
+# East and north range, m.
+Extent = tuple[tuple[float, float], tuple[float, float]]
+
 
 @dataclass(frozen=True, slots=True)
 class NamedWind:
@@ -109,8 +112,7 @@ def map_chart(
     failed = failures(verdict, len(route) if route is not None else 0)
     tracks = [drawn for drawn in tracks if len(drawn.track)]
     entered = failed.threat_names()
-    layers = [*_area(scenario), *threat_circles(scenario.threats, route, frozenset(entered))]
-    layers += zone_shapes(scenario.zones)
+    layers: list[Layer] = []
     labels: list[Label] = []
     if route is not None:
         layers += _paths(route, plan_waypoints, failed)
@@ -121,15 +123,35 @@ def map_chart(
         layers += _waypoints(route, failed, waypoint_words)
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += fail_labels(failed, route[:, :2], centres)
-    layers += _ends(scenario)
-    labels += [*_end_labels(scenario, route), *([] if route is None else _numbers(scenario, route, failed))]
-    east, north = map_extent(scenario, route, [drawn.track for drawn in tracks])
-    names = [*threat_names(scenario.threats, frozenset(entered)), *zone_names(scenario.zones)]
-    labels += [name for name in names if east[0] < name.x < east[1] and north[0] < name.y < north[1]]
+    labels += [*end_labels(scenario, route), *([] if route is None else _numbers(scenario, route, failed))]
+    extent = map_extent(scenario, route, [drawn.track.position for drawn in tracks])
+    return world_map(scenario, subject, layers, labels, extent, route=route, entered=frozenset(entered), winds=winds)
+
+
+def world_map(
+    scenario: Scenario,
+    subject: str,
+    layers: Sequence[Layer],
+    labels: Sequence[Label],
+    extent: Extent,
+    *,
+    route: Floats | None,
+    entered: frozenset[int] = frozenset(),
+    winds: Sequence[NamedWind] = (),
+) -> MapChart:
+    """A map of a scenario: its area, threats and zones under layers, start and destination over them.
+
+    labels: before the names of threats and zones.  extent: as of `map_extent`.  route: (w, 3) m, at whose heights
+    missiles are filled; entered: threats whose rule fails.
+    """
+    east, north = extent
+    around = [*_area(scenario), *threat_circles(scenario.threats, route, entered), *zone_shapes(scenario.zones)]
+    names = [*threat_names(scenario.threats, entered), *zone_names(scenario.zones)]
+    names = [name for name in names if east[0] < name.x < east[1] and north[0] < name.y < north[1]]
     origin = scenario.origin
     return MapChart(
         f"{shorten(scenario.name, 60)}: {subject}",
-        Panel("north", "km", tuple(layers), span=north, labels=tuple(labels)),
+        Panel("north", "km", (*around, *layers, *_ends(scenario)), span=north, labels=(*labels, *names)),
         east,
         north,
         position_text(origin.lat_deg, origin.lon_deg),
@@ -148,11 +170,10 @@ def map_json(chart: MapChart) -> Json:
     }
 
 
-def map_extent(
-    scenario: Scenario, route: Floats | None, tracks: Sequence[Track]
-) -> tuple[tuple[float, float], tuple[float, float]]:
+def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats]) -> Extent:
     """East and north range of the scenario's area, widened to what lies outside it, with a rim, m.
 
+    ways: (t, 3) m; rows that are not known are left out.
     Bounds made around an external mission limit nothing: its way is shown, and of zones what lies in them.
     """
     points = [scenario.start[None, :2], scenario.destination[None, :2]]
@@ -162,7 +183,7 @@ def map_extent(
         points.append(scenario.bounds.T)
     if route is not None:
         points.append(route[:, :2])
-    points += [track.position[np.isfinite(track.position).all(axis=1), :2] for track in tracks]
+    points += [way[np.isfinite(way).all(axis=1), :2] for way in ways]
     together = np.vstack(points)
     low, high = together.min(axis=0), together.max(axis=0)
     padding = (_MISSION_RIM if scenario.external else _RIM) * float((high - low).max())
@@ -226,7 +247,7 @@ def _ends(scenario: Scenario) -> list[Layer]:
     ]
 
 
-def _end_labels(scenario: Scenario, route: Floats | None) -> list[Label]:
+def end_labels(scenario: Scenario, route: Floats | None) -> list[Label]:
     """Start and destination, in one label where they are at one place.
 
     The route's first and last number stand in their labels where they coincide.

@@ -52,14 +52,14 @@ def profile_chart(
     track = track if track is not None and len(track) else None
     at = route_distance(route)
     distance, points = route_samples(route, max(float(at[-1]) / _SAMPLES, 1.0))
-    ground = _ground_under(scenario, points)
+    ground = ground_under(scenario, points)
     low, high = _span(scenario, route, track, ground)
     plane = PathPlane(distance / 1000.0, points, ground, low, high)
     failed = failures(verdict, len(route))
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
     flown, entered = _flown(scenario, route, track, failed, plane)
-    layers = [*zones, *cuts, *_ground(scenario, plane), *_failing_legs(at, route, failed)]
+    layers = [*zones, *cuts, *ground_bands(scenario, plane), *_failing_legs(at, route, failed)]
     layers += [] if straight else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
     layers += flown
     labels: list[Label] = []
@@ -93,7 +93,7 @@ def _chart(scenario: Scenario, at: Floats, panel: Panel, *, straight: bool) -> C
     )
 
 
-def _ground_under(scenario: Scenario, points: Floats) -> Floats | None:
+def ground_under(scenario: Scenario, points: Floats) -> Floats | None:
     """Terrain height (s,) under the points, None where there is none at all."""
     if scenario.terrain is None:
         return None
@@ -119,7 +119,7 @@ def _span(scenario: Scenario, route: Floats, track: Track | None, ground: Floats
     return low - 0.12 * span, high + 0.14 * span
 
 
-def _ground(scenario: Scenario, plane: PathPlane) -> list[Layer]:
+def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
     """The ground, the band above it that the path must stay out of, and the greatest height."""
     ground, along = plane.ground, plane.kilometres
     if ground is None:
@@ -148,7 +148,7 @@ def _flown(
     line = Layer("line", "flown", "flown", progress[rows], heights[rows])
     if not failed.threats:
         return [line], {}
-    ground = _ground_under(scenario, track.position)
+    ground = ground_under(scenario, track.position)
     layers, places = entered_cuts(
         scenario.threats, failed, PathPlane(progress, track.position, ground, plane.low, plane.high)
     )

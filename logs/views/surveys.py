@@ -9,7 +9,7 @@ from flight.simulation.track import Track
 from logs.verdict.measures.photo_lines import LineMeasure, measure_line
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements, surveys_of
 from logs.verdict.measures.track_alignment import align_track
-from logs.views.charts import Chart, Label, Layer, Panel
+from logs.views.charts import Chart, Label, Layer, Panel, parted
 
 Floats = NDArray[np.float64]
 
@@ -65,8 +65,8 @@ def _panel(
             labels.append(Label(str(number), float(corners[0, 0]), float(corners[0, 1]), "number"))
     thin = laid(position[:: max(1, len(position) // _POINTS)])
     layers = (
-        Layer("line", "photo line, flown as photos need it", "planned", *_parted(used), quiet=True),
-        Layer("line", "photo line, lost", "fail", *_parted(lost), quiet=True),
+        Layer("line", "photo line, flown as photos need it", "planned", *parted(used), quiet=True),
+        Layer("line", "photo line, lost", "fail", *parted(lost), quiet=True),
         Layer("line", "flown track", "flown", thin[:, 0], thin[:, 1], quiet=True),
     )
     return Panel(f"{name}: to the left of its first line", "m", layers, labels=tuple(labels))
@@ -90,10 +90,3 @@ def _part(corners: Floats, low: float, high: float) -> Floats:
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
     at = np.concatenate([[low], run[(run > low) & (run < high)], [min(high, run[-1])]])
     return np.stack([np.interp(at, run, corners[:, axis]) for axis in range(2)], axis=1)
-
-
-def _parted(parts: list[Floats]) -> tuple[Floats, Floats]:
-    """Lines one behind another, with a gap between each two."""
-    gap = np.full((1, 2), np.nan)
-    together = np.vstack([piece for part in parts if len(part) for piece in (part, gap)] or [np.zeros((0, 2))])
-    return together[:, 0], together[:, 1]

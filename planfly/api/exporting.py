@@ -8,12 +8,26 @@ from pathlib import Path
 from flight.mission.fences import numbered, zone_fences
 from flight.mission.items import Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.rules.mission_rule import lacks_landing
-from logs.views.exports.map_files import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
+from logs.views.exports.map_files import (
+    MapLine,
+    MapZone,
+    glide_shapes,
+    gpx_text,
+    kml_text,
+    map_zones,
+    plan_line,
+    return_lines,
+    track_line,
+)
 from planfly.api.flying import FencePaths, FlownMission, named_fences
 from planfly.first_start import with_warm_up
 from planfly.open_mission import NamedFences, fence_of_plan, is_log, loss_text, open_mission
+from planfly.returns_beside import returns_beside
+from planfly.stages import stage
 from planfly.targets import refuse_existing
 from planner.plan import Plan, plan_json
 from world.errors import MissionError, PlanflyError
@@ -49,6 +63,7 @@ class _Source:
     mission: its items, and a plan's threats as fences.
     name: a map's title.
     lines, zones: on a map, lines by what they are; none where no target asks for one.
+    returns, footprint: on a map in KML, lines and shapes that have colours.
     notes: what the mission does not hold of the plan.
     log: the input, where it is a flight log.
     """
@@ -57,6 +72,8 @@ class _Source:
     name: str
     lines: dict[str, MapLine] = field(default_factory=dict)
     zones: list[MapZone] = field(default_factory=list)
+    returns: list[MapLine] = field(default_factory=list)
+    footprint: list[MapZone] = field(default_factory=list)
     notes: tuple[str, ...] = ()
     log: FlightLog | None = None
 
@@ -135,24 +152,39 @@ def _read(path: Path, targets: tuple[Path, ...], fences: NamedFences, at: str | 
         if fenced:
             allowed = "a log is exported with the fence that it was flown with"
             raise MissionError.of_argument("fence", fences, allowed, shown="", file=path)
-        return _read_log(path)
+        return _read_log(path, coloured=_asks_kml(targets))
     for target in targets:
         suffix = target.suffix
         if suffix.lower() in LOGS:
             message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
             raise MissionError(message, file=target, field="suffix", value=suffix)
-    return _read_mission(path, any(target.suffix.lower() in MAPS for target in targets), fences, at)
+    maps = any(target.suffix.lower() in MAPS for target in targets)
+    return _read_mission(path, fences, at, maps=maps, coloured=_asks_kml(targets))
 
 
-def _read_log(path: Path) -> _Source:
+def _asks_kml(targets: tuple[Path, ...]) -> bool:
+    return any(target.suffix.lower() == ".kml" for target in targets)
+
+
+def _with_returns(source: _Source, setup: FlightSetup, track: Track | None) -> _Source:
+    """With returns from a few places of a flight or a planned path, and glides, where they can be judged."""
+    with stage("flying returns for the map"):
+        drawn = returns_beside(setup, track).drawn()
+    if drawn is None:
+        return source
+    return replace(source, returns=return_lines(setup, drawn), footprint=glide_shapes(setup, drawn))
+
+
+def _read_log(path: Path, *, coloured: bool) -> _Source:
     log = read_log(path)
     lines = {"plan": plan_line(log.setup)}
     if len(log.track):
         lines["flown"] = track_line(log.setup, log.track)
-    return _Source(log.setup.mission, log.setup.scenario.name, lines, map_zones(log.setup), log=log)
+    source = _Source(log.setup.mission, log.setup.scenario.name, lines, map_zones(log.setup), log=log)
+    return _with_returns(source, log.setup, log.track) if coloured else source
 
 
-def _read_mission(path: Path, maps: bool, fences: NamedFences, at: str | None) -> _Source:
+def _read_mission(path: Path, fences: NamedFences, at: str | None, *, maps: bool, coloured: bool) -> _Source:
     """A plan or a mission file; a map, zones and a plan's fence need its place, too, which not every mission has."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
@@ -162,6 +194,7 @@ def _read_mission(path: Path, maps: bool, fences: NamedFences, at: str | None) -
     # What a station uploads has no times: which zones count is decided here.
     setup = open_mission(path, None, None, change=partial(at_time, at=at), fences=fences).setup
     source = _Source(setup.mission, setup.scenario.name, {"plan": plan_line(setup)}, map_zones(setup))
+    source = _with_returns(source, setup, None) if coloured else source
     if not is_plan:
         return _with_zones(source, setup.scenario)
     mission, notes = fence_of_plan(setup)
@@ -183,7 +216,11 @@ def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
         return _flown_text(source.log, suffix)
     if suffix in MAPS:
         parts = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
-        return MAPS[suffix](source.name, list(source.lines.values()), source.zones), " and ".join(parts)
+        lines, zones = list(source.lines.values()), source.zones
+        if suffix == ".kml" and source.returns:
+            lines, zones = lines + source.returns, zones + source.footprint
+            parts.append("returns")
+        return MAPS[suffix](source.name, lines, zones), " and ".join(parts)
     kind = mission_kind(target)
     if kind in _CONTENTS:
         count = len(mission.fences if kind == "fence" else mission.rally)

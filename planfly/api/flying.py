@@ -33,7 +33,7 @@ from planfly.open_mission import (
     read_named_fences,
 )
 from planfly.pipeline import PlanThenFly, autopilot_log, fly_and_judge
-from planfly.return_flights import returns_line
+from planfly.returns_beside import ReturnsBeside, returns_line
 from planfly.stages import say_replaced, stage
 from planfly.targets import file_target, refuse_existing
 from planner.plan import Plan
@@ -57,6 +57,7 @@ class FlownMission:
     events: what the log holds beside the rows.
     log: the file that it is recorded in; None where none was asked for, or nothing flown.
     autopilot_log: the log of the autopilot's program beside it, if one flew.
+    returns: from a few places of it, as the log has them; None without a log.
     """
 
     setup: FlightSetup
@@ -66,6 +67,7 @@ class FlownMission:
     events: tuple[LogEvent, ...] = ()
     log: Path | None = None
     autopilot_log: Path | None = None
+    returns: ReturnsBeside | None = None
 
     @property
     def mission(self) -> Mission:
@@ -85,7 +87,7 @@ class FlownMission:
     @property
     def returns_line(self) -> str:
         """Returns from a few places of the flight in a line; "" for a mission without a home."""
-        return returns_line(self.setup, self.track)
+        return returns_line(self.setup, self.track) if self.returns is None else self.returns.line
 
     def __repr__(self) -> str:
         return f"<FlownMission {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
@@ -219,11 +221,12 @@ def fly(
     limits = FlightLimits(max_hours, max_log)
     with stage(f"flying {flight_text(opened.setup)}", flight_kind(opened.setup)) as advance:
         flown = fly_and_judge(
-            opened.setup, opened.airframe, target, advance, every=60 // log_hz, autopilot=program, limits=limits
-        )
+            opened.setup, opened.airframe, target, advance, every=60 // log_hz, autopilot=program,
+            returns=target is not None, limits=limits,
+        )  # fmt: skip
     target = target if len(flown.track) else None
     own = None if target is None or program is None else autopilot_log(target, program)
-    return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, own)
+    return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, target, own, flown.returns)
 
 
 @with_warm_up(*FLYING)

@@ -14,6 +14,7 @@ from logs.views.report.compare import Comparison, compare_logs, write_comparison
 from planfly.api.flying import FlownMission
 from planfly.first_start import with_warm_up
 from planfly.open_mission import judge_log, open_planned
+from planfly.returns_beside import returns_beside
 from planfly.stages import stage
 from planfly.targets import COMPARE_FILES, LOG_FIGURES, clean_folder, refuse_existing
 from planner.plan import Plan
@@ -104,6 +105,7 @@ def report(
         files = write_report(
             folder, shown.setup, shown.track, shown.verdict, ended=shown.ended, events=shown.events, svg=svg,
             versions=shown.versions or package_versions(), command=command,
+            returns=returns_beside(shown.setup, shown.track).drawn(),
         )  # fmt: skip
     return WrittenReport(folder / "report.html", tuple(files), shown.verdict)
 

@@ -9,9 +9,12 @@ from flight.simulation.setup import FlightSetup, VerticalDatum
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, read_log
+from logs.recording.recorder import Recorder
+from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import NOT_ASKED, Glides, judge_glides
-from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
+from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import (
     causes_text,
     headline,
@@ -21,16 +24,21 @@ from logs.verdict.returns.returns_text import (
     remedy_text,
 )
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
+from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
 from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
+from planfly.crash_safe_log import INTERRUPTED
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.open_mission import is_log
+from planfly.open_mission import OpenedMission, is_log
 from planfly.pipeline import fly_and_judge
-from planfly.return_flights import fly_return, return_starts
+from planfly.return_flights import fly_return
+from planfly.returns_beside import return_starts
 from planfly.stages import stage
+from planfly.targets import RETURN_FILES, clean_folder, refuse_folder
 from planner.plan import Plan
+from world.files import write_whole
 from world.scenario import over_terrain
 from world.scenario_tables import Guidance, Navigation
 
@@ -54,12 +62,14 @@ class ReturnsFound:
     returns: each of them, and in ranges of seconds, the worst first.
     glides: what can be reached where the engine stops; empty where that was not asked.
     suggested: what would help, the plainest first, each with the returns that it leads to; none where none was asked.
+    files: written, none where no folder was named.
     """
 
     setup: FlightSetup
     returns: Returns
     glides: Glides = NOT_ASKED
     suggested: tuple[Suggested, ...] = ()
+    files: tuple[Path, ...] = ()
 
     @property
     def safe(self) -> bool:
@@ -146,6 +156,8 @@ def returns(
     *,
     every: float = 1.0,
     suggest: bool = False,
+    out: str | Path | None = None,
+    overwrite: bool = True,
     scenario: str | Path | None = None,
     terrain: str | Path | None = None,
     fence: FencePaths = (),
@@ -168,6 +180,7 @@ def returns(
     what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: what `planfly.fly`
     gave, a flight log or its path, or an autopilot's log.
     every: s between two returns.  suggest: whether to look for what would make all of them safe.
+    out: folder for pictures of them; None writes none.  overwrite: whether results in it are replaced.
     scenario, terrain, fence, seed, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
     plan or mission, as of `planfly.fly`; of a flight only terrain.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
@@ -185,22 +198,19 @@ def returns(
     } | {"autopilot_law": autopilot_law}  # fmt: skip
     other, of_log = {"seed": seed, "nav": nav}, {"plan": plan, "flight": flight, "datum": datum}
     path = Path(what) if isinstance(what, str | Path) else None
+    asked = _asked(every, suggest, out, overwrite=overwrite)
     if path is not None and is_imported_log(path):
         refuse(str(path), other, _AS_FLOWN)
-        found = _imported(path, terrain=terrain, **{**given, **of_log, "fence": fence})
-        return _judged(found.setup, found.track, every, suggest)
+        return _of_import(_imported(path, terrain=terrain, **{**given, **of_log, "fence": fence}), asked)
     refuse(str(path or "mission"), of_log, "goes with an imported log")
     if path is not None and is_log(path):
         what = read_log(path)
     if isinstance(what, FlightLog | FlownMission):
         refuse(str(path or "flight"), given | other, _AS_FLOWN)
-        return _judged(_over(what.setup, terrain), what.track, every, suggest)
+        return _judged(_over(what.setup, terrain), what.track, asked, what.ended or INTERRUPTED)
     changes = {name: value for name, value in given.items() if name not in ("scenario", "fence")}
-    opened = opened_mission(what, scenario, terrain, seed, fence, partial(changed_scenario, **changes, nav=nav))
-    return_world(opened.setup)  # Raises before it is flown.
-    with stage("flying the mission"):
-        track = fly_and_judge(opened.setup, opened.airframe, None, reference=False).track
-    return _judged(opened.setup, track, every, suggest)
+    change = partial(changed_scenario, **changes, nav=nav)
+    return _of_mission(opened_mission(what, scenario, terrain, seed, fence, change), asked)
 
 
 def _imported(path: Path, **keywords: Any) -> "ImportedFlight":
@@ -215,19 +225,80 @@ def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
     return setup if terrain is None else setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
 
 
-def _judged(setup: FlightSetup, track: Track | None, every: float, suggest: bool) -> ReturnsFound:
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is asked of returns: how many, what would help, and pictures in a folder."""
+
+    every: float
+    suggest: bool
+    folder: Path | None
+    overwrite: bool
+
+
+def _asked(every: float, suggest: bool, out: str | Path | None, *, overwrite: bool) -> _Asked:
+    """The same, its folder checked.  Raises PlanflyError for one that is a file, or holds anything."""
+    if out is not None:
+        refuse_folder(Path(out), overwrite)
+    return _Asked(every, suggest, None if out is None else Path(out), overwrite)
+
+
+def _of_import(found: "ImportedFlight", asked: _Asked) -> ReturnsFound:
+    return _judged(found.setup, found.track, asked, found.ended)
+
+
+def _of_mission(opened: OpenedMission, asked: _Asked) -> ReturnsFound:
+    """Of a mission, which is flown first."""
+    return_world(opened.setup)  # Raises before it is flown.
+    with stage("flying the mission"):
+        flown = fly_and_judge(opened.setup, opened.airframe, None, reference=False)
+    return _judged(flown.setup, flown.track, asked, flown.ended)
+
+
+def _judged(setup: FlightSetup, track: Track, asked: _Asked, ended: str) -> ReturnsFound:
     world = return_world(setup)
-    starts = return_starts(setup, track, every)
+    starts = return_starts(setup, track, asked.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
-        judged = judge_returns(world, starts, every, fly_return)
+        judged = judge_returns(world, starts, asked.every, fly_return)
     with stage("gliding from there without the engine"):
         found = ReturnsFound(setup, judged, judge_glides(world, starts))
-    if not suggest or found.safe or not found.returns.each:
+    if asked.suggest and not found.safe and found.returns.each:
+        found = replace(found, suggested=_suggested(world, starts, found, asked.every))
+    if asked.folder is None or not found.returns.each:
         return found
+    with stage("drawing", "drawing returns"):
+        drawn = drawn_returns(world, starts, judged, found.glides)
+        files = _files(setup, track, drawn)
+    folder = clean_folder(asked.folder, RETURN_FILES, overwrite=asked.overwrite)
+    for name, data in files.items():
+        write_whole(folder / name, data)
+    names = list(files)
+    if len(track):
+        with Recorder(folder / "returns.mcap", setup) as recorder:
+            recorder.write(track)
+            recorder.finish(ended, returns=drawn)
+        names.append("returns.mcap")
+    return replace(found, files=tuple(folder / name for name in names))
+
+
+def _suggested(world: ReturnWorld, starts: ReturnStarts, found: ReturnsFound, every: float) -> tuple[Suggested, ...]:
+    """What helps of what would make them safe."""
     with stage("looking for what would make them safe"):
         remedies = suggest_parameters(world, starts)
         rally = suggest_rally(world, starts)
     remedies += [] if rally is None else [rally]
     with stage(f"flying the returns of {len(remedies)} suggestions", "flying suggested returns"):
         proved = [Suggested(one, judge_returns(one.on(world), starts, every, fly_return)) for one in remedies]
-    return replace(found, suggested=tuple(one for one in proved if helps(found.returns, one.returns)))
+    return tuple(one for one in proved if helps(found.returns, one.returns))
+
+
+def _files(setup: FlightSetup, track: Track, drawn: DrawnReturns) -> dict[str, bytes]:
+    """Pictures of returns, and the map with their lines and shapes, by file name."""
+    # matplotlib loads for pictures alone.
+    from logs.views.figures import draw_pictures, return_views
+
+    flown = [track_line(setup, track)] if len(track) else []
+    lines = [plan_line(setup), *flown, *return_lines(setup, drawn)]
+    zones = [*map_zones(setup), *glide_shapes(setup, drawn)]
+    text = kml_text(f"{setup.scenario.name} returns", lines, zones)
+    pictures = draw_pictures(return_views(setup, drawn, track if flown else None))
+    return {**pictures, "returns.kml": text.encode("utf-8")}

@@ -23,7 +23,7 @@ from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
 from planfly.pipeline import autopilot_log, fly_and_judge, make_plan, make_setup, planned_for
 from planfly.refine import refine as refine_rounds
-from planfly.return_flights import returns_line
+from planfly.returns_beside import returns_beside
 from planfly.stages import say_replaced, stage
 from planfly.targets import RUN_FILES, RUN_FOLDER, filled_pattern, prepare_folder, refuse_folder
 from planner.plan import Plan, plan_json
@@ -230,18 +230,20 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
             setup, airframe, folder / "flight.mcap", advance, every=task.every, autopilot=task.program,
-            limits=task.limits,
+            returns=True, limits=task.limits,
         )  # fmt: skip
     write_whole(folder / "verdict.json", verdict_json(flown.verdict))
+    beside = flown.returns or returns_beside(flown.setup, flown.track)
     with stage("drawing", "drawing a report"):
         write_report(
             folder, flown.setup, flown.track, flown.verdict, ended=flown.ended, versions=package_versions(),
-            command=task.command, events=flown.events,
+            command=task.command, events=flown.events, returns=beside.drawn(),
         )  # fmt: skip
     notes = (*setup.scenario.notes, *setup.route.notes)
-    line = returns_line(flown.setup, flown.track)
     has_log = len(flown.track) > 0
-    return Round(number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=line)
+    return Round(
+        number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=beside.line
+    )
 
 
 def _keep(folder: Path, number: int) -> None:

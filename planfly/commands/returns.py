@@ -13,7 +13,7 @@ from planfly.terminal.options import (
     call,
     flown_by_options,
     imported_log_options,
-    json_option,
+    result_options,
     steering_options,
     world_options,
 )
@@ -33,7 +33,7 @@ def returns_options(line: LineParser) -> None:
         "fly the return to launch from everywhere on the way: say whether each is safe, where it goes and why; and"
         " what can be reached without the engine",
         "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
-        "planfly returns flight.mcap --every 5",
+        "planfly returns flight.mcap --every 5 --out pictures",
     )
     completed(
         parser.add_argument(
@@ -56,7 +56,11 @@ def returns_options(line: LineParser) -> None:
     steering_options(parser).add_argument(
         "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
-    json_option(parser.group("results"), "returns")
+    result_options(
+        parser,
+        "folder for pictures: the way by what comes of a return, the worst in profile, the least height "
+        "that one is safe from, and the glide's footprint (default: none)",
+    )
 
 
 def returns(args: argparse.Namespace) -> int:
@@ -86,6 +90,8 @@ def returns(args: argparse.Namespace) -> int:
         print(f"  and {len(found.lines_of_glides) - _LISTED} ranges more; --json FILE has them all")
     for text in found.notes:
         print(f"  note    {text}")
+    for path in found.files:
+        print(f"  written {path}")
     give_answer(args, lambda: _answer(str(args.what), found, code))
     return code
 
@@ -120,5 +126,6 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),
         engine_out=glides_entry(found),
         suggestions=[suggestion_entry(found, one) for one in found.suggested],
+        files=[str(path) for path in found.files],
         notes=list(found.notes),
     )

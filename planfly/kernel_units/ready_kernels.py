@@ -12,7 +12,7 @@ from logs.recording.recorder import Recorder
 from planfly.airframe import Airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.pipeline import fly_and_judge, make_setup
-from planfly.return_flights import returns_line
+from planfly.returns_beside import returns_line
 from planner.search.kernel_calls import PARTS, call_kernels
 from world.compile_events import tell_before_compiling
 from world.scenario import Scenario, from_spec

@@ -159,6 +159,8 @@ class ReturnsAnswer:
     no_return_s: float | None
     engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]
+    files: list[str]
+    """Pictures that were written."""
     """Of --suggest."""
     notes: list[str]
 

@@ -17,6 +17,22 @@ _FROM: dict[Reach, str] = {
     "nothing": "nothing from {count}",
     "unknown": "from {count} it is not known",
 }
+_REACHED: dict[Reach, str] = {
+    "home": "home is in reach",
+    "site": "a rally point or landing place is in reach",
+    "flat": "flat ground alone is in reach",
+    "nothing": "nothing is in reach",
+    "unknown": "what is in reach is not known",
+}
+
+
+def reached_text(reach: Reach) -> str:
+    """What the best in reach without an engine is.
+
+    >>> reached_text("home")
+    'home is in reach'
+    """
+    return _REACHED[reach]
 
 
 def glides_headline(glides: Glides) -> str:

@@ -19,7 +19,17 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.swift_return import CIRCLED, HIT, fly_returns
 from flight.mission.placing import landing_places
 from flight.mission.return_path import ReturnCircle, ReturnTarget
-from logs.verdict.returns.glide_map import Cells, GlideMap, bar_zones, glide_map, glide_slopes, landable, least_heights
+from logs.verdict.returns.glide_footprint import GlideFootprint
+from logs.verdict.returns.glide_map import (
+    Cells,
+    Flags,
+    GlideMap,
+    bar_zones,
+    glide_map,
+    glide_slopes,
+    landable,
+    least_heights,
+)
 from logs.verdict.returns.glide_reach import heights_left, place_of
 from logs.verdict.returns.judge_returns import ReturnWorld
 from logs.verdict.returns.return_starts import ReturnStarts
@@ -124,6 +134,7 @@ class Glides:
     cell: side of the map's cells, m.
     fuel: whether the engine burns fuel: what it brakes when it stands is not known.
     not_judged: why nothing is.
+    footprint: the map that they were looked up on; None where nothing is judged.
     """
 
     each: tuple[Glide, ...]
@@ -132,6 +143,7 @@ class Glides:
     cell: float = math.nan
     fuel: bool = False
     not_judged: NotJudged = ""
+    footprint: GlideFootprint | None = None
 
     def count(self, reach: Reach) -> int:
         """From how many places this is the best."""
@@ -192,11 +204,14 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     low = float(np.nanmin(made.ground)) if np.isfinite(made.ground).any() else 0.0
     slopes = glide_slopes(world.aircraft, airspeed, low, max(top, low + 1.0))
 
-    def looked(cells: Cells) -> tuple[Floats, NDArray[np.int32]]:
-        return heights_left(rows, least_heights(made, cells, slopes, top), world.aircraft, around, airspeed, bank)
+    def looked(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
+        needs = least_heights(made, cells, slopes, top)
+        return *heights_left(rows, needs, world.aircraft, around, airspeed, bank), needs.need
 
-    left = [looked(np.array([made.cell_of(site.east, site.north)]))[0] for site in sites]
-    flat, flat_cells = looked(_flat_cells(world, made))
+    by_site = [looked(np.array([made.cell_of(site.east, site.north)])) for site in sites]
+    left = [found[0] for found in by_site]
+    landings = _flat_ground(world, made)
+    flat, flat_cells, _ = looked(np.argwhere(landings))
     known = np.isfinite(terrain.height(rows["east"], rows["north"]))
     each = []
     for k, row in enumerate(rows):
@@ -205,7 +220,8 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
         start = (float(row["east"]), float(row["north"]), float(row["up"]))
         reach = _best(lefts, float(flat[k])) if known[k] else "unknown"
         each.append(Glide(float(starts.time[k]), start, ends[k], lefts, float(flat[k]), at, reach))
-    return Glides(tuple(each), sites, airspeed, made.cell, fuel)
+    chosen = np.minimum.reduce([found[2] for found in by_site])
+    return Glides(tuple(each), sites, airspeed, made.cell, fuel, footprint=GlideFootprint(made, chosen, landings))
 
 
 def _best(left: tuple[float, ...], flat: float) -> Reach:
@@ -226,11 +242,11 @@ def _sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
     )
 
 
-def _flat_cells(world: ReturnWorld, made: GlideMap) -> Cells:
-    """Cells that could be landed on: flat, and in no exclusion zone that reaches down to the ground."""
+def _flat_ground(world: ReturnWorld, made: GlideMap) -> Flags:
+    """Cells (n, e) that could be landed on: flat, and in no exclusion zone that reaches down to the ground."""
     flat = landable(made)
     bar_zones(made, flat, world.airspace.records, MARGIN)
-    return np.argwhere(flat)
+    return flat
 
 
 # ----------------------------------------------------------------------

@@ -441,16 +441,18 @@ def fly_home(
     starts: ReturnStarts,
     ends: Sequence[ReturnTarget],
     least: tuple[Floats, Floats] | None = None,
+    *,
+    keep: bool = False,
 ) -> tuple[Records, tuple[Floats, ...]]:
     """Returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their ways where there are zones to meet.
 
-    least: as of `flight.autopilots.arduplane.swift_return.fly_returns`.
+    least: as of `flight.autopilots.arduplane.swift_return.fly_returns`.  keep: whether all ways are wanted.
     """
     radius = ArduPlane(world.parameters).return_rules.radius
     circles = [None if end.straight else ReturnCircle(*end.position, radius, end.slope_base) for end in ends]
     # A landing is not flown: what would begin with it ends where it would go on to it.
     landings = [end.landing if end.landing and not end.landing.lands else None for end in ends]
-    keep = bool(world.airspace.zones)
+    keep = keep or bool(world.airspace.zones)
     found = fly_returns(
         starts.rows, circles, world.parameters, world.aircraft, world.around, landings=landings, keep=keep, least=least
     )

@@ -31,6 +31,18 @@ _MANY: dict[Kind, str] = {
     "unsure": "are flown too differently by the point mass and in JSBSim to be judged",
     "low": "come lower than {limit:.0f} m above ground",
 }
+# What the way is called where returns from it come to this.
+_WAY: dict[Kind, str] = {
+    "ground": "a return hits the ground",
+    "threat": "a return enters a missile's sphere",
+    "zone": "a return violates a zone",
+    "lost": "a return does not arrive",
+    "energy": "a return takes too much energy",
+    "unknown": "a return is not judged: ground not known",
+    "unsure": "a return is not judged: flown too differently",
+    "low": "a return comes lower than required",
+    "safe": "a return is safe",
+}
 _DOES = {
     "return": "returns",
     "land": "by its landing sequence",
@@ -52,6 +64,20 @@ _OPEN: dict[Open, str] = {
     "return path": "RTL_AUTOLAND 4 returns by the mission's return path",
     "landing": "the landing sequence begins with the landing itself",
 }
+
+
+def way_text(kind: Kind) -> str:
+    """What the way is called where returns from it come to this.
+
+    >>> way_text("ground")
+    'a return hits the ground'
+    """
+    return _WAY[kind]
+
+
+def outcome_text(one: ReturnFlown, limit: float) -> str:
+    """What one return comes to.  limit: least height above ground that is asked for, m."""
+    return "is safe" if one.safe else _ONE[one.kind].format(limit=limit)
 
 
 def counts_text(returns: Returns) -> str:

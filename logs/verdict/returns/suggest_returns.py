@@ -80,7 +80,7 @@ class _Needs:
         return _Needs(self.clearance[chosen], self.outside[chosen])
 
 
-def _needs(world: ReturnWorld, starts: ReturnStarts) -> _Needs:
+def _needs(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _Needs:
     """The limits with their margin, or what the start itself has, less what the turn takes, where that is less."""
     rows = starts.rows
     outside = np.full(len(starts), math.inf)
@@ -90,9 +90,14 @@ def _needs(world: ReturnWorld, starts: ReturnStarts) -> _Needs:
         if radius > 0.0:
             outside = np.minimum(outside, np.linalg.norm(place - centre, axis=1) - radius)
     return _Needs(
-        np.minimum(world.limit + MARGIN, np.maximum(floors(world, starts), clear - TURN)),
-        np.minimum(MARGIN, np.maximum(0.0, outside - TURN)),
+        np.minimum(world.limit + margin, np.maximum(floors(world, starts), clear - TURN)),
+        np.minimum(margin, np.maximum(0.0, outside - TURN)),
     )
+
+
+def come_home(world: ReturnWorld, starts: ReturnStarts) -> Flags:
+    """Which returns (n,) by RTL keep the limits themselves, on the point mass alone."""
+    return _flown_well(world, starts, _needs(world, starts, 0.0), _keep_all)
 
 
 def _keep_ground(_world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:

@@ -13,11 +13,16 @@ from xml.etree import ElementTree
 
 import gpxpy.gpx
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs.theme import LOOKS
 from logs.verdict.measures.route_requirements import with_fence_zones
+from logs.verdict.returns.drawn_returns import DrawnReturns
+from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
+from logs.verdict.returns.glides_text import reached_text
+from logs.verdict.returns.returns_text import outcome_text, way_text
 from world.airspace.zones_on_map import zone_parts
 from world.frames import to_geo
 
@@ -36,6 +41,8 @@ class MapLine:
     lat_deg, lon_deg: (n,).
     amsl: (n,) m above mean sea level.
     marks: a name for each point, or none.
+    folder: of KML, that it shares with others; "" for one of its own.
+    role: that it is drawn in, of `logs.theme`; "" for the viewer's own look.
     """
 
     name: str
@@ -43,6 +50,8 @@ class MapLine:
     lon_deg: Floats
     amsl: Floats
     marks: tuple[str, ...] = ()
+    folder: str = ""
+    role: str = ""
 
 
 def plan_line(setup: FlightSetup) -> MapLine:
@@ -85,12 +94,15 @@ class MapZone:
     parts: (k, 2) latitude and longitude in degrees of the outline of each part, and then of its holes, closed.
     height: m of its ceiling, None where it has none.
     above_ground: whether that is above the ground, not above mean sea level.
+    folder, role: as of `MapLine`.
     """
 
     name: str
     parts: tuple[tuple[Floats, ...], ...]
-    height: float | None
-    above_ground: bool
+    height: float | None = None
+    above_ground: bool = False
+    folder: str = "zones"
+    role: str = ""
 
 
 def map_zones(setup: FlightSetup) -> list[MapZone]:
@@ -108,6 +120,49 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
         height = None if top is None else top.height
         made.append(MapZone(name, parts, height, top is not None and top.datum == "ground"))
     return made
+
+
+# Returns and glides, which have colours.
+
+
+def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
+    """The way by what comes of a return from there, the ways of the worst returns, and the way by what is in reach."""
+    limit, lines = drawn.returns.limit, []
+    for kind, ones in drawn.by_kind:
+        name = f"{ones[0].time:.0f} to {ones[-1].time:.0f} s: {way_text(kind)}"
+        lines.append(_line(setup, name, [one.start for one in ones], "returns to launch", f"return-{kind}"))
+    for number, worst in enumerate(drawn.worst, 1):
+        one = worst.one
+        name = f"{number}: from {one.time:.0f} s to {one.target.name}: {outcome_text(one, limit)}"
+        lines.append(_line(setup, name, worst.way, "the worst returns", "return-way"))
+    for reach, glides in drawn.by_reach:
+        name = f"{glides[0].time:.0f} to {glides[-1].time:.0f} s: {reached_text(reach)}"
+        lines.append(_line(setup, name, [one.start for one in glides], "without its engine", f"reach-{reach}"))
+    return lines
+
+
+def _line(setup: FlightSetup, name: str, places: ArrayLike, folder: str, role: str) -> MapLine:
+    position = np.asarray(places, dtype=np.float64)
+    lat, lon = to_geo(setup.scenario.origin, position[:, 0], position[:, 1])
+    return MapLine(name, np.asarray(lat), np.asarray(lon), position[:, 2], folder=folder, role=role)
+
+
+def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
+    """The glide's footprint: from how low above ground a chosen place is in reach, and flat ground."""
+    footprint = drawn.glides.footprint
+    if footprint is None:
+        return []
+
+    def shape(name: str, role: str, parts: tuple[Part, ...]) -> MapZone:
+        placed = tuple(tuple(_geographic(setup, ring) for ring in part) for part in parts)
+        return MapZone(name, placed, folder="the glide's footprint", role=role)
+
+    found = [
+        shape(f"home or another chosen place in reach from {band.up_to:.0f} m above ground", role, band.parts)
+        for band in footprint.bands()
+        for role in [BAND_ROLES[band.up_to]]
+    ]
+    return [*found, shape("flat ground by the elevation file", "landable", footprint.landings())]
 
 
 def _geographic(setup: FlightSetup, ring: Floats) -> Floats:
@@ -128,11 +183,12 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
     root = ElementTree.Element(f"{{{KML}}}kml")
     document = _add(root, "Document")
     _add(document, "name", title)
+    folders = _Folders(document)
     for line in lines:
-        folder = _add(document, "Folder")
-        _add(folder, "name", line.name)
+        folder = folders.named(line.folder) if line.folder else folders.new(line.name)
         mark = _add(folder, "Placemark")
         _add(mark, "name", line.name)
+        _add_style(mark, line.role)
         string = _add(mark, "LineString")
         _add(string, "altitudeMode", "absolute")
         _add(string, "coordinates", " ".join(_coordinates(line, k) for k in range(len(line.lat_deg))))
@@ -142,19 +198,49 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
             point = _add(mark, "Point")
             _add(point, "altitudeMode", "absolute")
             _add(point, "coordinates", _coordinates(line, k))
-    _add_zones(document, zones)
+    _add_zones(folders, zones)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _add_zones(document: ElementTree.Element, zones: Sequence[MapZone]) -> None:
-    if not zones:
+class _Folders:
+    """The folders of a document."""
+
+    def __init__(self, document: ElementTree.Element) -> None:
+        self._document = document
+        self._named: dict[str, ElementTree.Element] = {}
+
+    def new(self, name: str) -> ElementTree.Element:
+        """Another one."""
+        folder = _add(self._document, "Folder")
+        _add(folder, "name", name)
+        return folder
+
+    def named(self, name: str) -> ElementTree.Element:
+        """The one of a name that several share."""
+        if name not in self._named:
+            self._named[name] = self.new(name)
+        return self._named[name]
+
+
+def _add_style(mark: ElementTree.Element, role: str) -> None:
+    """The colour and width of a role, on the dark ground of pictures from above."""
+    if not role:
         return
-    folder = _add(document, "Folder")
-    _add(folder, "name", "zones")
+    look, style = LOOKS[role], _add(mark, "Style")
+    # KML has opacity first, then blue, green and red.
+    colour = "".join(look.dark[k : k + 2] for k in (5, 3, 1))
+    line = _add(style, "LineStyle")
+    _add(line, "color", f"ff{colour}")
+    _add(line, "width", f"{max(1.0, look.width):g}")
+    _add(_add(style, "PolyStyle"), "color", f"{round(255.0 * look.fill):02x}{colour}")
+
+
+def _add_zones(folders: _Folders, zones: Sequence[MapZone]) -> None:
     for zone in zones:
-        mark = _add(folder, "Placemark")
+        mark = _add(folders.named(zone.folder), "Placemark")
         _add(mark, "name", zone.name)
+        _add_style(mark, zone.role)
         several = _add(mark, "MultiGeometry")
         for outline, *holes in zone.parts:
             polygon = _add(several, "Polygon")

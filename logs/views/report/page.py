@@ -24,6 +24,7 @@ from flight.simulation.track import Track
 from logs import theme
 from logs.verdict.findings import Verdict
 from logs.verdict.measures.track_alignment import with_legs
+from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.views import figures
 from logs.views.charts import Chart
 from logs.views.failures import failures
@@ -168,6 +169,7 @@ def write_report(
     command: str,
     events: Sequence["LogEvent"] = (),
     svg: bool = False,
+    returns: DrawnReturns | None = None,
 ) -> list[Path]:
     """Write those of `logs.views.figures.FIGURES` that are files, and ``report.html``, into a folder, made if missing.
 
@@ -177,6 +179,7 @@ def write_report(
     command: the command line that makes the same flight again.
     events: the log's lines, shown with their times.
     svg: the figures as SVG, too.
+    returns: of the flight or the plan; None draws none.
 
     Everything is drawn before the first file is written; each file is written whole or not at all.
     Returns the paths written.  Raises OSError.
@@ -193,7 +196,7 @@ def write_report(
     ['map.png', 'profile.png', 'scene.png', 'turns.png', 'envelope.png', 'report.html']
     """
     track = None if track is None or not len(track) else with_legs(track, verdict.leg_ends)
-    subject = subject_of(setup, track, verdict)
+    subject = subject_of(setup, track, verdict, returns)
     views = figure_views(subject)
     pictures = figures.draw_pictures(views, svg=svg)
     page = _page(setup, subject, views, pictures, ended=ended, versions=versions, command=command, events=events)

@@ -5,6 +5,7 @@ import inspect
 import io
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import numpy as np
 import pytest
 import trimesh
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from mcap.reader import make_reader
 
+from logs import theme
 from logs.recording.foxglove_scene import (
     AIRCRAFT,
     SPAN,
@@ -22,13 +25,17 @@ from logs.recording.foxglove_scene import (
     layout_text,
     model_corners,
     plan_scene,
+    returns_scene,
     threats_scene,
     zones_scene,
 )
-from logs.recording.recorder import _CHANNELS, ZONES_TOPIC
+from logs.recording.reader import read_log
+from logs.recording.recorder import _CHANNELS, RETURNS_TOPIC, ZONES_TOPIC, Recorder
 from logs.recording.state_channel import EPOCH_NS, FIELDS, STATE_TOPIC
+from logs.verdict.returns.judge_glides import NOT_ASKED
 from tests.clients import need
-from tests.logs.made_flight import make_setup
+from tests.logs.made_flight import make_setup, make_track
+from tests.logs.verdict.returns.hill import hill_drawn, hill_setup
 
 
 def seen(data: bytes) -> trimesh.Scene:
@@ -71,7 +78,7 @@ def test_the_scene_carries_it_in_the_aircrafts_frame() -> None:
 def test_the_layout_names_only_topics_and_fields_of_a_log() -> None:
     layout = json.loads(layout_text())
     fields = {field.name for field in FIELDS}
-    topics = {*_CHANNELS, STATE_TOPIC, ZONES_TOPIC}
+    topics = {*_CHANNELS, STATE_TOPIC, ZONES_TOPIC, RETURNS_TOPIC}
     assert set(layout["configById"]["3D!planfly"]["topics"]) <= topics
     for name, panel in layout["configById"].items():
         for path in panel.get("paths", ()):
@@ -203,3 +210,47 @@ def test_waypoints_are_named_as_in_a_verdict() -> None:
     update = plan_scene(EPOCH_NS, setup.route.waypoints, setup.route.items.tolist())
     entity = SceneUpdate.FromString(update).entities[0]
     assert [text.text for text in entity.texts] == ["0", "1 (item 2)", "2 (item 3)", "3 (item 4)"]
+
+
+def test_returns_are_lines_in_the_colours_of_what_they_come_to(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path)
+    drawn = hill_drawn(setup)
+    update = SceneUpdate()
+    update.ParseFromString(returns_scene(0, drawn, setup.scenario.terrain))
+    (entity,) = update.entities
+    ways = list(entity.lines)[: len(drawn.by_kind)]
+    for line, (kind, ones) in zip(ways, drawn.by_kind, strict=True):
+        colour = (line.color.r, line.color.g, line.color.b, line.color.a)
+        assert colour == pytest.approx(theme.rgba(f"return-{kind}", dark=True))
+        assert len(line.points) == len(ones)
+        point = line.points[0]
+        assert (point.x, point.y) == pytest.approx(ones[0].start[:2])
+        # Just below the way, so that the plan stays visible.
+        assert 0.0 < ones[0].start[2] - point.z < 20.0
+    assert [text.text for text in entity.texts] == [f"return {k}" for k in range(1, len(drawn.worst) + 1)]
+    terrain = setup.scenario.terrain
+    assert terrain is not None
+    ground = list(entity.lines)[len(drawn.by_kind) + len(drawn.worst) :]
+    assert ground
+    for point in (line.points[0] for line in ground):
+        assert 0.0 < point.z - float(terrain.height(point.x, point.y)) < 10.0
+    plain = SceneUpdate()
+    plain.ParseFromString(returns_scene(0, replace(drawn, glides=NOT_ASKED), terrain))
+    assert len(plain.entities[0].lines) == len(drawn.by_kind) + len(drawn.worst)
+
+
+def test_a_log_shows_returns_from_its_start_though_they_were_judged_at_its_end(tmp_path: Path) -> None:
+    setup = make_setup()
+    drawn = hill_drawn(hill_setup(tmp_path))
+    paths = [tmp_path / "with.mcap", tmp_path / "without.mcap"]
+    for path, returns in zip(paths, (drawn, None), strict=True):
+        with Recorder(path, setup) as recorder:
+            recorder.write(make_track(seconds=4.0))
+            recorder.finish("completed", returns=returns)
+    with paths[0].open("rb") as file:
+        found = [message.log_time for _, _, message in make_reader(file).iter_messages(topics=[RETURNS_TOPIC])]
+    assert found == [EPOCH_NS]
+    assert read_log(paths[0]).ended == "completed"
+    assert len(read_log(paths[0]).track) == len(read_log(paths[1]).track)
+    with paths[1].open("rb") as file:
+        assert RETURNS_TOPIC not in {channel.topic for channel in make_reader(file).get_summary().channels.values()}

@@ -1,6 +1,7 @@
 """``planfly returns``: a mission flown, and its log; what it prints, answers and ends with; bad input."""
 
 import json
+import struct
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,34 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFi
     assert of_log["engine_out"] == answer["engine_out"]
     assert main(["check", "hill.waypoints", "--scenario", "hill.toml"]) == 0
     assert "returns   of " in capsys.readouterr().out
+
+
+def test_pictures_map_and_log_go_into_a_folder(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fly", "hill.waypoints", "--scenario", "hill.toml", "--log", "hill.mcap"]) == 0
+    asked = ["returns", "hill.mcap", "--every", "20", "--out", "drawn"]
+    assert main([*asked, "--json", "answer.json"]) == 4
+    capsys.readouterr()
+    files = sorted(path.name for path in (hill / "drawn").iterdir())
+    pictures = ["glide.png", "return-heights.png", "returns.png", "worst-returns.png"]
+    assert files == sorted([*pictures, "returns.kml", "returns.mcap"])
+    answer = json.loads((hill / "answer.json").read_text(encoding="utf-8"))
+    assert sorted(Path(name).name for name in answer["files"]) == files
+    for name in pictures:
+        assert struct.unpack(">I", (hill / "drawn" / name).read_bytes()[16:20])[0] == 1500
+    # A whole flight, with its returns in the scene.
+    assert main(["check", "drawn/returns.mcap"]) == 0
+    assert main([*asked, "--quiet"]) == 2
+    assert "exists and is not empty" in capsys.readouterr().err
+    # The report and an exported map of the flight have them too.
+    assert main(["report", "hill.mcap", "--out", "page", "--quiet"]) == 0
+    page = (hill / "page" / "report.html").read_text(encoding="utf-8")
+    for name in ("returns", "worst-returns", "return-heights", "glide"):
+        assert f'<section id="{name}">' in page
+        assert f'data-chart="{name}"' in page
+    assert main(["export", "hill.mcap", "hill.kml", "hill.gpx"]) == 0
+    assert "plan and flown and returns" in capsys.readouterr().out
+    assert "a return hits the ground" in (hill / "hill.kml").read_text(encoding="utf-8")
+    assert "a return" not in (hill / "hill.gpx").read_text(encoding="utf-8")
 
 
 def test_without_terrain_nothing_is_known(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,6 +10,10 @@ from pathlib import Path
 from flight.mission.items import Mission
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FlightSetup
+from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
+from logs.verdict.returns.judge_glides import judge_glides
+from logs.verdict.returns.judge_returns import judge_returns, return_world
+from logs.verdict.returns.return_starts import planned_starts
 from planfly.airframe import load_airframe
 from planfly.pipeline import make_setup
 from world.scenario import load_scenario
@@ -65,3 +69,9 @@ def hill_setup(folder: Path, more: str = "", mission: str = "", rally: tuple[obj
     scenario, read = load_scenario(str(file)), read_mission(way)
     made = Mission(read.home, read.items, rally=rally, source=read.source)  # type: ignore[arg-type]
     return make_setup(scenario, load_airframe(scenario), made, 1)
+
+
+def hill_drawn(setup: FlightSetup, every: float = 10.0) -> DrawnReturns:
+    """What is drawn of the returns and glides from its planned path."""
+    world, starts = return_world(setup), planned_starts(setup, every)
+    return drawn_returns(world, starts, judge_returns(world, starts, every), judge_glides(world, starts))

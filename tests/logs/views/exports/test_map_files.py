@@ -2,14 +2,26 @@
 
 import dataclasses
 import math
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from flight.simulation.setup import FlightSetup
-from logs.views.exports.map_files import MapLine, gpx_text, kml_text, map_zones, plan_line, track_line
+from logs import theme
+from logs.views.exports.map_files import (
+    MapLine,
+    glide_shapes,
+    gpx_text,
+    kml_text,
+    map_zones,
+    plan_line,
+    return_lines,
+    track_line,
+)
 from tests.logs.made_flight import WAYPOINTS, make_setup, make_track
+from tests.logs.verdict.returns.hill import hill_drawn, hill_setup
 
 # The names of OGC 12-007 and of GPX 1.1, clause for clause theirs.
 KML = "{http://www.opengis.net/kml/2.2}"
@@ -119,3 +131,35 @@ def test_zones_are_tracks_of_gpx_a_segment_a_ring() -> None:
     tracks = root.findall(f"{GPX}trk")
     assert [track.findtext(f"{GPX}name") for track in tracks] == ZONES
     assert [len(track.findall(f"{GPX}trkseg")) for track in tracks] == [2, 1, 1]
+
+
+def test_returns_have_the_colours_of_what_they_come_to(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path)
+    drawn = hill_drawn(setup)
+    lines, shapes = return_lines(setup, drawn), glide_shapes(setup, drawn)
+    root = ElementTree.fromstring(kml_text("returns", lines, shapes))
+    folders = {
+        folder.findtext(f"{KML}name"): folder.findall(f"{KML}Placemark")
+        for folder in root.findall(f"{KML}Document/{KML}Folder")
+    }
+    assert list(folders) == ["returns to launch", "the worst returns", "without its engine", "the glide's footprint"]
+    way = folders["returns to launch"]
+    assert len(way) == len(drawn.by_kind)
+    for mark, (kind, ones) in zip(way, drawn.by_kind, strict=True):
+        red, green, blue = (round(255.0 * part) for part in theme.rgb(theme.colour(f"return-{kind}", dark=True)))
+        assert mark.findtext(f"{KML}Style/{KML}LineStyle/{KML}color") == f"ff{blue:02x}{green:02x}{red:02x}"
+        assert f"{ones[0].time:.0f} to " in (mark.findtext(f"{KML}name") or "")
+        first = (mark.findtext(f"{KML}LineString/{KML}coordinates") or "").split()[0]
+        lon, lat, up = (float(value) for value in first.split(","))
+        assert (lon - 8.0) * 77_448.0 == pytest.approx(ones[0].start[0], abs=3.0)
+        assert (lat, up) == pytest.approx((46.0, ones[0].start[2]), abs=1e-3)
+    assert "hits the ground" in (folders["the worst returns"][0].findtext(f"{KML}name") or "")
+    near = folders["the glide's footprint"][0]
+    assert near.findtext(f"{KML}name") == "home or another chosen place in reach from 150 m above ground"
+    opacity = round(255.0 * theme.LOOKS["glide-near"].fill)
+    assert (near.findtext(f"{KML}Style/{KML}PolyStyle/{KML}color") or "").startswith(f"{opacity:02x}")
+    # It lies about home, and no height is stated: on the ground.
+    ring = near.findtext(f".//{KML}outerBoundaryIs/{KML}LinearRing/{KML}coordinates") or ""
+    longitudes = [float(point.split(",")[0]) for point in ring.split()]
+    assert min(longitudes) < 8.0 < max(longitudes)
+    assert near.find(f".//{KML}extrude") is None

@@ -23,7 +23,7 @@ function startCharts(charts, world) {
     drawn.set(holder, width);
     library = library || loadPlotly().catch(giveUp);
     const plotly = await library;
-    const figure = holder.dataset.chart === "map" ? mapFigure(chart, world, theme, width) : panelFigure(chart, theme, width);
+    const figure = chart.panels ? panelFigure(chart, theme, width) : mapFigure(chart, world, theme, width);
     if (chart.timed && clock) figure.layout.shapes.push(cursor(figure.layout));
     await plotly.react(holder, figure.traces, figure.layout, CHART_CONFIG);
     holder.style.minHeight = "";

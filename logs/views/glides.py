@@ -1,0 +1,64 @@
+"""Without its engine: from how low home is reached, what is flat, and what of it is in reach along the way."""
+
+import numpy as np
+
+from flight.simulation.setup import FlightSetup
+from logs.verdict.returns.drawn_returns import DrawnReturns
+from logs.verdict.returns.glide_footprint import BAND_ROLES, Part
+from logs.verdict.returns.glides_text import reached_text, site_text
+from logs.verdict.returns.judge_glides import REACHES, Glide, Reach
+from logs.views.charts import Label, Layer
+from logs.views.map import Extent, MapChart, NamedWind, end_labels, map_extent, world_map
+from logs.views.returns import way_layers
+
+# Of what can be reached without an engine: role and name of the way.
+_LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
+
+
+def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
+    """The glide's footprint from above, and the way coloured by what is in reach; None where nothing was judged."""
+    glides, scenario, route = drawn.glides, setup.scenario, setup.route.waypoints
+    if not glides.each:
+        return None
+    sites = np.array([[site.east, site.north, 0.0] for site in glides.sites])
+    extent = map_extent(scenario, route, [sites, np.array([one.start for one in glides.each])])
+    layers = footprint_layers(drawn, extent)
+    layers += way_layers(drawn.by_reach, _LOOKS, lambda one: one.start[:2], lambda one: _said(one, drawn))
+    down = np.array([one.own.at for one in glides.each if one.own.end == "ground"])
+    if len(down):
+        name = "where ArduPlane's own return comes down"
+        layers.append(Layer("dots", name, "comes-down", down[:, 0], down[:, 1], quiet=True))
+    names = tuple(site_text(site) for site in glides.sites)
+    layers.append(Layer("dots", "home, rally point or landing", "waypoint", sites[:, 0], sites[:, 1], words=names))
+    labels = [
+        Label(name, site.east, site.north, "end", "waypoint") for name, site in zip(names, glides.sites, strict=True)
+    ]
+    return world_map(
+        scenario, "without its engine", layers, [*labels, *end_labels(scenario, route)], extent,
+        route=route, winds=(NamedWind(scenario.wind),),
+    )  # fmt: skip
+
+
+def _said(one: Glide, drawn: DrawnReturns) -> str:
+    spare = drawn.glides.spare(one)
+    left = f", {spare:.0f} m left over" if spare >= 0.0 else ""
+    return f"{one.time:.0f} s: {reached_text(one.reach)}{left}"
+
+
+def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
+    """Bands of the least height above ground that leads to a chosen place, and flat ground; none without a map."""
+    footprint = drawn.glides.footprint
+    if footprint is None:
+        return []
+    layers, place = [], "home, rally point or landing" if len(drawn.glides.sites) > 1 else "home"
+    for band in footprint.bands(*extent):
+        name = f"{place} in reach from {band.up_to:.0f} m above ground"
+        layers.append(_area(name, BAND_ROLES[band.up_to], band.parts))
+    flat = footprint.landings(*extent)
+    return layers + ([_area("flat ground by the elevation file", "landable", flat)] if flat else [])
+
+
+def _area(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
+    gap = np.full((1, 2), np.nan)
+    x, y = np.vstack([piece for part in parts for ring in part for piece in (ring, gap)])[:-1].T
+    return Layer("area", name, role, x, y, words=(name,))

@@ -1,0 +1,73 @@
+"""Returns to launch beside a verdict: from a few places of a flight, in a line, in a log's scene and in pictures."""
+
+from dataclasses import dataclass
+
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, plainly_drawn
+from logs.verdict.returns.judge_glides import judge_glides
+from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
+from logs.verdict.returns.returns_text import headline
+from world.errors import PlanflyError
+
+
+def return_starts(setup: FlightSetup, track: Track | None, every: float) -> ReturnStarts:
+    """Of the track, or of the planned path where nothing was flown."""
+    if track is not None and len(track):
+        return flown_starts(setup, track, every)
+    return planned_starts(setup, every)
+
+
+# Returns of which the line beside a verdict is made, and its pictures.
+_FEW = 50
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnsBeside:
+    """Returns from a few places of a flight, beside its verdict; those in JSBSim are left out.
+
+    line: all of them in a line; "" where there is nothing to judge.
+    world, starts, returns: None where nothing is judged.
+    """
+
+    line: str = ""
+    world: ReturnWorld | None = None
+    starts: ReturnStarts | None = None
+    returns: Returns | None = None
+
+    def drawn(self) -> DrawnReturns | None:
+        """What pictures show of them, glides without the engine too, which take some seconds to find."""
+        if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
+            return None
+        return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
+
+    def plainly_drawn(self) -> DrawnReturns | None:
+        """The same without glides and least heights: some hundredths of a second."""
+        if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
+            return None
+        return plainly_drawn(self.world, self.starts, self.returns)
+
+
+def returns_beside(setup: FlightSetup, track: Track | None) -> ReturnsBeside:
+    """Of a flight, or of the planned path; nothing without a home or a terrain."""
+    if setup.mission.home is None or setup.scenario.terrain is None:
+        return ReturnsBeside()
+    try:
+        world = return_world(setup)
+        seconds = setup.path.length / max(1.0, setup.airspeed)
+        if track is not None and len(track):
+            seconds = float(track.time[-1] - track.time[0])
+        every = max(1.0, seconds / _FEW)
+        starts = return_starts(setup, track, every)
+        found = judge_returns(world, starts, every)
+    except PlanflyError as error:
+        return ReturnsBeside(f"not judged: {error}")
+    own = world.stands_in and not world.other_law
+    stands_in = f" (by ArduPlane's law in place of {setup.autopilot.title}'s)" if own else ""
+    return ReturnsBeside(headline(found) + stands_in, world, starts, found)
+
+
+def returns_line(setup: FlightSetup, track: Track | None) -> str:
+    """Returns from a few places of a flight, or of the planned path, in a line; "" without a home or a terrain."""
+    return returns_beside(setup, track).line
