@@ -6,7 +6,6 @@ north of its origin), courses are radians clockwise from north, and home stands 
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from world.scenario_tables import (
     LandingTable,
     LaunchMethod,
     LaunchTable,
+    ReturnDemand,
     ReturnsTable,
 )
 from world.terrain import Terrain
@@ -128,12 +128,12 @@ class LandingStrip:
 class AskedReturns:
     """What is asked of returns, and what a planned mission sets for them.
 
-    require: "rtl" among them where every return to launch has to be safe.
+    require: "rtl" among them where every return to launch has to be safe, "glide" where an engine may stop anywhere.
     rtl_altitude: over home, m; None where the scenario sets none.
     rally: (n, 3) east, north, m AMSL.
     """
 
-    require: tuple[Literal["rtl"], ...]
+    require: tuple[ReturnDemand, ...]
     rtl_altitude: float | None
     rally: Floats
 

@@ -301,7 +301,7 @@ def _examples(draft: Draft) -> str:
 
 # What the way home is judged by.
 # [returns]
-# require = ["rtl"]           # a return to launch from anywhere on the way has to be safe
+# require = ["rtl", "glide"]  # from anywhere on the way a return to launch has to be safe, an engine may stop
 """
 
 

@@ -525,15 +525,20 @@ class RallyTable(PointTable):
         return self
 
 
+# What a scenario may ask of the way home from everywhere: that RTL is safe; that a glide without the engine leads
+# somewhere.
+ReturnDemand = Literal["rtl", "glide"]
+
+
 class ReturnsTable(ScenarioTable):
     """[returns]: what a verdict asks of the way home from everywhere, and what a planned mission sets for it.
 
-    require: "rtl" where every return to launch has to be safe.
+    require: "rtl" where every return to launch has to be safe, "glide" where an engine may stop anywhere.
     rtl_altitude_m: over home, that a return climbs or descends to.
     rally: points that are nearer than home.
     """
 
-    require: Annotated[list[Literal["rtl"]], Field(max_length=1)] | None = None
+    require: list[ReturnDemand] | None = None
     rtl_altitude_m: Annotated[float, within(1.0, 9000.0)] | None = None
     rally: Annotated[list[RallyTable], Field(min_length=1, max_length=100)] | None = None
 
@@ -541,6 +546,8 @@ class ReturnsTable(ScenarioTable):
     def _says_something(self) -> "ReturnsTable":
         if self.require is None and self.rtl_altitude_m is None and self.rally is None:
             raise ValueError("require: missing; give require, rtl_altitude_m or rally")
+        if self.require is not None and len(set(self.require)) < len(self.require):
+            raise ValueError(f"require: {', '.join(self.require)}: each is expected once")
         return self
 
 

@@ -221,6 +221,7 @@ CASES: dict[str, tuple[str, str, str]] = {
     "waypoints": ("", "[planner]\nwaypoints = 2", "planner.waypoints: 2: allowed 3..500"),
     "seed": ("", "[planner]\nseed = -1", "planner.seed: -1: allowed 0..9223372036854775807"),
     "returns": ("", '[returns]\nrequire = ["land"]', 'returns.require.0: "land": Input should be'),
+    "returns twice": ("", '[returns]\nrequire = ["glide", "glide"]', "require: glide, glide: each is expected once"),
     "goals": ("", "[planner.goals]\nlength_ratio = 0.5", "planner.goals.length_ratio: 0.5: allowed 1..100"),
     "airspeed": ("", "[flight]\nairspeed_mps = 14", "flight.airspeed_mps: 14: allowed 15..60"),
     "guidance": ("", '[flight]\nguidance = "luck"', 'flight.guidance: "luck"'),

@@ -154,6 +154,13 @@ class Glides:
         """How many of ArduPlane's own returns arrive."""
         return sum(one.own.end == "arrives" for one in self.each)
 
+    @property
+    def somewhere(self) -> bool | None:
+        """Whether something is in reach from everywhere; None where that is not known."""
+        if self.count("nothing"):
+            return False
+        return None if not self.each or self.count("unknown") else True
+
     def best_site(self, one: Glide) -> int:
         """Home where that is in reach, else the site that most is left over for; -1 for none in reach."""
         if one.reach == "home":

@@ -8,6 +8,7 @@ area, speed, stall and energy are judged on it as on every other leg.
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,11 +20,14 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.returns.judge_returns import judge_returns, return_world
+from logs.verdict.returns.glides_text import glides_headline
+from logs.verdict.returns.judge_glides import MARGIN, judge_glides
+from logs.verdict.returns.judge_returns import ReturnWorld, heights_above_ground, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
 from logs.verdict.returns.returns_text import headline
 from logs.verdict.rule import Rule
 from world.errors import MissionError
+from world.scenario_tables import ReturnDemand
 
 # Returns that are flown where all are required to be safe: one a second, and no more than this, 2 ms each.
 _MOST = 3000
@@ -65,23 +69,58 @@ def flown_return_findings(
 
 
 def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Whether every return from the way is safe, where the scenario requires it; nothing where it does not.
+    """Whether what the scenario requires of returns and of glides holds from all of the way; nothing where it does not.
 
     starts: makes them, so many seconds apart.
     """
     setup = requirements.setup
     asked = setup.scenario.returns
-    if asked is None or "rtl" not in asked.require:
+    if asked is None or not asked.require:
         return []
     every = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MOST)))
-    ok: bool | None
     try:
-        returns = judge_returns(return_world(setup), starts(every), every)
-        ok, reason = (None if returns.undecided else returns.safe), headline(returns)
+        world, begun = return_world(setup), starts(every)
+        found = [_DEMANDS[name](world, begun, every) for name in asked.require]
     except MissionError as error:
-        ok, reason = False, str(error)
-    method = f"from every {every:.0f} s of the way, on a point mass by ArduPlane's law"
+        # Without a home nothing returns; what could be glided to is not known.
+        found = [_Answer(False if "rtl" in asked.require else None, str(error), _METHOD)]
+    results = {one.ok for one in found}
+    ok = False if False in results else None if None in results else True
+    reason, method = "; ".join(one.reason for one in found), "; ".join(one.method for one in found)
+    method = f"from every {every:.0f} s of the way, {method}"
     return [make_finding("return", FLIGHT, ok=ok, reason=reason, source="scenario", method=method)]
+
+
+_METHOD = "on a point mass by ArduPlane's law"
+
+
+class _Answer(NamedTuple):
+    """Whether a demand is met, None where that is not known; why; and how it was judged."""
+
+    ok: bool | None
+    reason: str
+    method: str
+
+
+def _rtl(world: ReturnWorld, starts: ReturnStarts, every: float) -> _Answer:
+    """Whether every return to launch is safe."""
+    returns = judge_returns(world, starts, every)
+    return _Answer(None if returns.undecided else returns.safe, headline(returns), _METHOD)
+
+
+def _glide(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
+    """Whether the engine may stop anywhere: a glide leads home, to a rally point, a landing place or flat ground.
+
+    Lower than the least height above ground an aircraft takes off or lands, and comes down straight ahead.
+    """
+    low = heights_above_ground(world, starts) < world.limit
+    glides = judge_glides(world, starts.at(np.flatnonzero(~low)))
+    left_out = f"; {low.sum()} lower than {world.limit:.0f} m above ground are left out" if low.any() else ""
+    reason = f"without the engine: {glides_headline(glides)}{left_out}"
+    return _Answer(glides.somewhere, reason, f"glides that keep {MARGIN:.0f} m above ground")
+
+
+_DEMANDS: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answer]] = {"rtl": _rtl, "glide": _glide}
 
 
 def circled(requirements: RouteRequirements, aligned: AlignedTrack) -> bool:

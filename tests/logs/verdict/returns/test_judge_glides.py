@@ -9,12 +9,14 @@ import pytest
 
 from flight.mission.items import Command, Frame, MissionItem
 from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Finding
+from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import Glides, judge_glides
 from logs.verdict.returns.judge_returns import PointOfNoReturn, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import no_return_text
-from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup
+from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 
 # Nobody may land within 20 km: without it, all but the hill is flat.
 BARRED = (
@@ -130,6 +132,71 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     starts.rows["east"] += 50_000.0
     away = judge_glides(return_world(setup), starts)
     assert away.not_judged == "far" or {one.reach for one in away.each} == {"unknown"}
+
+
+def demanded(folder: Path, more: str = "", mission: str = "", demand: str = '["glide"]') -> Finding:
+    """What a verdict says by geometry alone where a scenario requires it."""
+    setup = hill_setup(folder, f"{more}[returns]\nrequire = {demand}\n", mission)
+    (found,) = [one for one in judge_geometry(setup).findings if one.rule == "return"]
+    return found
+
+
+def test_a_scenario_that_requires_it_fails_where_nothing_is_in_reach(tmp_path: Path) -> None:
+    # Nobody may land but at home, which a glide from 600 m reaches over 5.2 km, as above.
+    near, far = (demanded(tmp_path, BARRED, mission_text(0.0, east)) for east in (4500.0, 6500.0))
+    assert (near.ok, far.ok) == (True, False)
+    assert "without the engine: of 181 places home can be reached from 181" in near.reason
+    assert ", nothing from " in far.reason
+    assert far.method == "from every 1 s of the way, glides that keep 30 m above ground"
+    # Flat ground counts, for it is somewhere to land.
+    assert demanded(tmp_path).ok is True
+    assert not [one for one in judge_geometry(hill_setup(tmp_path, BARRED)).findings if one.rule == "return"]
+
+
+def test_just_enough_height_is_enough(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path, BARRED)
+    world, starts = return_world(setup), planned_starts(setup, 1.0).at(np.array([60]))
+
+    def lowered(metres: float) -> Glides:
+        rows = starts.rows.copy()
+        rows["up"] -= metres
+        return judge_glides(world, replace(starts, rows=rows))
+
+    spare = 0.0
+    for _ in range(3):
+        # What is lost on the way changes with the height by hundredths of it.
+        spare += lowered(spare).each[0].left[0]
+    assert spare > 200.0
+    just, hardly = lowered(spare - 0.5), lowered(spare + 0.5)
+    assert 0.0 <= just.each[0].left[0] < 1.0
+    assert -1.0 < hardly.each[0].left[0] < 0.0
+    assert (just.somewhere, hardly.somewhere) == (True, False)
+
+
+def test_both_may_be_required_and_the_worse_counts(tmp_path: Path) -> None:
+    both = demanded(tmp_path, demand='["rtl", "glide"]')
+    assert both.ok is False
+    assert "hit the ground" in both.reason
+    assert "; without the engine: of 261 places home can be reached from " in both.reason
+    short = demanded(tmp_path, mission=mission_text(0.0, 2000.0), demand='["glide", "rtl"]')
+    assert short.ok is True
+
+
+def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Path) -> None:
+    """From 10 m to 210 m on 2 km: the least height above ground, 30 m, is reached after 200 m, 8 s; 0 s counts."""
+    rows = ((1, 0.0, 10), (2, 2000.0, 210), (3, 3000.0, 500))
+    way = HEAD + "".join(f"{k}\t0\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up}\t1\n" for k, x, up in rows)
+    found = demanded(tmp_path, mission=way)
+    assert "; 9 lower than 30 m above ground are left out" in found.reason
+    setup = hill_setup(tmp_path, '[returns]\nrequire = ["glide"]\n')
+    bare = replace(setup, scenario=replace(setup.scenario, terrain=None))
+    (unknown,) = [one for one in judge_geometry(bare).findings if one.rule == "return"]
+    assert unknown.ok is None
+    assert unknown.reason == "without the engine: not judged: there is no elevation file"
+    homeless = replace(setup, mission=replace(setup.mission, home=None))
+    (nowhere,) = [one for one in judge_geometry(homeless).findings if one.rule == "return"]
+    assert nowhere.ok is None
+    assert "home: none is stated" in nowhere.reason
 
 
 def test_ranges_hold_every_place_in_order(tmp_path: Path) -> None:
