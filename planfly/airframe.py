@@ -10,6 +10,8 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.catalog import load_autopilot
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.setup import make_limits
+from planner.plan import Plan
+from planner.search.lay_ground_ways import FinalLaw, with_ground_ways
 from world.errors import FlightError, ScenarioError
 from world.scenario import Scenario
 
@@ -38,6 +40,27 @@ class Airframe:
     def max_bank(self) -> float:
         """Steepest bank in turns, rad."""
         return self.limits.max_bank
+
+
+def laid_from_the_ground(plan: Plan, airframe: Airframe) -> Plan:
+    """A plan with the ways from and to the ground that its scenario asks for; the plan as it is where it asks for none.
+
+    >>> import numpy as np
+    >>> from planner.plan import Certificate
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> path = np.stack([scenario.start, scenario.destination])
+    >>> certificate = Certificate(0.1, math.inf, 0.1, 9.0, 10.0, 50.0, ())
+    >>> plan = Plan(scenario, path, np.zeros(4), np.zeros(4), certificate, 7, "umda", 60, np.zeros((0, 3)))
+    >>> laid_from_the_ground(plan, load_airframe(scenario)) is plan
+    True
+    """
+    autopilot, cruise = airframe.autopilot, airframe.airspeed
+    law = FinalLaw(
+        airspeed=lambda tail, amsl: autopilot.landing_airspeed(cruise, tail, amsl),
+        slope=lambda height, run, tail, amsl: autopilot.landing_glide(height, run, tail, amsl).slope,
+    )
+    return with_ground_ways(plan, airframe.limits.surely(), law)
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:

@@ -11,6 +11,7 @@ from flight.autopilots.catalog import program_autopilot
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.fences import fence_zones
+from flight.mission.field_notes import field_notes
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission
@@ -29,7 +30,7 @@ from logs.verdict.measures.circle_reach import beside_end
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.rules.energy_rule import needed_energy
-from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.airframe import Airframe, choose_seed, laid_from_the_ground, load_airframe
 from planfly.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.reference_flights import judge_with_reference_flights
 from planfly.returns_beside import ReturnsBeside, returns_beside
@@ -139,7 +140,8 @@ def make_plan(
 
     Where the autopilot circles at the mission's end, the certificate names what that may come too near to.
     """
-    plan = plan_path(scenario, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
+    made = plan_path(scenario, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
+    plan = laid_from_the_ground(made, airframe)
     if not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
@@ -176,6 +178,9 @@ def make_setup(
     else:
         route = lay_route(placed, airspeed, fly_over, limits, *laws)
     route = with_end_courses(route, scenario, limits)
+    stated = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
+    notes = field_notes(mission, route, scenario, autopilot.return_rules, stated)
+    route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,
         mission=mission,

@@ -14,6 +14,8 @@ RUN_FILES = (
     "plan.json",
     "mission.waypoints",
     "mission.plan",
+    "mission.rally",
+    "mission.parm",
     "flight.mcap",
     "flight.BIN",
     "flight.ulg",

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from planner.ground_ways import GroundWays, GroundWaysFile, ground_ways_json
 from world.errors import MissionError
 from world.files import read_small_file
 from world.html_table import html_table
@@ -97,6 +98,8 @@ class Plan:
     algorithms the number of kinds violated).
     ended: "completed", or why the search ended early: "budget", "interrupted".
     flown_legs: number of legs at the beginning that were already flown under an earlier plan.
+    ways: from the ground to the first waypoint and from the last to the ground; None for a plan that stays in the air.
+    Where one that the scenario asks for is not free, the certificate says so.
     """
 
     scenario: Scenario
@@ -110,6 +113,7 @@ class Plan:
     history: Floats
     ended: str = "completed"
     flown_legs: int = 0
+    ways: GroundWays | None = None
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -174,6 +178,7 @@ class _PlanFile(_Model):
     evaluations: Annotated[int, Field(ge=0)]
     ended: Literal["completed", "budget", "interrupted"] = "completed"
     flown_legs: Annotated[int, Field(ge=0)] = 0
+    ground_ways: GroundWaysFile | None = None
     feasible: bool
     safe: bool
     waypoints_east_north_amsl_m: Annotated[
@@ -219,6 +224,7 @@ def plan_json(plan: Plan) -> str:
         "feasible": plan.feasible,
         "safe": plan.safe,
         "waypoints_east_north_amsl_m": plan.waypoints.tolist(),
+        **({} if plan.ways is None else {"ground_ways": ground_ways_json(plan.ways)}),
         "violations": {item.name.lower(): int(plan.violations[item]) for item in Violation},
         "objectives": {item.name.lower(): float(plan.objectives[item]) for item in Objective},
         "certificate": {
@@ -292,6 +298,7 @@ def parse_plan(
         history=history,
         ended=file.ended,
         flown_legs=file.flown_legs,
+        ways=None if file.ground_ways is None else file.ground_ways.ways(),
     )
 
 

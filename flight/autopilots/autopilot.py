@@ -342,6 +342,21 @@ class Autopilot(ABC):
         """
         return LandingGlide(height / run)
 
+    def landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
+        """True airspeed on the glide to a landing point, m/s: that of the cruise, m/s.
+
+        tail_wind: m/s, negative from ahead.  amsl: height of the landing point, m.
+        """
+        return cruise
+
+    def as_asked(self, rtl_altitude: float | None, *, lands: bool) -> "Autopilot":
+        """The autopilot with what a scenario sets of its returns; as it is where it has no parameters for it.
+
+        rtl_altitude: over home, m; None where the scenario leaves it as it is.
+        lands: whether the scenario's missions end with a landing sequence.
+        """
+        return self
+
     def go_around_height(self, asked: float, takeoff: float) -> float | None:
         """Height over home (m) that it climbs to on its landing course before it goes around; None where that is open.
 

@@ -43,7 +43,8 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
         known = " or ".join(f"'{known}'" for known in _LAWS)
         allowed = f"{known} is expected{did_you_mean(name, sorted(_LAWS))}"
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
-    return _LAWS[name].load(scenario.flight, aircraft, scenario.name)
+    made, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
+    return made.as_asked(None if returns is None else returns.rtl_altitude, lands=scenario.landing is not None)
 
 
 def program_autopilot(program: Path) -> type[ProgramAutopilot]:

@@ -7,6 +7,7 @@ a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundCo
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +48,15 @@ def read_parameter_file(path: Path) -> dict[str, Entry]:
     """
     data = read_small_file(path, MAX_BYTES, "parameter", ParameterError)
     return parse_parameters(utf8_text(data, path, ParameterError), str(path))
+
+
+def parameters_text(values: Mapping[str, float], title: str) -> str:
+    r"""Parameters as a file that every ground station reads, a name and a value a line, below a comment.
+
+    >>> parameters_text({"RTL_ALTITUDE": 180.0, "LAND_FLARE_SEC": 2.5}, "made for a field")
+    '# made for a field\nRTL_ALTITUDE 180\nLAND_FLARE_SEC 2.5\n'
+    """
+    return "\n".join([f"# {title}", *(f"{name} {value:.10g}" for name, value in values.items())]) + "\n"
 
 
 def parse_parameters(text: str, source: str) -> dict[str, Entry]:

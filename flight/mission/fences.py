@@ -171,7 +171,8 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     no height.  Radars are no fence: being detected is not forbidden.  Zones follow as `zone_fences` makes them.  An
     exclusion that the mission passes above or below, as ``passes`` tells, is left out: an autopilot with such a fence
     refuses the mission or breaks it off.  Rally points are the first and last position of the mission, at the mission's
-    height over home.  The notes say, for people, what a fence cannot hold, and what was left out for it.
+    height over home; a mission with rally points, and one from or to the ground, keeps its own.  The notes say, for
+    people, what a fence cannot hold, and what was left out for it.
 
     >>> from world.scenario import load_scenario
     >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"), lambda shape: False)
@@ -205,7 +206,10 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
         above = f"{scenario.limits.max_height_m:g} m above ground"
         notes.append(f"a fence does not follow the ground: the greatest height of {above} is not in it")
     every = numbered([*fences, *mission.fences])
-    return replace(mission, fences=every, rally=numbered(_rally(mission))), tuple(notes)
+    # A mission that begins or ends on the ground has its scenario's: its last position is where it lands.
+    grounded = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None
+    rally = mission.rally if grounded else numbered(_rally(mission))
+    return replace(mission, fences=every, rally=rally), tuple(notes)
 
 
 def _missile_zones(scenario: Scenario) -> list[Zone]:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.parameter_files import parameters_text
 from flight.mission.fences import numbered, zone_fences
 from flight.mission.items import Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
@@ -36,6 +38,9 @@ from world.files import temporary_folder, write_whole
 from world.scenario import Scenario, at_time
 
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
+# Parameters of the autopilot that a mission was judged with: those of returns, rally points, take-off and landing.
+PARAMETERS = (".parm",)
+_JUDGED = ("RTL_", "RALLY_", "LAND_", "TECS_LAND_", "TKOFF_", "FW_LND_", "FW_TKO_", "NAV_DLL_ACT")
 # What a flight log alone can be written as.
 LOGS = (".csv", ".parquet", ".tlog", ".ulg")
 _CONTENTS = {"fence": "fence items", "rally": "rally points"}
@@ -66,6 +71,7 @@ class _Source:
     returns, footprint: on a map in KML, lines and shapes that have colours.
     notes: what the mission does not hold of the plan.
     log: the input, where it is a flight log.
+    autopilot: that flies the mission; None where no target asks for it.
     """
 
     mission: Mission
@@ -76,6 +82,7 @@ class _Source:
     footprint: list[MapZone] = field(default_factory=list)
     notes: tuple[str, ...] = ()
     log: FlightLog | None = None
+    autopilot: Autopilot | None = None
 
 
 @with_warm_up()
@@ -89,7 +96,8 @@ def export(
     """Write a plan, a mission or a flight in the forms that the files' suffixes name.
 
     source: a plan, a flight with a log, or the path of a plan.json, mission file or log.
-    files: .waypoints, .plan, .fence, .rally, .kml, .gpx; of a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
+    files: .waypoints, .plan, .fence, .rally, .kml, .gpx, and .parm with the parameters of take-off, landing and returns
+    that it is judged with; of a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
     fence: files of fences or zones beside its own.
     at: when it is flown, as of `planfly.plan`: zones that are not active then are in none of the files.
     overwrite: whether files that are there may be replaced.
@@ -107,7 +115,7 @@ def export(
     with contextlib.ExitStack() as place:
         path = _as_file(source, place)
         for target in targets:
-            if target.suffix.lower() not in (*MAPS, *LOGS):
+            if target.suffix.lower() not in (*MAPS, *PARAMETERS, *LOGS):
                 _refuse_unknown(target)
             refuse_existing(target, overwrite, path)
         found = _read(path, targets, named_fences(fence), at, fenced=bool(fence))
@@ -138,7 +146,7 @@ def _refuse_unknown(target: Path) -> None:
     try:
         mission_kind(target)
     except MissionError:
-        allowed = f"allowed {', '.join([*KINDS, *MAPS, *LOGS])}"
+        allowed = f"allowed {', '.join([*KINDS, *MAPS, *PARAMETERS, *LOGS])}"
         message = f"{target}: suffix {target.suffix!r}: {allowed}"
         raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
 
@@ -158,8 +166,8 @@ def _read(path: Path, targets: tuple[Path, ...], fences: NamedFences, at: str | 
         if suffix.lower() in LOGS:
             message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
             raise MissionError(message, file=target, field="suffix", value=suffix)
-    maps = any(target.suffix.lower() in MAPS for target in targets)
-    return _read_mission(path, fences, at, maps=maps, coloured=_asks_kml(targets))
+    placed = any(target.suffix.lower() in (*MAPS, *PARAMETERS) for target in targets)
+    return _read_mission(path, fences, at, placed=placed, coloured=_asks_kml(targets))
 
 
 def _asks_kml(targets: tuple[Path, ...]) -> bool:
@@ -180,20 +188,22 @@ def _read_log(path: Path, *, coloured: bool) -> _Source:
     lines = {"plan": plan_line(log.setup)}
     if len(log.track):
         lines["flown"] = track_line(log.setup, log.track)
-    source = _Source(log.setup.mission, log.setup.scenario.name, lines, map_zones(log.setup), log=log)
+    setup = log.setup
+    source = _Source(setup.mission, setup.scenario.name, lines, map_zones(setup), log=log, autopilot=setup.autopilot)
     return _with_returns(source, log.setup, log.track) if coloured else source
 
 
-def _read_mission(path: Path, fences: NamedFences, at: str | None, *, maps: bool, coloured: bool) -> _Source:
-    """A plan or a mission file; a map, zones and a plan's fence need its place, too, which not every mission has."""
+def _read_mission(path: Path, fences: NamedFences, at: str | None, *, placed: bool, coloured: bool) -> _Source:
+    """A plan or a mission file; a map, parameters, zones and a plan's fence need its place, which not every one has."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan = path.suffix.lower() == ".json"
-    if not (maps or is_plan or fences.zones or at is not None):
+    if not (placed or is_plan or fences.zones or at is not None):
         return _Source(fences.on_mission(read_mission(path)), path.stem)
     # What a station uploads has no times: which zones count is decided here.
     setup = open_mission(path, None, None, change=partial(at_time, at=at), fences=fences).setup
-    source = _Source(setup.mission, setup.scenario.name, {"plan": plan_line(setup)}, map_zones(setup))
+    line, zones = {"plan": plan_line(setup)}, map_zones(setup)
+    source = _Source(setup.mission, setup.scenario.name, line, zones, autopilot=setup.autopilot)
     source = _with_returns(source, setup, None) if coloured else source
     if not is_plan:
         return _with_zones(source, setup.scenario)
@@ -221,6 +231,8 @@ def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
             lines, zones = lines + source.returns, zones + source.footprint
             parts.append("returns")
         return MAPS[suffix](source.name, lines, zones), " and ".join(parts)
+    if suffix in PARAMETERS and source.autopilot is not None:
+        return judged_parameters(mission.source, source.autopilot)
     kind = mission_kind(target)
     if kind in _CONTENTS:
         count = len(mission.fences if kind == "fence" else mission.rally)
@@ -231,6 +243,20 @@ def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
     if kind == "plan" and (mission.fences or mission.rally):
         extra = f", {len(mission.fences)} fence items, {len(mission.rally)} rally points"
     return mission_text(mission, kind), f"{len(mission.items)} items{extra}"
+
+
+def judged_parameters(mission: str, autopilot: Autopilot) -> tuple[str, str]:
+    """Parameters of take-off, landing and returns as a file's text, and what it holds.
+
+    mission: its name in messages.  Raises MissionError for an autopilot that has none of them.
+    """
+    found = () if autopilot.parameters is None else autopilot.parameters.values
+    values = {name: value for name, value, _ in found if name.startswith(_JUDGED)}
+    if not values:
+        who = f"{autopilot.title} has no parameters of take-off, landing and returns"
+        raise MissionError(f"{mission}: {who}", file=mission, field="autopilot")
+    title = f"{autopilot.title}: take-off, landing and returns as planfly judged the mission with"
+    return parameters_text(values, title), f"{len(values)} parameters of {autopilot.title}"
 
 
 def _flown_text(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from flight.autopilots.catalog import load_autopilot, program_autopilot
 from logs.verdict.conditions import Conditions, conditions_of
-from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, load_airframe
+from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, laid_from_the_ground, load_airframe
 from planfly.arguments import check_arguments, is_wind
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import PLANNING
@@ -284,13 +284,15 @@ def _planned(
     if out is not None:
         read = None if isinstance(source, Scenario) else Path(source)
         target = file_target(out, world.name, number, overwrite=overwrite, source=read)
-    limits, ends = load_airframe(world).limits.surely(), _stop_condition(seconds, stop)
+    airframe, ends = load_airframe(world), _stop_condition(seconds, stop)
+    limits = airframe.limits.surely()
     with stage(f"planning {world.name}", "planning") as advance:
         if flown is None:
             made = plan_path(world, limits, seed=number, algorithm=algorithm, progress=advance, stop=ends)
         else:
             old, leg = flown
             made = replan_path(world, limits, old, leg, seed=number, algorithm=algorithm, progress=advance, stop=ends)
+    made = laid_from_the_ground(made, airframe)
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, plan_json(made))

@@ -15,6 +15,7 @@ from logs.recording.setup_attachments import package_versions
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.judge_flight import judge_plan_only
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
+from planfly.api.exporting import judged_parameters
 from planfly.api.flying import named_program
 from planfly.api.planning import Wind, changed_scenario, opened_scenario
 from planfly.arguments import check_arguments
@@ -220,8 +221,11 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     write_whole(folder / "plan.json", plan_json(plan))
     tracking = airframe.limits.tracking
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints", tracking=tracking)
-    for target in (folder / "mission.waypoints", folder / "mission.plan"):
+    rally = [folder / "mission.rally"] if mission.rally else []
+    for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
         write_whole(target, mission_text(mission, mission_kind(target)))
+    if plan.ways is not None and airframe.autopilot.parameters is not None:
+        write_whole(folder / "mission.parm", judged_parameters("mission.waypoints", airframe.autopilot)[0])
     if not plan.feasible:
         verdict = judge_plan_only(plan, planned_for(task.scenario, airframe))
         write_whole(folder / "verdict.json", verdict_json(verdict))

@@ -29,7 +29,7 @@ def export_options(line: LineParser) -> None:
         "files",
         metavar="FILE",
         nargs="+",
-        help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx;"
+        help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx, .parm (of take-off, landing and returns);"
         " of a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink; extra planfly[live]), .ulg (PX4)",
     )
     fence_option(parser)
@@ -61,4 +61,6 @@ def _kind(suffix: str) -> str:
     """What a file of a suffix is about."""
     if suffix in (".kml", ".gpx"):
         return "map"
+    if suffix == ".parm":
+        return "settings"
     return "flight" if suffix in (".csv", ".parquet", ".tlog", ".ulg") else "mission"

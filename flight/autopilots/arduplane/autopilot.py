@@ -142,9 +142,25 @@ class ArduPlane(Autopilot):
         """True by equivalent airspeed."""
         return float(true_by_equivalent(amsl))
 
+    def landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
+        """By TECS_LAND_ARSPD, or AIRSPEED_CRUISE and AIRSPEED_MIN, and LAND_WIND_COMP."""
+        return landing_airspeed(self.parameters, tail_wind) * self.airspeed_factor(amsl)
+
+    def as_asked(self, rtl_altitude: float | None, *, lands: bool) -> Autopilot:
+        """With RTL_ALTITUDE, and RTL_AUTOLAND 1 where nobody's file states it: 0 refuses to arm with DO_LAND_START.
+
+        >>> made = ArduPlane(default_parameters()).as_asked(180.0, lands=True)
+        >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland
+        (180.0, 1.0)
+        """
+        values = {} if rtl_altitude is None else {"RTL_ALTITUDE": rtl_altitude}
+        if lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in self.parameters.by_origin("file"):
+            values["RTL_AUTOLAND"] = 1.0
+        return ArduPlane(self.parameters.changed(**values)) if values else self
+
     def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
         """By LAND_FLARE_*, LAND_WIND_COMP, TECS_LAND_SINK and TECS_LAND_ARSPD."""
-        airspeed = landing_airspeed(self.parameters, tail_wind) * self.airspeed_factor(amsl)
+        airspeed = self.landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
     def go_around_height(self, asked: float, takeoff: float) -> float | None:

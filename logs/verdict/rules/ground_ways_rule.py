@@ -3,7 +3,8 @@
 A flight of ours begins and ends in the air.  These ways are not flown: they are laid out from the mission's items and
 judged against ground, missile spheres and zones, whether the mission was flown or not.
 
-Where a mission takes off, the aircraft climbs from the ground at home towards the next place.  What it hits at its
+Where a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course that the
+scenario's `[launch]` states.  What it hits at its
 steepest climb fails; what it would hit at `LEAST_CLIMB` of it is left open.  Where it does not take off, somebody flies
 the aircraft to its first waypoint, perhaps by another way: what is hit on the straight one is left open.
 
@@ -40,12 +41,14 @@ from logs.verdict.tolerances import (
     LAUNCH_RUN,
     LEAST_CLIMB,
     ON_THE_SPOT,
+    PLAN_TOLERANCE,
     POINT_ERROR,
     ROUNDING,
 )
 from logs.verdict.wording import place_text, shortened
 from world.airspace.zone_kernels import zone_records
 from world.frames import to_map
+from world.geometry import wrap
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -144,9 +147,10 @@ class _Met(NamedTuple):
 
 
 def _is_judged(requirements: RouteRequirements) -> bool:
-    """Whether ways are laid out: of missions over known ground, but for planfly's own plans and imported flights."""
+    """Whether ways are laid out: over known ground, but for imported flights and plans that stay in the air."""
     setup = requirements.setup
-    return setup.scenario.terrain is not None and setup.plan is None and setup.source is None
+    on_ground = setup.plan is None or setup.plan.ways is not None
+    return setup.scenario.terrain is not None and on_ground and setup.source is None
 
 
 def _climb(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
@@ -186,7 +190,8 @@ def climbout_findings(
     if takeoff is not None:
         if takeoff.command == Command.NAV_VTOL_TAKEOFF:
             return []
-        course, run = float(requirements.courses[0]), float(requirements.runs[0])
+        launch = _launch(requirements)
+        course, run, slope = launch.course, launch.run, launch.slope
     else:
         course, run = math.atan2(here[0] - begin[0], here[1] - begin[1]), math.dist(here[:2], begin)
         if run < SAME_PLACE:
@@ -200,7 +205,7 @@ def climbout_findings(
     if takeoff is None:
         way = _straight(begin, course, _way_up(low, float(here[2]), run, steepest))
         return [_by_hand(place, _look(requirements, way))]
-    up, slope = float(requirements.points[0, 2]), math.tan(float(requirements.slopes[0]))
+    up = float(requirements.points[0, 2])
     if up <= low:
         reason = f"the take-off's height is not above the ground at home, which is at {low:.0f} m AMSL"
         return [make_finding("climbout", place, ok=None, reason=reason, unit="m")]
@@ -208,7 +213,30 @@ def climbout_findings(
         _look(requirements, _straight(begin, course, _take_off(low, up, run, slope, climb)))
         for climb in (steepest, max(1e-3, LEAST_CLIMB * certain))
     )
-    return [_launched(requirements, place, met, least, (begin, low, up), certain == steepest)]
+    return [_launched(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
+
+
+class _Launch(NamedTuple):
+    """A launch: its course (rad), how far it is flown (m), the slope of the leg along it (m per m), and it in words."""
+
+    course: float
+    run: float
+    slope: float
+    way: str = ""
+
+
+def _launch(requirements: RouteRequirements) -> _Launch:
+    """Along the first leg, or on the course that the scenario states; the leg counts where it is on that course."""
+    stated = requirements.setup.scenario.launch
+    along = _Launch(
+        float(requirements.courses[0]), float(requirements.runs[0]), math.tan(float(requirements.slopes[0]))
+    )
+    if stated is None or stated.course is None:
+        return along
+    way = f"on the launch course {math.degrees(stated.course) % 360.0:.0f}°"
+    if abs(float(wrap(stated.course - along.course))) <= PLAN_TOLERANCE:
+        return along._replace(way=way)
+    return _Launch(stated.course, math.inf, 0.0, way)
 
 
 def _way_up(low: float, up: float, run: float, climb: float) -> Profile:
@@ -257,20 +285,23 @@ def _by_hand(place: Place, met: _Met) -> Finding:
 
 def _launched(
     requirements: RouteRequirements,
+    way: str,
     place: Place,
     met: _Met,
     least: _Met,
     launch: tuple[tuple[float, float], float, float],
     is_known: bool,
 ) -> Finding:
-    """Of a mission that takes off: the climb towards its next place.
+    """Of a mission that takes off: the climb towards its next place, or on its launch course.
 
+    way: of the launch in words, "" for along the first leg.
     met, least: at the steepest climb, and at the least.
     launch: where (east, north, m), from which ground and to which height (m AMSL).
     is_known: whether the aircraft's climb is certain.
     """
     to_item = requirements.leg(0).to_item
-    subject = f"the climb from home towards {'the next place' if to_item is None else f'item {to_item}'}"
+    towards = f"towards {'the next place' if to_item is None else f'item {to_item}'}"
+    subject = f"the climb from home {way or towards}"
     if math.isnan(met.clearance) and not met.entered:
         reason = message(f"the ground below {subject} is not known")
         return _finding("climbout", place, met, None, reason)
@@ -284,7 +315,9 @@ def _launched(
         return _finding("climbout", place, met, None, message(f"{at_least} leads to where the ground is not known"))
     if not least.free:
         return _finding("climbout", place, met, None, least.told(at_least, "from home"), GROUND_WAY)
-    return _finding("climbout", place, met, True, message(f"towards the next place: {_room(met)}"))
+    return _finding(
+        "climbout", place, met, True, message(f"{subject.removeprefix('the climb from home ')}: {_room(met)}")
+    )
 
 
 def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], low: float, up: float) -> str:
@@ -498,7 +531,7 @@ CLIMBOUT = Rule(
     noun="climb-out",
     asks="Is the way up from home to the mission's first place free of ground, missiles and zones?",
     margin=Margin("height above ground", "m", 10.0),
-    tolerances=("LAUNCH_RUN", "FIRST_CLIMB", "LEAST_CLIMB", "ROUNDING"),
+    tolerances=("LAUNCH_RUN", "FIRST_CLIMB", "LEAST_CLIMB", "PLAN_TOLERANCE", "ROUNDING"),
     judge=climbout_findings,
     phrase=lambda item: located("climb-out", item, shortened(item.brief)),
     unjudged="climb-out",

@@ -1,0 +1,165 @@
+"""The ways of a plan from the ground to its first waypoint, and from its last to the ground, and how a file holds them.
+
+A plan's path stays in the air between start and destination.  Where its scenario has `[launch]` or `[landing]`, these
+ways lead up to it from home and down from it to the landing strip; `planner.search.lay_ground_ways` lays them out.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+Floats = NDArray[np.float64]
+
+_Metres = Annotated[float, Field(ge=-500_000.0, le=500_000.0)]
+_Place = Annotated[list[_Metres], Field(min_length=3, max_length=3)]
+_Course = Annotated[float, Field(ge=-10.0, le=10.0)]
+_Length = Annotated[float, Field(gt=0.0, le=100_000.0)]
+
+
+@dataclass(frozen=True, slots=True)
+class ClimbOut:
+    """The way up: launched at home on a course, straight ahead to the take-off's height, and by waypoints to the plan.
+
+    home: (3,) m, on the ground.
+    course: of the launch, rad clockwise from north.
+    up: height that the take-off climbs to, m AMSL.
+    waypoints: (n, 3) m, between home and the plan's first waypoint.
+    gradient: m per m, the least climb that the way is laid out for.
+    """
+
+    home: Floats
+    course: float
+    up: float
+    waypoints: Floats
+    gradient: float
+
+    def __post_init__(self) -> None:
+        """Lock the arrays."""
+        _lock(self, "home", "waypoints")
+
+
+@dataclass(frozen=True, slots=True)
+class Descent:
+    """The way down: by waypoints from the plan's last one to the line-up, and along that to the landing point.
+
+    waypoints: (n, 3) m, before the line-up.
+    line_up: (2, 3) m, two points at one height on the landing course; the glide begins at the second.
+    point: (3,) m, the landing point on the ground.
+    course: of the landing, rad clockwise from north.
+    slope: of the straight line from the line-up's end to the landing point, m per m.
+    go_around: height over home that a go-around from there climbs to, m.
+    """
+
+    waypoints: Floats
+    line_up: Floats
+    point: Floats
+    course: float
+    slope: float
+    go_around: float
+
+    def __post_init__(self) -> None:
+        """Lock the arrays."""
+        _lock(self, "waypoints", "line_up", "point")
+
+
+@dataclass(frozen=True, slots=True)
+class GroundWays:
+    """A plan's ways from and to the ground; None for what its scenario does not ask for, or where none is free."""
+
+    climb: ClimbOut | None = None
+    descent: Descent | None = None
+
+
+def _lock(made: ClimbOut | Descent, *names: str) -> None:
+    for name in names:
+        array = np.array(getattr(made, name), dtype=np.float64)
+        array = array.reshape(-1, 3) if name in ("waypoints", "line_up") else array
+        array.setflags(write=False)
+        object.__setattr__(made, name, array)
+
+
+# ----------------------------------------------------------------------
+# As a plan's file holds them.
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class _ClimbFile(_Table):
+    home_east_north_amsl_m: _Place
+    course_rad: _Course
+    takeoff_amsl_m: _Metres
+    waypoints_east_north_amsl_m: Annotated[list[_Place], Field(min_length=1, max_length=1000)]
+    gradient: Annotated[float, Field(gt=0.0, le=10.0)]
+
+
+class _DescentFile(_Table):
+    waypoints_east_north_amsl_m: Annotated[list[_Place], Field(max_length=1000)]
+    line_up_east_north_amsl_m: Annotated[list[_Place], Field(min_length=2, max_length=2)]
+    point_east_north_amsl_m: _Place
+    course_rad: _Course
+    slope: Annotated[float, Field(gt=0.0, le=10.0)]
+    go_around_m: _Length
+
+
+class GroundWaysFile(_Table):
+    """A plan's ways from and to the ground as JSON: keys with units, None for what is not there."""
+
+    climb: _ClimbFile | None = None
+    descent: _DescentFile | None = None
+
+    def ways(self) -> GroundWays:
+        """The ways that it holds."""
+        up, down = self.climb, self.descent
+        climb = descent = None
+        if up is not None:
+            climb = ClimbOut(
+                np.array(up.home_east_north_amsl_m),
+                up.course_rad,
+                up.takeoff_amsl_m,
+                np.array(up.waypoints_east_north_amsl_m),
+                up.gradient,
+            )
+        if down is not None:
+            descent = Descent(
+                np.array(down.waypoints_east_north_amsl_m),
+                np.array(down.line_up_east_north_amsl_m),
+                np.array(down.point_east_north_amsl_m),
+                down.course_rad,
+                down.slope,
+                down.go_around_m,
+            )
+        return GroundWays(climb, descent)
+
+
+def ground_ways_json(ways: GroundWays) -> dict[str, Any]:
+    """Ways as JSON data, which `GroundWaysFile` reads.
+
+    >>> climb = ClimbOut(np.zeros(3), 0.5, 80.0, np.array([[0.0, 600.0, 90.0]]), 0.15)
+    >>> data = ground_ways_json(GroundWays(climb))
+    >>> list(data), GroundWaysFile.model_validate(data).ways().climb.waypoints.tolist()
+    (['climb'], [[0.0, 600.0, 90.0]])
+    """
+    data: dict[str, Any] = {}
+    if (up := ways.climb) is not None:
+        data["climb"] = {
+            "home_east_north_amsl_m": up.home.tolist(),
+            "course_rad": up.course,
+            "takeoff_amsl_m": up.up,
+            "waypoints_east_north_amsl_m": up.waypoints.tolist(),
+            "gradient": up.gradient,
+        }
+    if (down := ways.descent) is not None:
+        data["descent"] = {
+            "waypoints_east_north_amsl_m": down.waypoints.tolist(),
+            "line_up_east_north_amsl_m": down.line_up.tolist(),
+            "point_east_north_amsl_m": down.point.tolist(),
+            "course_rad": down.course,
+            "slope": down.slope,
+            "go_around_m": down.go_around,
+        }
+    return data

@@ -1,0 +1,522 @@
+"""Lay out a plan's ways from home up to its first waypoint, and from its last down to the landing strip.
+
+Both are searched for among a few thousand ways of straight legs, shortest first: launch courses or finals, and corners
+and laps between them and the plan.  A way counts if the certificate that judges the plan finds nothing on it (turns,
+slopes, clearance, missiles, zones, bounds), and if what lies below the certificate's clearance is free, too: the climb
+from the ground, and the glide to the landing point.  Where none counts, the plan's certificate says which came nearest.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits, aircraft_slopes
+from planner.evaluation.certify import certify
+from planner.evaluation.problem import ANGLE_MARGIN, Problem, make_problem
+from planner.ground_ways import ClimbOut, Descent, GroundWays
+from planner.plan import Certificate, Plan
+from planner.search.algorithms import find_algorithm, limits_for
+from planner.search.pose_chains import LAP_SIDE, MOST_LAPS, Spot, chains, fallen, risen, turns_fit
+from world.airfield import LandingStrip, Launch
+from world.geometry import leg_courses, leg_runs
+from world.scenario import Scenario
+from world.terrain import Terrain
+
+Floats = NDArray[np.float64]
+
+# Share of the aircraft's steepest climb, and of its steepest dive, at the cruise airspeed that a way takes: a take-off
+# climbs no less (the verdict's LEAST_CLIMB).
+SHARE = 0.7
+# Share of the steepest dive at the landing's airspeed that a glide takes.
+GLIDE_SHARE = 0.85
+# Shares of these slopes that are tried: the arc of a turn is steeper than its legs, by a quarter at a right angle.
+_GENTLER = (1.0, 0.75, 0.6)
+# m.  So much higher than the certificate asks for a take-off ends, and no lower than this over home.
+_OVER_CLEARANCE, _LEAST_TAKEOFF = 2.0, 40.0
+# The first leg is so much longer than the climb to the take-off's height: a share and m; and tried longer by these.
+_AFTER_TAKEOFF, _LONGER = (1.05, 30.0), (1.0, 1.6, 2.4)
+# m.  So far from home no ground stands in the way (the verdict's LAUNCH_RUN); beyond, this share of the height that was
+# climbed is to be left above ground, up to the scenario's clearance.
+_LAUNCH_RUN, _IN_HAND = 50.0, 0.5
+# m.  Steps in which the ground under the climb and the glide is looked at.
+_STEP = 10.0
+# Launch courses, and landing courses where there is no wind.
+_LAUNCHES, _LANDINGS = 36, 12
+# m/s.  With more wind from behind, and m of way that a launch with it has to spare.
+_TAIL, _TAIL_COST = 0.5, 5000.0
+# Finals: lengths (m) and slopes (rad) that are tried where the scenario states none; slopes beyond what PX4 takes last.
+_APPROACHES = (500.0, 600.0, 700.0, 800.0, 900.0, 1000.0, 1200.0, 1500.0, 2000.0)
+_SLOPES = tuple(math.radians(slope) for slope in (3.5, 4.0, 4.5, 4.9, 5.5, 6.0, 7.0))
+_PX4_SLOPE = math.radians(5.0)
+# Length of the line-up, in radii of the tightest turn, and m.
+_LINE_UP, _LEAST_LINE_UP = 4.0, 500.0
+# The glide: so near (m) before the point the ground may be met; above ground before, by this share of its height over
+# the point, up to so much (m).
+_EARLY, _GLIDE_SHARE, _GLIDE_ROOM = 60.0, 0.4, 10.0
+# Steepest ground (m per m) along and across a strip.
+STEEPEST_STRIP = 0.10
+# A go-around: least height over home and above ground, m, steps and the highest that is tried, m.
+_GO_AROUND, _GO_AROUND_ROOM, _HEIGHT_STEP, _HIGHEST = 50.0, 30.0, 10.0, 1000.0
+# Ways that are certified at most for each end, and finals that are tried.
+_CERTIFIED, _FINALS = 500, 8
+
+
+class FinalLaw(NamedTuple):
+    """What whoever flies makes of a final.
+
+    airspeed: true, on the glide, m/s, of the wind from behind (m/s) and the height (m AMSL).
+    slope: of the glide that is flown, m per m, of the height over and the distance before the landing point (m), the
+    wind from behind and the height of the point.
+    """
+
+    airspeed: Callable[[float, float], float]
+    slope: Callable[[float, float, float, float], float]
+
+
+def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw) -> Plan:
+    """The plan with the ways that its scenario's `[launch]` and `[landing]` ask for, or why there are none.
+
+    limits: that it was planned within.  A plan whose scenario has neither table stays as it is.
+    """
+    scenario = plan.scenario
+    if scenario.home is None or scenario.terrain is None or (scenario.launch is None and scenario.landing is None):
+        return plan
+    site = _make_site(plan, limits, scenario.home, scenario.terrain)
+    climb = descent = None
+    problems: list[str] = []
+    if scenario.launch is not None:
+        climb, why = _climb_out(site, scenario.launch)
+        problems += [f"climb-out: {why}"] if why else []
+    if scenario.landing is not None:
+        descent, why = _descent(site, scenario.landing, final)
+        problems += [f"landing: {why}"] if why else []
+    certificate = replace(plan.certificate, problems=(*plan.certificate.problems, *problems))
+    return replace(plan, ways=GroundWays(climb, descent), certificate=certificate)
+
+
+# ----------------------------------------------------------------------
+# What both ends ask of the ground, the aircraft and the airspace.
+
+
+@dataclass(frozen=True, slots=True)
+class _Site:
+    """A plan, and what its ways are certified by.
+
+    low: the problem of what lies below the required clearance: of its certificate the distances from missiles and zones
+    count.  radius: of the tightest turn, m.
+    """
+
+    plan: Plan
+    limits: Limits
+    home: Floats
+    terrain: Terrain
+    problem: Problem
+    low: Problem
+    radius: float
+
+    @property
+    def scenario(self) -> Scenario:
+        return self.plan.scenario
+
+    def slopes(self, course: float, amsl: float) -> tuple[float, float]:
+        """Climb and dive (m per m) that a way takes on a course (rad) at a height (m AMSL)."""
+        certified = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
+        stated = (self.limits.max_climb, self.limits.max_dive)
+        found = []
+        for able, sure, most in zip(self.limits.slopes(course, amsl), certified, stated, strict=True):
+            slope = min(SHARE * math.tan(able), math.tan(max(0.0, sure - 1.1 * ANGLE_MARGIN)))
+            found.append(slope if most is None else min(slope, math.tan(max(0.0, most - 1.1 * ANGLE_MARGIN))))
+        return found[0], found[1]
+
+    def certificate(self, chain: Floats, near: tuple[Floats, Floats]) -> Certificate:
+        """Certificate of a chain (n, 3).
+
+        near: places, (3,) m, near which less height above ground is asked for where they have less.
+        """
+        data = self.problem.certified
+        start, end = (min(data.buffer, 0.75 * max(0.0, self.above(place) - data.clearance - 0.01)) for place in near)
+        free = data._replace(
+            start=_locked(near[0]),
+            destination=_locked(near[1]),
+            start_buffer=start,
+            destination_buffer=end,
+            start_course=math.nan,
+            destination_course=math.nan,
+        )
+        return certify(replace(self.problem, certified=free), np.ascontiguousarray(chain))
+
+    def above(self, place: Floats) -> float:
+        """Height of a place above ground, m."""
+        return float(place[2] - self.terrain.height(place[0], place[1]))
+
+    def entered(self, chain: Sequence[Sequence[float]]) -> str:
+        """The missile or zone that a chain low over the ground enters, in words; "" for none."""
+        found = certify(self.low, np.array(chain, dtype=np.float64))
+        if found.kill_distance <= 0.0:
+            return f"{-found.kill_distance:.0f} m inside a missile's reach"
+        return f"{max(0.0, -found.zone_distance):.0f} m beyond a zone's edge" if found.zone_distance <= 0.0 else ""
+
+
+def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _Site:
+    scenario = plan.scenario
+    within = limits_for(find_algorithm(plan.algorithm, scenario.name), limits)
+    problem = make_problem(scenario, within)
+    # One to stay in that has a floor begins above the field.
+    zones = tuple(zone for zone in scenario.zones if zone.kind == "exclusion" or zone.floor is None)
+    low = make_problem(replace(scenario, zones=zones), within)
+    low = replace(low, certified=low.certified._replace(clearance=-1e5))
+    up = float(max(scenario.start[2], scenario.destination[2]))
+    radius = max(within.turn_radius(course, course + math.pi, up) for course in (0.0, 0.5 * math.pi))
+    return _Site(plan, within, home, terrain, problem, low, radius)
+
+
+def _locked(place: Floats) -> Floats:
+    """A place that cannot be written to, as a problem's own: another kind of array would compile the kernels again."""
+    out = np.array(place, dtype=np.float64)
+    out.setflags(write=False)
+    return out
+
+
+def _points(spots: Sequence[Spot], heights: Floats) -> Floats:
+    return np.column_stack([np.array(spots), heights])
+
+
+def _profile(terrain: Terrain, begin: Spot, course: float, last: float) -> tuple[Floats, Floats]:
+    """Runs from a place on a course, m, and heights of the ground there, NaN where that is not known."""
+    run = np.arange(0.0, last + _STEP, _STEP)
+    east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
+    return run, terrain.height(east, north)
+
+
+class _Nearest:
+    """The best of the ways that do not count, and how many there were."""
+
+    def __init__(self) -> None:
+        self.tried, self._margin, self.problem = 0, -math.inf, ""
+
+    def add(self, found: Certificate | None) -> None:
+        """Take a way's certificate into account, if it has one; one inside a missile's reach has no other problem."""
+        if found is None:
+            return
+        self.tried += 1
+        margin = min(found.clearance, found.kill_distance, found.zone_distance, found.bounds)
+        if not self.problem or margin > self._margin:
+            inside = f"{-found.kill_distance:.0f} m inside a missile's reach"
+            self._margin, self.problem = margin, found.problems[0] if found.problems else inside
+
+
+# ----------------------------------------------------------------------
+# The climb-out.
+
+
+def _climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
+    """The shortest way from home that counts; None and why not where none does."""
+    data, target = site.problem.certified, site.plan.waypoints[0]
+    ground, goal = float(site.home[2]), float(target[2])
+    over = max(_LEAST_TAKEOFF, data.clearance + data.buffer + _OVER_CLEARANCE)
+    up = ground + over
+    launches, why = _launches(site, launch, over, max(up, goal))
+    if not launches:
+        return None, why
+    nearest = _Nearest()
+    for laps in _lap_counts(site, goal - ground, 0):
+        for _, course, spots in sorted(_ways_up(site, launches, laps), key=lambda one: one[0]):
+            found = _certified_climb(site, course, spots, up)
+            if isinstance(found, ClimbOut):
+                return found, ""
+            nearest.add(found)
+            if nearest.tried >= _CERTIFIED:
+                break
+    courses = "on its course" if launch.course is not None else f"on {len({course for course, _ in launches})} courses"
+    if not nearest.tried:
+        return None, f"no way launched {courses} is long enough to climb to the start, {goal - ground:.0f} m over home"
+    return None, f"none of {nearest.tried} ways launched {courses} is free; the nearest: {nearest.problem}"
+
+
+def _certified_climb(site: _Site, course: float, spots: list[Spot], up: float) -> ClimbOut | Certificate | None:
+    """A way from home over these corners; its certificate where it does not count, None where it cannot be flown.
+
+    up: height that the take-off climbs to, m AMSL.
+    """
+    onward = site.plan.waypoints[1:3]
+    if not turns_fit([*spots, (float(onward[0, 0]), float(onward[0, 1]))], site.radius):
+        return None
+    target = site.plan.waypoints[0]
+    goal, top = float(target[2]), max(up, float(target[2]))
+    found = None
+    for share in _GENTLER:
+        heights = risen(spots, float(site.home[2]), partial(_share_of, site, share, 0, top), up, goal)
+        if heights[-1] < goal - 1e-6:
+            break
+        chain = np.concatenate([_points(spots, heights), onward])
+        found = site.certificate(chain, (target, chain[0]))
+        if found.ok and found.kill_distance > 0.0:
+            return ClimbOut(site.home, course, up, chain[1 : len(spots) - 1], site.slopes(course, top)[0])
+    return found
+
+
+# A launch: its course (rad), and where its first leg ends.
+_Start = tuple[float, Spot]
+
+
+def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[list[_Start], str]:
+    """Launches that climb free of ground, missiles and zones; or why there are none.
+
+    over: height over home to climb to straight ahead.  high: height for which the climb is looked up, m AMSL.
+    """
+    courses = [2.0 * math.pi * k / _LAUNCHES for k in range(_LAUNCHES)] if launch.course is None else [launch.course]
+    home, found, best = (float(site.home[0]), float(site.home[1])), [], (-math.inf, "")
+    for course in courses:
+        climb = site.slopes(course, high)[0]
+        if climb <= 0.0:
+            continue
+        least = over / climb * _AFTER_TAKEOFF[0] + _AFTER_TAKEOFF[1]
+        for longer in _LONGER:
+            last = least * longer
+            run, low = _profile(site.terrain, home, course, last)
+            height = climb * run
+            needed = np.minimum(site.problem.certified.clearance, _IN_HAND * height)
+            room = (site.home[2] + height - low - needed)[run > _LAUNCH_RUN]
+            where = f"on {math.degrees(course) % 360.0:.0f}°"
+            if not (room >= 0.0).all():
+                worst = float(np.nanmin(room)) if not np.isnan(room).all() else -math.inf
+                k = int(np.argmin(np.where(np.isnan(room), math.inf, room)))
+                at = float(run[run > _LAUNCH_RUN][k])
+                said = f"the nearest, {where}, is {-worst:.0f} m too low over the ground {at:.0f} m from home"
+                best = max(best, (worst, said))
+                break
+            end = (home[0] + last * math.sin(course), home[1] + last * math.cos(course))
+            ground = float(site.home[2])
+            entered = site.entered([(*home, ground), (*end, ground + climb * last)])
+            if entered:
+                best = max(best, (-1e6, f"{where} it is {entered}"))
+                break
+            found.append((course, end))
+    whose = "the launch course leads" if launch.course is not None else f"none of {len(courses)} launch courses leads"
+    no = "" if launch.course is None else "not "
+    return found, f"{whose} {no}free of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}"
+
+
+def _ways_up(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tuple[float, float, list[Spot]]]:
+    """Ways from home to the plan's first waypoint: what each costs, its launch course, and its corners."""
+    first, asked = site.plan.waypoints[0], site.scenario.start_course
+    onward = float(leg_courses(site.plan.waypoints[:2])[0]) if asked is None else asked
+    end, home = (float(first[0]), float(first[1])), (float(site.home[0]), float(site.home[1]))
+    for course, begin in launches:
+        tail = site.scenario.wind.along(course, float(site.home[2]))[0]
+        for corners in chains(begin, course, end, onward, site.radius, laps):
+            spots = [home, begin, *corners, end]
+            cost = sum(math.dist(a, b) for a, b in pairwise(spots))
+            yield cost + (_TAIL_COST if tail > _TAIL else 0.0), course, spots
+
+
+def _lap_counts(site: _Site, rise: float, side: int) -> list[int]:
+    """How many laps to try for a height to gain, or to lose, m, fewest first; side: 0 for a climb, 1 for a descent."""
+    up = float(max(site.scenario.start[2], site.scenario.destination[2]))
+    slope = max(1e-3, min(site.slopes(course, up)[side] for course in np.arange(8) * (math.pi / 4.0)))
+    most = math.ceil(abs(rise) / (4.0 * LAP_SIDE * site.radius * slope))
+    return list(range(min(MOST_LAPS, most) + 1))
+
+
+# ----------------------------------------------------------------------
+# The descent.
+
+
+class _Final(NamedTuple):
+    """A final: its course (rad), its length and height over the landing point (m), and its line-up, (2, 3) m."""
+
+    course: float
+    length: float
+    height: float
+    line_up: Floats
+    point: Floats
+
+
+def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent | None, str]:
+    """The first way down that counts; None and why not where none does."""
+    field = float(site.terrain.height(strip.east, strip.north))
+    point = np.array([strip.east, strip.north, field])
+    into = strip.into(site.scenario.wind, field)
+    courses = [into] if into is not None else [2.0 * math.pi * k / _LANDINGS for k in range(_LANDINGS)]
+    finals, reasons = [], []
+    for course in courses:
+        rough = _rough(site.terrain, strip, course)
+        if rough:
+            reasons.append(rough)
+            continue
+        made, why = _finals(site, strip, course, point, final)
+        finals += made
+        reasons += [why] if not made else []
+    if not finals:
+        return None, reasons[0]
+    why = ""
+    for one in finals[:_FINALS]:
+        corners, why = _way_down(site, one)
+        if corners is None:
+            continue
+        go_around = _go_around(site, one)
+        if go_around is None:
+            why = f"no height would do for a go-around on {math.degrees(one.course) % 360.0:.0f}°"
+            continue
+        return Descent(corners, one.line_up, point, one.course, one.height / one.length, go_around), ""
+    return None, why
+
+
+def _rough(terrain: Terrain, strip: LandingStrip, course: float) -> str:
+    """What is wrong with the ground of a strip, in words; "" for nothing."""
+    for name, turned, length in (("along", 0.0, strip.length), ("across", 0.5 * math.pi, max(60.0, strip.width))):
+        away = 0.5 * length * np.array([-1.0, 1.0])
+        heading = course + turned
+        low = terrain.height(strip.east + away * math.sin(heading), strip.north + away * math.cos(heading))
+        slope = float(low[1] - low[0]) / length
+        if math.isnan(slope):
+            return "the ground of the strip is not known to its ends"
+        if abs(slope) > STEEPEST_STRIP:
+            on = f"on {math.degrees(course) % 360.0:.0f}°"
+            return f"the strip slopes by {abs(slope):.0%} {name} it {on}; at most {STEEPEST_STRIP:.0%} can be landed on"
+    return ""
+
+
+def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law: FinalLaw) -> tuple[list[_Final], str]:
+    """Finals on a course that can be flown and are free, the gentlest and shortest first; or why there are none."""
+    field = float(point[2])
+    tail = site.scenario.wind.along(course, field)[0]
+    able = GLIDE_SHARE * math.tan(site.limits.slopes(course, field, law.airspeed(tail, field))[1])
+    lengths = _APPROACHES if strip.approach is None else (strip.approach,)
+    slopes = _SLOPES if strip.slope is None else (strip.slope,)
+    pairs = sorted(((a, s) for a in lengths for s in slopes), key=lambda one: (one[1] > _PX4_SLOPE, one))
+    found, why = list[_Final](), (-math.inf, "")
+    for length, slope in pairs:
+        height = length * math.tan(slope)
+        flown = law.slope(height, length, tail, field)
+        if flown > able:
+            steep, most = math.degrees(math.atan(flown)), math.degrees(math.atan(able))
+            why = max(why, (-1e6, f"a glide of {steep:.1f}° is steeper than the {most:.1f}° that can be flown there"))
+            continue
+        made = _Final(course, length, height, _line_up(site, point, course, length, height), point)
+        margin, blocked = _blocked(site, made)
+        if blocked:
+            why = max(why, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {blocked}"))
+        else:
+            found.append(made)
+    return found, f"on {math.degrees(course) % 360.0:.0f}° {why[1]}"
+
+
+def _line_up(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
+    away = np.array([length + max(_LEAST_LINE_UP, _LINE_UP * site.radius), length])
+    east, north = point[0] - away * math.sin(course), point[1] - away * math.cos(course)
+    return np.column_stack([east, north, np.full(2, point[2] + height)])
+
+
+def _blocked(site: _Site, final: _Final) -> tuple[float, str]:
+    """What stands in the way of a final and its line-up: by how much (m, negative), and in words; "" for nothing."""
+    begin, point = final.line_up[1], final.point
+    run, low = _profile(site.terrain, (float(begin[0]), float(begin[1])), final.course, final.length)
+    over = final.height * (1.0 - run / final.length)
+    room = float(point[2]) + over - low - np.minimum(_GLIDE_ROOM, _GLIDE_SHARE * over)
+    asked = room[run <= final.length - _EARLY]
+    if np.isnan(asked).any():
+        return -math.inf, "leads over ground that is not known"
+    if asked.min(initial=0.0) < 0.0:
+        return float(asked.min()), f"is {-float(asked.min()):.0f} m too low over the ground"
+    entered = site.entered([begin.tolist(), [float(point[0]), float(point[1]), float(begin[2])]])
+    entered = entered or site.entered([[*begin[:2].tolist(), float(point[2])], point.tolist()])
+    if entered:
+        return -math.inf, f"is {entered}"
+    above = np.array([point[0], point[1], begin[2]])
+    chain = np.concatenate([final.line_up, above[None]])
+    found = site.certificate(chain, (chain[0], chain[0]))
+    if not found.ok:
+        return min(found.clearance, 0.0) - 1.0, f"is not free: {found.problems[0]}"
+    return 0.0, "" if found.kill_distance > 0.0 else "is inside a missile's reach"
+
+
+def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
+    """Corners (n, 3) of the shortest way from the plan's last waypoint to a line-up; None and why not."""
+    path, goal = site.plan.waypoints, float(final.line_up[0, 2])
+    last, high = path[-1], float(path[-1, 2])
+    asked = site.scenario.destination_course
+    course = float(leg_courses(path[-2:])[0]) if asked is None else asked
+    begin, end = (float(last[0]), float(last[1])), (float(final.line_up[0, 0]), float(final.line_up[0, 1]))
+    before = path[-3:-1]
+    flown = [(float(one[0]), float(one[1])) for one in before]
+    after = (float(final.line_up[1, 0]), float(final.line_up[1, 1]))
+    nearest = _Nearest()
+    above = np.array([final.point[0], final.point[1], goal])
+    for laps in _lap_counts(site, high - goal, int(goal < high)):
+        ways = [[begin, *corners, end] for corners in chains(begin, course, end, final.course, site.radius, laps)]
+        for spots in sorted(ways, key=lambda one: sum(math.dist(a, b) for a, b in pairwise(one))):
+            if not turns_fit([*flown, *spots, after], site.radius):
+                continue
+            for share in _GENTLER:
+                heights = _heights_down(site, spots, share, high, goal)
+                if abs(heights[0] - high) > 1e-6 or abs(heights[-1] - goal) > 1e-6:
+                    break
+                chain = np.concatenate([before, _points(spots, heights), final.line_up[1:], above[None]])
+                found = site.certificate(chain, (last, last))
+                if found.ok and found.kill_distance > 0.0:
+                    return chain[len(before) + 1 : len(before) + len(spots) - 1], ""
+                nearest.add(found)
+            if nearest.tried >= _CERTIFIED:
+                break
+    where = f"from the destination to the final on {math.degrees(final.course) % 360.0:.0f}°"
+    if not nearest.tried:
+        return None, f"no way {where} is long enough for its turns and {high - goal:.0f} m of descent"
+    return None, f"none of {nearest.tried} ways {where} is free; the nearest: {nearest.problem}"
+
+
+def _heights_down(site: _Site, spots: list[Spot], share: float, high: float, goal: float) -> Floats:
+    """Heights (n,) m of a way between two heights, m AMSL, at a share of the slopes that it may take."""
+    top = max(high, goal)
+    climb, dive = (partial(_share_of, site, share, side, top) for side in (0, 1))
+    return fallen(spots, high, climb, dive, goal)
+
+
+def _share_of(site: _Site, share: float, side: int, amsl: float, course: float) -> float:
+    """A share of the climb (side 0) or dive (1) that a way takes on a course, m per m."""
+    return share * site.slopes(course, amsl)[side]
+
+
+def _go_around(site: _Site, final: _Final) -> float | None:
+    """Least height over home (m) of a go-around that climbs ahead and flies back to the line-up; None where none does.
+
+    It climbs from the landing point at `SHARE` of the steepest climb.
+    """
+    home, field = float(site.home[2]), float(final.point[2])
+    target = final.line_up[0]
+    first = max(_GO_AROUND, field - home + _GO_AROUND)
+    for height in np.arange(math.ceil(first / _HEIGHT_STEP) * _HEIGHT_STEP, _HIGHEST, _HEIGHT_STEP).tolist():
+        top = home + height
+        climb = site.slopes(final.course, top)[0]
+        if climb <= 0.0:
+            return None
+        run, low = _profile(
+            site.terrain, (float(final.point[0]), float(final.point[1])), final.course, (top - field) / climb
+        )
+        room = (field + climb * run - low)[run > _LAUNCH_RUN]
+        turned = np.array(
+            [final.point[0] + run[-1] * math.sin(final.course), final.point[1] + run[-1] * math.cos(final.course), top]
+        )
+        if (room >= 0.0).all() and _back_room(site, turned, target) >= _GO_AROUND_ROOM:
+            return float(height)
+    return None
+
+
+def _back_room(site: _Site, turned: Floats, target: Floats) -> float:
+    """Least height above ground on the way back from a go-around to the line-up, m; -inf where that is not known."""
+    run = float(leg_runs(np.stack([turned, target]))[0])
+    share = np.linspace(0.0, 1.0, max(2, math.ceil(run / _STEP)))
+    east, north = (turned[k] + share * (target[k] - turned[k]) for k in range(2))
+    if target[2] > turned[2]:
+        climb = site.slopes(math.atan2(target[0] - turned[0], target[1] - turned[1]), float(target[2]))[0]
+        up = np.minimum(target[2], turned[2] + max(0.0, climb) * run * share)
+    else:
+        up = turned[2] + share * (target[2] - turned[2])
+    room = up - site.terrain.height(east, north)
+    return -math.inf if np.isnan(room).any() else float(room.min())
