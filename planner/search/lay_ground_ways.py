@@ -22,7 +22,7 @@ from planner.evaluation.problem import ANGLE_MARGIN, Problem, make_problem
 from planner.ground_ways import ClimbOut, Descent, GroundWays
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
-from planner.search.pose_chains import LAP_SIDE, MOST_LAPS, Spot, chains, fallen, risen, turns_fit
+from planner.search.pose_chains import LAP_SIDE, MOST_LAPS, Spot, chains, fallen, measure, risen
 from world.airfield import LandingStrip, Launch
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
@@ -40,7 +40,7 @@ _GENTLER = (1.0, 0.75, 0.6)
 # m.  So much higher than the certificate asks for a take-off ends, and no lower than this over home.
 _OVER_CLEARANCE, _LEAST_TAKEOFF = 2.0, 40.0
 # The first leg is so much longer than the climb to the take-off's height: a share and m; and tried longer by these.
-_AFTER_TAKEOFF, _LONGER = (1.05, 30.0), (1.0, 1.6, 2.4)
+_AFTER_TAKEOFF, _LONGER = (1.05, 30.0), (1.0, 1.7)
 # m.  So far from home no ground stands in the way (the verdict's LAUNCH_RUN); beyond, this share of the height that was
 # climbed is to be left above ground, up to the scenario's clearance.
 _LAUNCH_RUN, _IN_HAND = 50.0, 0.5
@@ -133,6 +133,12 @@ class _Site:
             slope = min(SHARE * math.tan(able), math.tan(max(0.0, sure - 1.1 * ANGLE_MARGIN)))
             found.append(slope if most is None else min(slope, math.tan(max(0.0, most - 1.1 * ANGLE_MARGIN))))
         return found[0], found[1]
+
+    def least_length(self, rise: float, side: int) -> float:
+        """Least length of a way that gains or loses a height, m; side: 0 for a climb, 1 for a descent."""
+        up = float(max(self.scenario.start[2], self.scenario.destination[2]))
+        steepest = max(self.slopes(course, up)[side] for course in np.arange(8) * (math.pi / 4.0))
+        return max(0.0, abs(rise)) / steepest if steepest > 0.0 else math.inf
 
     def certificate(self, chain: Floats, near: tuple[Floats, Floats]) -> Certificate:
         """Certificate of a chain (n, 3).
@@ -244,10 +250,7 @@ def _certified_climb(site: _Site, course: float, spots: list[Spot], up: float) -
 
     up: height that the take-off climbs to, m AMSL.
     """
-    onward = site.plan.waypoints[1:3]
-    if not turns_fit([*spots, (float(onward[0, 0]), float(onward[0, 1]))], site.radius):
-        return None
-    target = site.plan.waypoints[0]
+    onward, target = site.plan.waypoints[1:3], site.plan.waypoints[0]
     goal, top = float(target[2]), max(up, float(target[2]))
     found = None
     for share in _GENTLER:
@@ -308,19 +311,20 @@ def _ways_up(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tup
     first, asked = site.plan.waypoints[0], site.scenario.start_course
     onward = float(leg_courses(site.plan.waypoints[:2])[0]) if asked is None else asked
     end, home = (float(first[0]), float(first[1])), (float(site.home[0]), float(site.home[1]))
+    after = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
+    least = site.least_length(float(first[2] - site.home[2]), 0) + math.dist(end, after)
     for course, begin in launches:
         tail = site.scenario.wind.along(course, float(site.home[2]))[0]
         for corners in chains(begin, course, end, onward, site.radius, laps):
             spots = [home, begin, *corners, end]
-            cost = sum(math.dist(a, b) for a, b in pairwise(spots))
-            yield cost + (_TAIL_COST if tail > _TAIL else 0.0), course, spots
+            way = measure([*spots, after], site.radius)
+            if way.fits and way.length >= least:
+                yield way.cost + (_TAIL_COST if tail > _TAIL else 0.0), course, spots
 
 
 def _lap_counts(site: _Site, rise: float, side: int) -> list[int]:
     """How many laps to try for a height to gain, or to lose, m, fewest first; side: 0 for a climb, 1 for a descent."""
-    up = float(max(site.scenario.start[2], site.scenario.destination[2]))
-    slope = max(1e-3, min(site.slopes(course, up)[side] for course in np.arange(8) * (math.pi / 4.0)))
-    most = math.ceil(abs(rise) / (4.0 * LAP_SIDE * site.radius * slope))
+    most = math.ceil(site.least_length(rise, side) / _GENTLER[-1] / (4.0 * LAP_SIDE * site.radius))
     return list(range(min(MOST_LAPS, most) + 1))
 
 
@@ -449,11 +453,15 @@ def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
     after = (float(final.line_up[1, 0]), float(final.line_up[1, 1]))
     nearest = _Nearest()
     above = np.array([final.point[0], final.point[1], goal])
-    for laps in _lap_counts(site, high - goal, int(goal < high)):
+    side = int(goal < high)
+    aside = math.dist(flown[-1], begin) + math.dist(end, after)
+    aside += sum(math.dist(a, b) for a, b in pairwise(flown))
+    least = site.least_length(high - goal, side) + aside
+    for laps in _lap_counts(site, high - goal, side):
         ways = [[begin, *corners, end] for corners in chains(begin, course, end, final.course, site.radius, laps)]
-        for spots in sorted(ways, key=lambda one: sum(math.dist(a, b) for a, b in pairwise(one))):
-            if not turns_fit([*flown, *spots, after], site.radius):
-                continue
+        measured = [(measure([*flown, *spots, after], site.radius), spots) for spots in ways]
+        fitting = [(way.cost, spots) for way, spots in measured if way.fits and way.length >= least]
+        for _, spots in sorted(fitting):
             for share in _GENTLER:
                 heights = _heights_down(site, spots, share, high, goal)
                 if abs(heights[0] - high) > 1e-6 or abs(heights[-1] - goal) > 1e-6:
