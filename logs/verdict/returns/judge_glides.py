@@ -8,7 +8,7 @@ out of kill spheres.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Literal, NamedTuple
 
@@ -143,7 +143,7 @@ class Glides:
     cell: float = math.nan
     fuel: bool = False
     not_judged: NotJudged = ""
-    footprint: GlideFootprint | None = None
+    footprint: GlideFootprint | None = field(default=None, repr=False, compare=False)
 
     def count(self, reach: Reach) -> int:
         """From how many places this is the best."""

@@ -1,0 +1,98 @@
+"""Returns and glides from everywhere on the demo's way: how long they take, and whether suggested rally points hold.
+
+``python -m benchmarks.ways_home [--every S] [--fresh N] [--whole N]`` plans and flies the demo, and judges the returns
+from it as `planfly returns` does: alone, with the glides, and with the search for rally points.  With the points that
+are found it then returns from N places that the search has not seen, by the law on a point mass, and from N of them by
+the whole law in JSBSim, and prints how low they came and how near to a sphere.  Times are those of the second pass:
+what is compiled or cached at first use is not counted.
+"""
+
+import argparse
+from collections.abc import Callable
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+
+import planfly
+from logs.verdict.returns.drawn_returns import drawn_returns
+from logs.verdict.returns.judge_glides import judge_glides
+from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.return_starts import ReturnStarts, flown_starts
+from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.suggest_returns import suggest_rally
+from planfly.return_flights import fly_return
+
+Result = TypeVar("Result")
+# Of the places that are fresh; between two of which they are drawn, s.
+_SEED, _FINE = 35, 0.1
+
+
+def timed(words: str, work: Callable[[], Result]) -> tuple[Result, float]:
+    """Do a piece of work twice, and print how long the second time took."""
+    work()
+    begun = perf_counter()
+    result = work()
+    seconds = perf_counter() - begun
+    print(f"{words:45s} {seconds:6.2f} s", flush=True)
+    return result, seconds
+
+
+def fresh_places(flown: planfly.FlownMission, every: float, count: int) -> ReturnStarts:
+    """Places of the flight that are not among those of every so many seconds."""
+    starts = flown_starts(flown.setup, flown.track, _FINE)
+    off = np.abs((starts.time / every + 0.5) % 1.0 - 0.5) * every
+    unseen = np.flatnonzero(off > 0.4 * every)
+    chosen = np.random.default_rng(_SEED).choice(unseen, size=min(count, len(unseen)), replace=False)
+    return starts.at(np.sort(chosen))
+
+
+def fly_fresh(world: ReturnWorld, starts: ReturnStarts, whole: int) -> None:
+    """Return from fresh places, and print how many came to harm."""
+    found = judge_returns(world, starts, 0.0)
+    low = [one.clearance for one in found.each]
+    outside = [one.outside for one in found.each]
+    print(f"from {len(low)} fresh places by the law: {headline(found)}")
+    print(f"  below {world.limit:.0f} m: {sum(one < world.limit for one in low)}, least {min(low):.1f} m;", end=" ")
+    print(f"inside a sphere: {sum(one <= 0.0 for one in outside)}, nearest {min(outside):.1f} m outside")
+    rows = starts.rows[np.linspace(0, len(starts) - 1, whole).round().astype(int)] if whole else []
+    flown = [one for one in (fly_return(world, row) for row in rows) if one is not None]
+    if flown:
+        least, nearest = min(one[0] for one in flown), min(one[1] for one in flown)
+        print(f"from {len(flown)} of them in JSBSim: least {least:.1f} m, nearest {nearest:.1f} m outside a sphere")
+
+
+def main() -> None:
+    """Measure, and print."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.ways_home")
+    parser.add_argument("--every", type=float, default=3.2, help="seconds between two returns (299 with 3.2)")
+    parser.add_argument("--fresh", type=int, default=100, help="places that the search has not seen")
+    parser.add_argument("--whole", type=int, default=20, help="of these, flown in JSBSim")
+    args = parser.parse_args()
+    flown = planfly.fly(planfly.plan("jacksboro", seed=1), wind=(5, 250))
+    world, starts = return_world(flown.setup), flown_starts(flown.setup, flown.track, args.every)
+    returns, alone = timed(
+        f"{len(starts)} returns, the least sure in JSBSim", lambda: judge_returns(world, starts, args.every, fly_return)
+    )
+    glides, without = timed("glides from there", lambda: judge_glides(world, starts))
+    _, drawn = timed(
+        "what is drawn of them, but for the drawing", lambda: drawn_returns(world, starts, returns, glides)
+    )
+    begun = perf_counter()
+    rally = suggest_rally(world, starts)
+    search = perf_counter() - begun
+    print(f"{'the search for rally points, once':45s} {search:6.2f} s")
+    print(
+        f"returns {alone:.1f} s; with glides {alone + without:.1f} s; with the search {alone + search:.1f} s", end="; "
+    )
+    print(f"drawing needs {drawn:.1f} s more")
+    print(f"{headline(returns)}; {glides.count('home')} glide home, {glides.count('nothing')} nowhere")
+    if rally is None or rally.rally is None:
+        print("no rally points were found")
+        return
+    print(f"{len(rally.rally)} rally points suggested")
+    fly_fresh(rally.on(world), fresh_places(flown, args.every, args.fresh), args.whole)
+
+
+if __name__ == "__main__":
+    main()
