@@ -11,12 +11,15 @@ from hypothesis import strategies as st
 from aircraft.catalog import load_aircraft
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.dynamics.envelope_tables import load_envelope
+from flight.mission.fences import with_fences
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import item_problem
 from flight.mission.route import make_route
 from flight.mission_files.formats import mission_text, parse_mission
 from flight.simulation.setup import make_limits
+from planner.ground_ways import ClimbOut, Descent, GroundWays
 from tests.mission_lines import a_plan
+from world.frames import to_map
 from world.scenario import load_scenario, with_wind
 
 
@@ -87,3 +90,45 @@ def test_a_corner_has_the_acceptance_that_its_autopilot_strays_least_with() -> N
     # On the second leg, at 60 degrees, the wind is from behind: 33.8 m/s.
     blown = plan_mission(windy, 25.0, math.radians(30.0), tracking=error)
     assert blown.items[2].params[1] == pytest.approx(15.0 + 104.7 + 2.0 * 8.85, abs=1.0)
+
+
+def test_a_plan_from_the_ground_begins_with_a_take_off_and_ends_with_a_landing() -> None:
+    plan = a_plan([(0.0, 0.0, 700.0), (0.0, 2000.0, 700.0)])
+    up = ClimbOut(np.array([-500.0, -900.0, 400.0]), 0.6, 470.0, np.array([[-100.0, -400.0, 500.0]]), 0.15)
+    line_up = np.array([[3000.0, 2000.0, 520.0], [3000.0, 1200.0, 520.0]])
+    down = Descent(
+        np.array([[2000.0, 2500.0, 640.0]]), line_up, np.array([3000.0, 400.0, 450.0]), math.pi, 0.0875, 130.0
+    )
+    scenario = load_scenario("jacksboro-field")
+    returns = scenario.returns
+    assert returns is not None
+    plan = replace(
+        plan,
+        ways=GroundWays(up, down),
+        scenario=replace(plan.scenario, home=up.home, returns=returns, landing=scenario.landing),
+    )
+    mission = plan_mission(plan, 25.0, math.radians(30.0))
+    assert [item.command for item in mission.items] == [22, 178, 16, 16, 16, 16, 189, 16, 16, 21]
+    assert all(item_problem(item) is None for item in mission.items)
+    takeoff, land = mission.items[0], mission.items[-1]
+    east, north = to_map(plan.scenario.origin, takeoff.lat_deg, takeoff.lon_deg)
+    assert (float(east), float(north), takeoff.alt) == pytest.approx((-500.0, -900.0, 470.0), abs=0.01)
+    assert takeoff.params[0] > 0.0
+    east, north = to_map(plan.scenario.origin, land.lat_deg, land.lon_deg)
+    assert (float(east), float(north), land.alt) == pytest.approx((3000.0, 400.0, 450.0), abs=0.01)
+    # A go-around's height over home is the landing's first number.
+    assert land.params[0] == 130.0
+    assert mission.home is not None
+    terrain = plan.scenario.terrain
+    assert terrain is not None
+    assert mission.home.alt == pytest.approx(float(terrain.height(-500.0, -900.0)), abs=0.001)
+    # Rally points at heights over home, whatever is below them.
+    (rally,) = mission.rally
+    assert rally.frame == 3
+    assert rally.alt == pytest.approx(returns.rally[0, 2] - mission.home.alt, abs=0.001)
+    for kind in ("waypoints", "plan"):
+        assert parse_mission(mission_text(mission, kind), f"a.{kind}").items == mission.items
+    assert parse_mission(mission_text(mission, "plan"), "a.plan").rally == mission.rally
+    # The fence of a plan leaves its rally points alone, and has none at the landing point.
+    assert with_fences(mission, plan.scenario, lambda shape: False)[0].rally == mission.rally
+    assert with_fences(replace(mission, rally=()), plan.scenario, lambda shape: False)[0].rally == ()

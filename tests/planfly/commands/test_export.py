@@ -8,11 +8,15 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
+from flight.autopilots.parameter_files import read_parameter_file
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.mission_files.formats import read_mission
 from logs.recording.reader import read_log
+from planfly.api.exporting import judged_parameters
 from planfly.cli import main
 from planner.plan import plan_json
 from tests.mission_lines import a_plan
+from world.errors import MissionError
 
 MISSIONS = Path(__file__).parents[2] / "flight" / "missions"
 KML = "{http://www.opengis.net/kml/2.2}"
@@ -94,6 +98,20 @@ def test_a_mission_from_form_to_form(tmp_path: Path, capsys: pytest.CaptureFixtu
     )
     assert "no fence items to write" in capsys.readouterr().err
     assert not (tmp_path / "b.waypoints").exists()
+
+
+def test_the_parameters_that_a_plan_is_judged_with(plan_file: Path, tmp_path: Path) -> None:
+    assert main(["export", str(plan_file), str(tmp_path / "a.parm")]) == 0
+    read = read_parameter_file(tmp_path / "a.parm")
+    assert {"RTL_ALTITUDE", "RALLY_LIMIT_KM", "LAND_FLARE_SEC", "RTL_AUTOLAND"} <= set(read)
+    assert read["RTL_ALTITUDE"].value == 100.0
+    # What flies by them alone is not in it.
+    assert not {"WP_RADIUS", "ROLL_LIMIT_DEG"} & set(read)
+
+
+def test_planflys_own_guidance_has_none_of_these_parameters() -> None:
+    with pytest.raises(MissionError, match=r"^a\.waypoints: .* has no parameters of take-off, landing and returns$"):
+        judged_parameters("a.waypoints", PlanflyGuidance())
 
 
 @pytest.mark.parametrize("name", ["a.kmz", "a.json", "a"])

@@ -26,6 +26,7 @@ north_m = 5500
 amsl_m = 320
 """
 
+HOME, LANDING = '[home]\nplace = "start"\n', "[landing]\neast_m = 4000\nnorth_m = 4000\n"
 ZONE = '[[zones]]\nname = "town"\nkind = "exclusion"\n{}\n'
 YARD = "polygon_m = [[2000, 2000], [3000, 2000], [3000, 3000]]\n"
 
@@ -74,6 +75,12 @@ SCENARIOS = {
     "parameters missing": SCENARIO + '[flight]\nparams = "nowhere.parm"\n',
     "wind too strong": SCENARIO + "[wind]\nspeed_mps = 24\n",
     "turbulence": SCENARIO + '[wind]\nturbulence = "severe"\n',
+    "a launch without home": SCENARIO + '[launch]\nmethod = "catapult"\n',
+    "a landing off the map": SCENARIO + HOME + "[landing]\neast_m = 7000\nnorth_m = 500\n",
+    "a landing by a course that is none": SCENARIO + HOME + LANDING + 'course_deg = "downwind"\n',
+    "home off the map": SCENARIO + "[home]\neast_m = 500\nnorth_m = -500\n",
+    "a rally point in the ground": SCENARIO + "[returns]\nrally = [{ east_m = 900, north_m = 900, amsl_m = 90 }]\n",
+    "a return below home": SCENARIO + "[returns]\nrtl_altitude_m = -20\n",
     "control character in a name": edited('name = "small"', 'name = "sm\\u0007all"'),
     "a zone that crosses itself": SCENARIO + ZONE.format("polygon_m = [[1, 1], [900, 900], [900, 1], [1, 900]]"),
     "a zone of two corners": SCENARIO + ZONE.format("polygon_m = [[1, 1], [900, 900]]"),
@@ -123,6 +130,8 @@ MISSIONS = {
     "nan.waypoints": WPL_HEAD + WPL_ROW.format(1, "nan", "-84.2") + WPL_ROW.format(2, "36.6", "-84.2"),
     "comma.waypoints": WPL_HEAD + WPL_ROW.format(1, "36,61", "-84.2") + WPL_ROW.format(2, "36.6", "-84.2"),
     "columns.waypoints": WPL_HEAD + "1\t0\t0\t16\t0\n",
+    # A landing without a place before it.
+    "landing.waypoints": WPL_HEAD + WPL_ROW.format(1, "36.6", "-84.2").replace("\t16\t", "\t21\t"),
     "one.waypoints": WPL_HEAD + WPL_ROW.format(1, "36.6", "-84.2"),
     "binary.waypoints": "\x00\x01\x02\x03" * 50,
     "truncated.plan": '{"fileType": "Plan", "version": 1, "mission": {"items": [',

@@ -70,6 +70,7 @@ def degrees(course: float) -> float:
 
 
 CATAPULT = {"launch": {"method": "catapult"}}
+NORTH = {"launch": {"method": "catapult", "course_deg": 0.0}}
 
 
 def test_a_plan_that_stays_in_the_air_stays_as_it_is() -> None:
@@ -79,7 +80,7 @@ def test_a_plan_that_stays_in_the_air_stays_as_it_is() -> None:
 
 
 def test_the_climb_is_flown_from_the_ground_at_seven_tenths_of_the_steepest() -> None:
-    plan = laid(**CATAPULT)
+    plan = laid(**NORTH)
     assert plan.feasible
     assert plan.ways is not None
     climb = plan.ways.climb
@@ -151,7 +152,7 @@ def test_a_wall_just_under_the_climb_is_passed_and_one_just_into_it_is_not() -> 
     # Of the height that was climbed half is to be left.
     clear = BASE + 0.5 * 0.7 * steepest * 255.0
     for top, free in ((clear - 2.0, True), (clear + 3.0, False)):
-        assert laid(ring(top), **CATAPULT).feasible is free, top
+        assert laid(ring(top), **NORTH).feasible is free, top
 
 
 def test_a_launch_into_a_missile_is_none() -> None:
@@ -163,7 +164,7 @@ def test_a_launch_into_a_missile_is_none() -> None:
 
 def test_a_high_start_is_climbed_to_in_laps() -> None:
     high = {"start": {"east_m": 0.0, "north_m": 0.0, "amsl_m": 900.0}}
-    scenario = scenario_of(**CATAPULT, **high, destination={"east_m": 0.0, "north_m": 5000.0, "amsl_m": 900.0})
+    scenario = scenario_of(**NORTH, **high, destination={"east_m": 0.0, "north_m": 5000.0, "amsl_m": 900.0})
     path = PATH + np.array([0.0, 0.0, 600.0])
     certificate, zeros = Certificate(0.1, 100.0, 0.1, 50.0, 500.0, 100.0, ()), np.zeros(4)
     plan = Plan(scenario, path, zeros, zeros, certificate, 1, "umda", 10, np.zeros((1, 3)))
@@ -253,17 +254,21 @@ def test_a_strip_that_slopes_too_much_is_named_with_the_side() -> None:
             assert ("along it" in said) is along
 
 
-def test_the_go_around_is_higher_over_a_hill_behind_the_field() -> None:
-    def hill(east: Floats, north: Floats) -> Floats:
-        return np.where((np.abs(north - 1800.0) < 100.0) & (np.abs(east - 2900.0) < 1500.0), 190.0, BASE)
+def test_the_go_around_is_higher_over_a_mound_behind_the_field() -> None:
+    def mound(east: Floats, north: Floats) -> Floats:
+        # Below the climb, 200 m beyond the landing point, and within 30 m of the way back at 50 m.
+        return np.where((np.abs(east - 2200.0) < 15.0) & (np.abs(north - 2500.0) < 200.0), BASE + 28.0, BASE)
 
     into = {"landing": FIELD | {"course_deg": 90.0}}
-    free, over = laid(**into).ways, laid(hill, **into).ways
-    assert free is not None
-    assert free.descent is not None
-    # Field and home are at one height.
-    assert free.descent.go_around == 50.0
-    assert over is None or over.descent is None or over.descent.go_around >= 50.0
+    found = []
+    for heights in (level, mound):
+        ways = laid(heights, **into).ways
+        assert ways is not None
+        assert ways.descent is not None
+        found.append(ways.descent.go_around)
+    # Field and home are at one height, over which it climbs 50 m at the least.
+    assert found[0] == 50.0
+    assert 50.0 < found[1] <= 80.0
 
 
 def test_a_field_higher_than_home_has_its_go_around_count_from_home() -> None:

@@ -19,6 +19,7 @@ from logs.verdict.judge_geometry import judge_geometry
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, setup_of, wp
 from tests.soak import scaled
+from world.airfield import Launch
 from world.airspace.zones import Cylinder, Zone, ZoneLevel
 from world.frames import to_geo
 from world.scenario import load_scenario
@@ -237,6 +238,17 @@ def test_where_no_way_up_is_known_there_is_no_finding_or_it_is_not_judged() -> N
     assert verdict.headline == "flyable; climb-out not judged"
     beside, _ = judged("climbout", lambda east, north: np.where(north == 1000.0, np.nan, 100.0) + 0.0 * east, *TAKEOFF)
     assert (beside.ok, beside.check) == (None, "")
+
+
+@pytest.mark.parametrize(("course_deg", "ok"), [(None, False), (0.0, False), (90.0, True), (185.0, True)])
+def test_a_stated_launch_course_replaces_the_guess_towards_the_first_place(course_deg: float | None, ok: bool) -> None:
+    setup = over(wall(500.0, 100.0 + 500.0 * climb() + 30.0, width=300.0), *TAKEOFF)
+    course = None if course_deg is None else math.radians(course_deg)
+    stated = replace(setup, scenario=replace(setup.scenario, launch=Launch("catapult", course)))
+    found = of(judge_geometry(stated), "climbout")
+    assert found.ok is ok
+    way = "towards item 2" if course_deg is None else f"on the launch course {course_deg:.0f}°"
+    assert (way if not ok else way.replace("towards item 2", "towards the next place")) in found.reason
 
 
 # ----------------------------------------------------------------------

@@ -1,14 +1,21 @@
 """Take-off climbs and landing approaches, just within and just beyond what the aircraft or the scenario allows."""
 
 import math
+from dataclasses import replace
+from typing import Any, cast
 
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.autopilot import ParameterValue
 from flight.simulation.simulate import simulate
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.rules.takeoff_landing_rule import takeoff_findings
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
+from world.airfield import Launch
 
 HOME = "36.5 -84.2 100"
 FAR = (wp(0, 3000, 300), wp(1500, 3000, 300))
@@ -102,3 +109,42 @@ def test_a_take_off_in_the_air_and_a_mission_without_ends_have_no_finding() -> N
     for lines in (FAR, (wp(0, 0), wp(0, 1500, 100, command=22), *FAR)):
         rules = {item.rule for item in judge_geometry(setup_of(*lines, home=HOME)).findings}
         assert not rules & {"takeoff", "landing"}
+
+
+class Stated:
+    """Parameters of which one is known."""
+
+    values = (ParameterValue("TKOFF_THR_MINACC", 15.0, "file"),)
+
+
+@pytest.mark.parametrize(
+    ("launch", "ok"),
+    [
+        # v^2 / 2 L: 13.5^2 / 12 = 15.2, and 13.3^2 / 12 = 14.7 m/s2.
+        (Launch("catapult", speed=13.5, length=6.0), True),
+        (Launch("catapult", speed=13.3, length=6.0), False),
+        # On a runway nothing but the motor pulls, which waits for it.
+        (Launch("runway", speed=20.0, length=6.0), False),
+    ],
+)
+def test_a_launch_too_gentle_for_the_motor_to_start(launch: Launch, ok: bool) -> None:
+    setup = setup_of("3 22 15 0 0 0 0 0 100", *FAR, home=HOME)
+    setup = replace(setup, scenario=replace(setup.scenario, launch=launch))
+    requirements = route_requirements(setup)
+    judged = replace(requirements, setup=replace(setup, autopilot=ArduPlane(cast(Any, Stated()))))
+    (found,) = takeoff_findings(judged, geometric=True)
+    assert found.ok is ok
+    if not ok:
+        assert found.reason.endswith("TKOFF_THR_MINACC asks for 15: the motor never starts")
+    # Without the parameter the motor waits for nothing.
+    assert takeoff_findings(requirements, geometric=True)[0].ok is True
+
+
+def test_a_launch_is_judged_by_its_climb_from_the_ground_to_the_next_place() -> None:
+    # 300 m over home, 3 km away: 5.7 degrees.
+    setup = setup_of("3 22 15 0 0 0 0 0 100", *FAR, home=HOME)
+    found = of(judge_geometry(replace(setup, scenario=replace(setup.scenario, launch=Launch("hand")))), "takeoff")
+    assert found.ok is True
+    assert found.planned == pytest.approx(math.degrees(math.atan(300.0 / 3000.0)), abs=0.02)
+    # And without one it is the autopilot's business.
+    assert of(judge_geometry(setup), "takeoff").ok is None
