@@ -101,7 +101,7 @@ LOOKS = {
     "aircraft": Look("#c8102e", "#ff5a6e", width=2.0),
     "return-safe": _SAFE,
     "return-ground": _WRONG,
-    "return-threat": Look(_VERMILLION, "#ff8033", width=4.4, dash=(3.0, 1.5), halo=True),
+    "return-threat": Look(_MISSILE.light, _MISSILE.dark, width=4.4, dash=(3.0, 1.5), halo=True),
     "return-zone": Look(_BROWN, "#e89090", width=4.4, dash=(9.0, 2.0, 2.0, 2.0), halo=True),
     "return-lost": Look(_BLUE, "#7cc0f5", width=4.4, dash=(6.0, 2.0, 2.0, 2.0), halo=True),
     "return-energy": Look(_BLUE, "#7cc0f5", width=4.4, dash=(2.0, 1.5), halo=True),

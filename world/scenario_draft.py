@@ -16,11 +16,11 @@ from world.raster import RasterFile, cover_text, is_covered, read_terrain, tile_
 
 Floats = NDArray[np.float64]
 
-# Ground beside the straight line that a way round may lead over, as a share of the line's length, and its limits, m;
+# Terrain on either side of the straight line, for detours: as a share of the line's length, and its limits, m;
 # less of it where there is no data further away.
 _MARGIN_SHARE, _MARGIN_LEAST, _MARGIN_MOST = 0.3, 1500.0, 15_000.0
 _SMALLER = (1.0, 0.5, 0.25, 0.12)
-# The ends may be no closer to the edge of the elevation file, and no further from each other, m.
+# Least distance of an end from the edge of the elevation file, and least and greatest distance between the ends, m.
 _EDGE, _NEAREST, _FURTHEST = 100.0, 100.0, 300_000.0
 # Latitude of a map's origin at most, degrees.
 _HIGHEST = 89.0

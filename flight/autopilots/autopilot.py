@@ -1,7 +1,7 @@
 """What steers a flight, as an interface: everything that the rest of planfly asks of an autopilot.
 
 An `Autopilot` carries its own settings: a `FlightSetup` holds one, and whoever plans, flies, judges or records asks it
-and never which one it is.  Each has a folder beside this file; `flight.autopilots.catalog.AUTOPILOTS` lists them.
+and never tests which one it is.  Each has a folder beside this file; `flight.autopilots.catalog.AUTOPILOTS` lists them.
 
 The base class answers for an autopilot that flies the fly-by path as it was planned, at the true airspeeds that it is
 told, without parameters, and returns to launch as ArduPlane does by its defaults.  An autopilot overrides what it does
@@ -55,7 +55,7 @@ class Parameters(Protocol):
 
     values: every parameter that its law knows.  unused: names that the file states and the law has no use for.
     source: the file that a person gave, "" for none.  not_flown: read, but no flight shows them.
-    beyond: what of the file lies beyond the documented ranges and is flown, with these.
+    beyond: values of the file outside their documented ranges, which are flown all the same, with those ranges.
     """
 
     not_flown: ClassVar[tuple[str, ...]]

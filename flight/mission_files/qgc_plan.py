@@ -42,7 +42,7 @@ from world.scenario_file import first_fault
 
 _TRANSECTS = ("survey", "CorridorScan")
 _LANDING = "fwLandingPattern"
-# QGC's altitude mode of a height that it counts from the terrain and sends as one above mean sea level.
+# QGC's altitude mode of a height given above terrain, which it sends as one above mean sea level.
 _CALCULATED = 3
 _COORDINATE = "latitude, longitude and altitude are expected"
 

@@ -42,7 +42,7 @@ Ints = NDArray[np.int64]
 
 # s between messages.
 EVERY = 2
-# Points of one message: when there are so many, they are thinned to so few.
+# Points of one message: as soon as there are the first number, they are thinned to the second.
 MAX_POINTS, THINNED = 96, 64
 
 

@@ -14,8 +14,8 @@ from aircraft import envelope
 PLAN_TOLERANCE = math.radians(0.01)
 # m.  A mission file's 1e-7 degrees move a waypoint by up to 1 cm in each direction.
 ROUNDING = 0.02
-# m.  How far below the required height above ground a leg may come: what `ROUNDING` of a waypoint comes to on steep
-# ground.
+# m.  How far below the required height above ground a leg, a circle or a return may come: what `ROUNDING` of a waypoint
+# comes to on steep ground.
 CLEARANCE_TOLERANCE = 0.1
 # m.  How far above the largest height above ground, or above the ceiling, a leg may rise: the same on steep ground.
 HEIGHT_TOLERANCE = 0.1

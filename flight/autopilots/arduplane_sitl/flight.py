@@ -51,7 +51,7 @@ class AutopilotFlight(SitlFlight):
             port.watch = self._process.watch
             self._lockstep = JsonLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._look)
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
-            self._mistake_place()
+            self._apply_gnss_error()
             self._converse(self._preflight.meet(given.given))
             program = _program(self._link, digest, given)
             self.setup = replace(setup, autopilot=replace(autopilot, program=program))

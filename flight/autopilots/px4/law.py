@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 PX4_MEMORY = record_dtype(
     ("begun", np.bool_),  # whether a tick was flown
     # Navigation.
-    ("leg", np.int64),  # that is flown, from waypoint `leg` to `leg + 1`
+    ("leg", np.int64),  # number of the leg that is flown, from waypoint `leg` to `leg + 1`
     "from_east",  # m, where the leg's line begins
     "from_north",
     "from_up",  # m, where its slope begins
@@ -49,8 +49,8 @@ PX4_MEMORY = record_dtype(
     ("climbed", np.bool_),  # whether it is at the height that it returns at
     ("finished", np.bool_),  # whether the mission's last waypoint was reached
     "waited",  # s at the mission's end
-    "end_bearing",  # rad, from there
-    "end_turned",  # rad, around it
+    "end_bearing",  # rad, from the last waypoint to the aircraft
+    "end_turned",  # rad, flown around the last waypoint
     # Lateral.
     "side_acceleration",  # m/s^2 to the right, as demanded
     "airspeed_for_ground",  # m/s, that the least ground speed takes; 0 for none

@@ -62,7 +62,7 @@ class Px4Flight(SitlFlight):
             lockstep = HilLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._look)
             self._lockstep = lockstep
             self._preflight = Px4Preflight(link, lambda: lockstep.time)
-            self._mistake_place()
+            self._apply_gnss_error()
             port.connect(_CONNECTS)
             lockstep.boot(self._rail, partial(_has_started, process), _PATIENCE, _STARTS)
             self._converse(self._preflight.meet(given.given))

@@ -245,7 +245,7 @@ class SitlFlight(ProgramFlight):
         self._link.poll()
         self._workspace.on_last_leg[0] = self._link.news.mission_item >= self.last_item
 
-    def _mistake_place(self) -> None:
+    def _apply_gnss_error(self) -> None:
         """Have the satellites mistake the place by as much as they do at the start."""
         settings, navigation = self._work.settings, self._work.navigation
         scale = settings.navigation_sigma * math.sqrt(2.0)

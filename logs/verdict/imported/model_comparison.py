@@ -17,7 +17,7 @@ from world.errors import LogError
 
 Floats = NDArray[np.float64]
 
-# m of leg between two places at which the flights are held against each other.
+# m.  Spacing along a leg of the places at which the flights are compared.
 STEP = 10.0
 
 
@@ -41,7 +41,7 @@ class LegPair:
     """One leg as flown and as simulated, each a pair of numbers; NaN where one has none.
 
     leg: of the whole route.  cross_track, height_error: m, the farthest from the leg, signed.
-    ground_speed: m/s, mean.  bank: deg, the most.  energy: Wh.
+    ground_speed: m/s, mean.  bank: deg, the largest.  energy: Wh.
     """
 
     leg: int
@@ -56,7 +56,7 @@ class LegPair:
 class TurnPair:
     """One turn as flown and as simulated.
 
-    waypoint: of the whole route.  turn: deg.  overshoot: m.  bank: deg, the most.  passed: m, nearest to the waypoint.
+    waypoint: of the whole route.  turn: deg.  overshoot: m.  bank: deg, the largest.  passed: m from the waypoint, least.
     """
 
     waypoint: int
