@@ -56,7 +56,7 @@ class LegPair:
 class TurnPair:
     """One turn as flown and as simulated.
 
-    waypoint: of the whole route.  turn: deg.  overshoot: m.  bank: deg, the largest.  passed: m from the waypoint, least.
+    waypoint: of the whole route.  turn: deg.  overshoot: m.  bank: deg, the largest.  passed: m, nearest to it.
     """
 
     waypoint: int
