@@ -10,7 +10,7 @@ otherwise.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple, Protocol, Self
@@ -19,7 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
+from aircraft.contacts import Contact
 from aircraft.tracking import TrackingError
+from flight.mission.ground_ways import GroundWays
 from flight.mission.loiter_circles import USUAL_LOITERS, LoiterRules
 from flight.mission.return_path import USUAL_RULES, ReturnRules
 from world.errors import ScenarioError
@@ -199,6 +201,7 @@ class Autopilot(ABC):
     refuses: whether it takes no mission that PX4's feasibility checks refuse.
     reads_as_px4: whether it reads nothing but the value of a mission's change of speed, goes back to its own airspeed
         for any that is not positive, and reads gates.
+    flies_ground: whether it flies take-offs and landings, see `from_ground`.
     height_candidates, side_candidates: parameters that may decide a flight which fails by its height or its track.
     """
 
@@ -210,6 +213,7 @@ class Autopilot(ABC):
     equivalent_airspeeds: ClassVar[bool] = False
     refuses: ClassVar[bool] = False
     reads_as_px4: ClassVar[bool] = False
+    flies_ground: ClassVar[bool] = False
     height_candidates: ClassVar[tuple[Candidate, ...]] = ()
     side_candidates: ClassVar[tuple[Candidate, ...]] = ()
     parameters: Parameters | None = None
@@ -275,6 +279,13 @@ class Autopilot(ABC):
         memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.  own: of the type `own`, None where that is None.
         """
         return
+
+    def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "GroundAutopilot":
+        """The autopilot that flies these ways from the ground and to it as well; only of one that `flies_ground`.
+
+        contacts: of the aircraft.
+        """
+        raise ValueError(f"{self.title} flies no take-off and no landing")
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
         """Begin another way where the aircraft is, and keep what the law has learnt of the aircraft.
@@ -420,6 +431,15 @@ class Autopilot(ABC):
     def with_parameters(self, **values: float) -> "Autopilot":
         """The same law with other values of parameters, by its own names and in its own units."""
         raise ValueError(f"{self.title} has no parameters")
+
+
+class GroundAutopilot(Autopilot):
+    """An autopilot that takes off, or lands, or both."""
+
+    @property
+    @abstractmethod
+    def released_throttle(self) -> float:
+        """Throttle (0..1) where rail or hand lets go of the aircraft, or where it stands on the runway."""
 
 
 def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -> str:

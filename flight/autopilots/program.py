@@ -30,6 +30,8 @@ class ProgramAutopilot(Autopilot):
     """
 
     log_suffix: ClassVar[str]
+    # Whatever its law does: a program is put into the air on a rail.
+    flies_ground: ClassVar[bool] = False
 
     @classmethod
     @abstractmethod

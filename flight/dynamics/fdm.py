@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
+from aircraft.contacts import Gear, with_contacts
 from flight.dynamics.jsbsim_properties import (
     FLAT_DENSITY,
     FLAT_PLANET,
@@ -100,10 +101,12 @@ def check_place(lat_deg: float, lon_deg: float, amsl: float, terrain_amsl: float
 MASS_TOLERANCE = 0.01
 
 
-def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat_earth: bool, tried: bool) -> None:
+def load_model(
+    instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat_earth: bool, tried: bool, gear: Gear | None = None
+) -> None:
     """Check a model, copy it into an empty folder, and load it from there: some models write into their own folder.
 
-    instance: a JSBSim instance with no model yet, made for this folder.  dt: s a step.  flat_earth, tried: as
+    instance: a JSBSim instance with no model yet, made for this folder.  dt: s a step.  flat_earth, tried, gear: as
     `Fdm` takes them.
 
     Raises FlightError for a model that is missing, refused or not loadable.
@@ -121,8 +124,9 @@ def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat
     folder.mkdir()
     for name, data in files.items():
         # JSBSim looks for the folder's name.
-        own = f"{aircraft.name}.xml" if name == aircraft.model_file.name else name
-        (folder / own).write_bytes(data)
+        main = name == aircraft.model_file.name
+        own = f"{aircraft.name}.xml" if main else name
+        (folder / own).write_bytes(with_contacts(data, aircraft, gear) if main and gear is not None else data)
     instance.set_aircraft_path(str(copy))
     instance.set_engine_path(str(folder))
     instance.set_systems_path(str(folder))
@@ -211,6 +215,7 @@ class Fdm:
     flat_earth: the book's world of constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2 over a plane that does not
     turn, for validation; degrees of latitude are then 157 times longer.  Otherwise WGS84 and the standard atmosphere.
     tried: whether somebody's model is known not to abort JSBSim; otherwise `flight.dynamics.model_check` finds out.
+    gear: what it meets the ground with, where its model does not say; None for a flight in the air alone.
 
     properties: JSBSim's own, by name, in its units.
 
@@ -227,12 +232,13 @@ class Fdm:
         flat_earth: bool = False,
         variation: Variation | None = None,
         tried: bool = False,
+        gear: Gear | None = None,
     ) -> None:
         if not 0.0 < rate_hz < math.inf:
             raise FlightError(f"rate_hz = {rate_hz} is not a positive number", field="rate_hz", value=rate_hz)
         self.aircraft = aircraft
         self.dt = 1.0 / rate_hz
-        self._exec = _load(aircraft, self.dt, flat_earth, tried or aircraft.embedded)
+        self._exec = _load(aircraft, self.dt, flat_earth, tried or aircraft.embedded, gear)
         access = PropertyAccess(self._exec.get_property_manager(), aircraft.model_file)
         self.properties = access
         if flat_earth:
@@ -321,6 +327,33 @@ class Fdm:
         self.move_to(amsl)
         self._evaluate(attitude, np.array(velocity, dtype=np.float64), rates, commands, settle=True)
         self._let_go()
+
+    def release(
+        self,
+        place: Sequence[float],
+        attitude: Sequence[float],
+        velocity: Sequence[float],
+        *,
+        wind: Sequence[float] = (0.0, 0.0, 0.0),
+        terrain_amsl: float = 0.0,
+        commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
+    ) -> None:
+        """Begin a flight anywhere, on the ground too, at rest or thrown; surfaces and motor stand at these commands.
+
+        place: lat_deg, lon_deg (geodetic) and amsl (m).  attitude: roll, pitch, yaw (true), rad.
+        velocity: north, east, down over the ground, m/s.  wind: (3,) m/s, the way the air moves; it stays on.
+        terrain_amsl: m.  Raises FlightError for numbers that are none, and a place that is on no map.
+        """
+        numbers = (*place, *attitude, *velocity, *wind, terrain_amsl, *commands)
+        if len(numbers) != 17 or not all(math.isfinite(number) for number in numbers):
+            raise FlightError(f"a release takes 17 finite numbers and has {numbers}", field="start", value=numbers)
+        lat_deg, lon_deg, amsl = place
+        # A place on the ground is one above it here: how far its skids are below it is the aircraft's.
+        check_place(lat_deg, lon_deg, amsl, min(terrain_amsl, amsl - 1.0))
+        self._at = (lat_deg, lon_deg, terrain_amsl)
+        self.begin_at(
+            attitude=attitude, velocity=velocity, rates=(0.0, 0.0, 0.0), wind=wind, amsl=amsl, commands=commands
+        )
 
     def _let_go(self) -> None:
         """Let everything move from where the initial conditions have put it."""
@@ -456,8 +489,8 @@ def _vary(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) 
         properties.set(name, value)
 
 
-def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool) -> jsbsim.FGFDMExec:
+def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool, gear: Gear | None) -> jsbsim.FGFDMExec:
     with silence(), temporary_folder("planfly-model-") as copy:
         instance = jsbsim.FGFDMExec(str(copy))
-        load_model(instance, copy, aircraft, dt, flat_earth=flat_earth, tried=tried)
+        load_model(instance, copy, aircraft, dt, flat_earth=flat_earth, tried=tried, gear=gear)
     return instance

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
+from aircraft.contacts import Gear
 from aircraft.path_limits import Limits, ground_speed_on
+from flight.autopilots.autopilot import Autopilot
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -57,10 +59,12 @@ class Airborne(ABC):
         variation: Variation | None = None,
         local_map: LocalMap | None = None,
         start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        gear: Gear | None = None,
     ) -> None:
         """Load it: local_map is the setup's where another flight of it has fitted one already.
 
         start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
+        gear: what it meets the ground with; None for a flight that does not.
         """
         self._start_offset = start_offset
         self._ground = Ground(setup.scenario.terrain)
@@ -69,7 +73,7 @@ class Airborne(ABC):
         self._gains = gains
         self._lay_out(setup, aircraft, local_map or LocalMap.around(setup))
         braking = setup.scenario.flight.motor_braking
-        self.fdm = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=braking, variation=variation)
+        self.fdm = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=braking, variation=variation, gear=gear)
 
     def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
         """Make the workspace for a route, and say how long it may take."""
@@ -77,7 +81,7 @@ class Airborne(ABC):
         waypoints = waypoint_records(setup.route, setup.mission)
         self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
-        self._workspace = Workspace(self._gains, self.path, waypoints, setup.autopilot.own)
+        self._workspace = Workspace(self._gains, self.path, waypoints, self._law(setup).own)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
@@ -98,6 +102,10 @@ class Airborne(ABC):
         if setup.autopilot.loiter_rules.ends_in_circle and waypoints["ends"][-1]:
             patience += longest_circling(setup.autopilot.loiter_rules.radius)
         self.max_ticks = int(patience / self.dt)
+
+    def _law(self, setup: FlightSetup) -> Autopilot:
+        """What keeps its record in the workspace."""
+        return setup.autopilot
 
     @property
     def position(self) -> Floats:

@@ -11,6 +11,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
+from flight.mission.ground_ways import GroundWays, find_ground_ways
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
@@ -242,6 +243,13 @@ class FlightSetup:
     def max_bank(self) -> float:
         """Steepest bank in turns, rad."""
         return self.limits.max_bank
+
+    @property
+    def ground_ways(self) -> GroundWays:
+        """What of the flight is flown from the ground and to it: nothing by an autopilot that does neither."""
+        if self.source is not None or not self.autopilot.flies_ground:
+            return GroundWays()
+        return find_ground_ways(self.scenario, self.mission, self.route)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
         """Set the same flight in another scenario; route, limits and path stay as they are."""

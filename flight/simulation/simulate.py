@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Tick
+from aircraft.contacts import contacts_of
+from flight.autopilots.autopilot import Autopilot, Tick
 from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.jsbsim_properties import Getter, Setter
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
+from flight.mission.ground_ways import GroundWays
 from flight.simulation.airborne import Airborne
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
+from flight.simulation.start import find_release, gear_of, release
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import StartError
@@ -87,6 +90,8 @@ TICK = 1.0 / 60.0
 BLOCK = 1.0
 # Bank that guidance may add to the planned turns' to correct an error, rad.
 BANK_RESERVE = math.radians(3.0)
+# So much longer a flight may take that takes off or lands, s.
+GROUND_PATIENCE = 120.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,12 +202,19 @@ class Flight(Airborne):
         start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
         """
         gains = load_gains(aircraft)
-        super().__init__(setup, aircraft, gains, variation, local_map, start_offset)
+        self._ways, gear = setup.ground_ways, None
+        if self._ways:
+            gear = gear_of(self._ways)
+            contacts = contacts_of(aircraft, gear)
+            self._from_ground = setup.autopilot.from_ground(self._ways, aircraft, contacts)
+        super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
+        if self._ways:
+            self.max_ticks += int(GROUND_PATIENCE / self.dt)
         # Guidance knows the model, not how the aircraft differs from it.
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
         self._begin(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
-        law = setup.autopilot.law
+        law = self._law(setup).law
         law.begin(self.memory, self._workspace.own)
         self._disturb(setup)
         self._loop = self._make_loop(self.fdm.loop_access(), law.tick)
@@ -214,6 +226,8 @@ class Flight(Airborne):
         setup: of the same aircraft, autopilot, wind and rates.  local_map: the setup's.
         """
         before, own = self._work, self._workspace.own
+        # In the air, whatever the other mission says.
+        self._ways = GroundWays()
         self._lay_out(setup, self.fdm.aircraft, local_map)
         for name in _CARRIED:
             setattr(self._work, name, getattr(before, name))
@@ -242,6 +256,14 @@ class Flight(Airborne):
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha
         memory.trim_throttle = (straight(model, start.airspeed, start.amsl) or level).throttle
         memory.last_airspeed = -1.0
+        if self._ways.take_off is not None:
+            throttle, elevator = self._from_ground.released_throttle, level.elevator
+            begin = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ways.take_off)
+            self._work.commands = release(self.fdm, begin, (elevator, 0.0, 0.0, throttle))
+            self._work.air.wind_north, self._work.air.wind_east = begin.wind[:2]
+
+    def _law(self, setup: FlightSetup) -> Autopilot:
+        return self._from_ground if self._ways else setup.autopilot
 
     def _fly(self, count: int) -> int:
         return self._loop(count)

@@ -1,11 +1,13 @@
-"""How a flight starts: where, how fast and on which slope its route begins, and the aircraft trimmed there."""
+"""How a flight starts: trimmed in the air where its route begins, or let go by a rail, a hand or on a runway."""
 
 import math
 from dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
+from aircraft.contacts import Gear, contacts_of
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import Trim
+from flight.mission.ground_ways import GroundWays, TakeOff
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import FlightSetup
 from world.errors import FlightError, StartError
@@ -90,3 +92,67 @@ def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
     fdm.set_wind(0.0, 0.0, 0.0)
     fdm.set_gust(*start.wind)
     return trimmed
+
+
+# ----------------------------------------------------------------------
+# From the ground.
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """How an aircraft is let go.
+
+    place: lat_deg, lon_deg, m AMSL.  attitude: roll, pitch, yaw (true), rad.
+    velocity, wind: (3,) m/s, north, east, down, over the ground and as the air moves.  ground: m AMSL.
+    """
+
+    place: tuple[float, float, float]
+    attitude: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+    wind: tuple[float, float, float]
+    ground: float
+
+
+def gear_of(ways: GroundWays) -> Gear:
+    """What an aircraft whose model has nothing meets the ground with: wheels where it rolls to its take-off."""
+    return "wheels" if ways.take_off is not None and ways.take_off.launch.method == "runway" else "belly"
+
+
+def find_release(
+    setup: FlightSetup, local_map: LocalMap, ground: Ground, aircraft: Aircraft, take_off: TakeOff
+) -> Release:
+    """Where and how a take-off begins."""
+    launch = take_off.launch
+    place, velocity = take_off.release(launch.release_speed(aircraft.stall_speed))
+    if launch.method == "runway":
+        stands = [one.down for one in contacts_of(aircraft, "wheels") if one.stands]
+        place[2] += max(stands, default=0.0)
+    lat, lon = (float(value) for value in to_geo(setup.scenario.origin, place[0], place[1]))
+    turn = local_map.convergence(lat, lon)
+    east, north = setup.scenario.wind.at(float(place[2]))
+    under = ground.height(float(place[0]), float(place[1]))
+    return Release(
+        place=(lat, lon, float(place[2])),
+        attitude=(0.0, launch.incline, take_off.course - turn),
+        velocity=(*_turned(float(velocity[0]), float(velocity[1]), turn), -float(velocity[2])),
+        wind=(*_turned(east, north, turn), 0.0),
+        ground=float(take_off.home[2]) if math.isnan(under) else under,
+    )
+
+
+def _turned(east: float, north: float, turn: float) -> tuple[float, float]:
+    """North and east about true north, of components on the map whose true north is at ``turn`` (rad)."""
+    cos, sin = math.cos(turn), math.sin(turn)
+    return north * cos + east * sin, east * cos - north * sin
+
+
+def release(fdm: Fdm, start: Release, commands: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    """Let the aircraft go with these commands, which are returned."""
+    fdm.release(
+        start.place, start.attitude, start.velocity,
+        wind=start.wind, terrain_amsl=start.ground, commands=commands,
+    )  # fmt: skip
+    # All that blows is set as a gust.
+    fdm.set_wind(0.0, 0.0, 0.0)
+    fdm.set_gust(*start.wind)
+    return commands

@@ -177,6 +177,7 @@ class Workspace:
 STEEPEST_BANK = math.radians(75.0)
 # What a tick returns, and how the flight ended by then.
 COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY = 1, 2, 3, 4, 5, 6, 7
+NO_MOTOR, TIPPED = 8, 9
 # A flight that passes the end of its route further than this from it, m, has missed it.
 FAR = 100.0
 # A return to launch has come to its circle within this distance of the middle, m, or `WIDER` of its radii, and to its
@@ -194,6 +195,8 @@ ENDS = {
     STALLED: "loss of control: airspeed below the stall",
     MISSED: "missed: passed the end of the route more than 100 m from it",
     EMPTY: "nothing is left in the battery or the tank",
+    NO_MOTOR: "not launched: the motor never started",
+    TIPPED: "ground contact: not on its belly or wheels",
 }
 _STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
 
@@ -249,6 +252,20 @@ def end_tick(work: Record) -> int:  # pragma: no cover - compiled
 
     Returns a key of `ENDS`, or 0 to fly on.
     """
+    fill_tick(work)
+    return status_in_air(work)
+
+
+@inner
+def status_in_air(work: Record) -> int:  # pragma: no cover - compiled
+    """How a flight in the air ends by now: a key of `ENDS`, or 0 to fly on."""
+    settings, air = work.settings, work.air
+    return _status(work.state, work.memory, work.place.clearance, settings.slowest, air.energy >= settings.battery)
+
+
+@inner
+def fill_tick(work: Record) -> None:  # pragma: no cover - compiled
+    """Make the next wind, fill a row of the track, count the tick, and state what to set in JSBSim, in its units."""
     state, true, air, timing, place = work.state, work.true, work.air, work.timing, work.place
     cos, sin = place.north_cos, place.north_sin
     row = work.rows[timing.row]
@@ -261,7 +278,6 @@ def end_tick(work: Record) -> int:  # pragma: no cover - compiled
     timing.tick += 1
     timing.row += 1
     _output(work.output, work.commands, air, work.scale_above, work.scale_below)
-    return _status(state, work.memory, place.clearance, work.settings.slowest, air.energy >= work.settings.battery)
 
 
 @inner

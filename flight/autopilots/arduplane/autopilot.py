@@ -1,15 +1,18 @@
 """ArduPlane's law as an autopilot, with the parameters that it flies by."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 import numpy as np
 
 from aircraft.catalog import Aircraft
+from aircraft.contacts import Contact
 from aircraft.tracking import TrackingError
+from flight.autopilots.arduplane.ground_law import ARDUPLANE_GROUND, CONTACTS, IN_AIR, TAKING_OFF, ground_tick
 from flight.autopilots.arduplane.landing import go_around_height, landing_airspeed, landing_glide
+from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick
 from flight.autopilots.arduplane.navigator import REACHED_HEIGHT, turn_distance
 from flight.autopilots.arduplane.parameters import (
@@ -27,6 +30,7 @@ from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import (
     Autopilot,
     Floats,
+    GroundAutopilot,
     LandingGlide,
     SpeedLimits,
     StoredAutopilot,
@@ -34,6 +38,7 @@ from flight.autopilots.autopilot import (
     Tick,
 )
 from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.mission.ground_ways import Approach, GroundWays, TakeOff
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
@@ -62,6 +67,7 @@ class ArduPlane(Autopilot):
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE
     cruise_parameter: ClassVar = "AIRSPEED_CRUISE"
     equivalent_airspeeds: ClassVar = True
+    flies_ground: ClassVar[bool] = True
     height_candidates: ClassVar = HEIGHT_CANDIDATES
     side_candidates: ClassVar = SIDE_CANDIDATES
     parameters: ArduPilotParameters = field()
@@ -236,10 +242,90 @@ class ArduPlane(Autopilot):
         """How far its law strays with these parameters."""
         return tracking_error(self.parameters, airspeed, nav, fly_over=fly_over, turbulence=turbulence)
 
+    def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "ArduPlaneFromGround":
+        """The same law with its take-off and its landing."""
+        return ArduPlaneFromGround(self.parameters, ways=ways, aircraft=aircraft, contacts=tuple(contacts))
+
     def with_parameters(self, **values: float) -> "ArduPlane":
         """The law, whoever flew before, with other parameters."""
         return ArduPlane(self.parameters.changed(**values))
 
+
+@dataclass(frozen=True)
+class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
+    """ArduPlane's law from the ground, or to it, or both.
+
+    ways: what of it is flown.  contacts: where the aircraft meets the ground.
+    """
+
+    own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE_GROUND
+    ways: GroundWays = field(kw_only=True)
+    aircraft: Aircraft = field(kw_only=True)
+    contacts: tuple[Contact, ...] = field(kw_only=True)
+
+    @property
+    def tick(self) -> Tick:
+        """One tick of the law."""
+        return ground_tick
+
+    @property
+    def motor_start(self) -> float:
+        """When the motor starts, s after the release; inf for never."""
+        if self.ways.take_off is None:
+            return -math.inf
+        launch, slowest = self.ways.take_off.launch, self.aircraft.stall_speed
+        return motor_start(launch.acceleration(slowest), launch.release_speed(slowest), launch.incline, self.parameters)
+
+    @property
+    def released_throttle(self) -> float:
+        """What the throttle has come to on the rail."""
+        made = self.parameters
+        # At once, and not 0 times infinity, for one that knows no limit; none yet where the motor starts later.
+        since = max(0.0, -self.motor_start)
+        return min(made.takeoff_throttle or made.throttle_max, since * takeoff_slew(made) if since else 0.0)
+
+    def begin(self, memory: Record, own: Record) -> None:
+        """Hand over the parameters, the contacts and the ways."""
+        super().begin(memory, own)
+        own.staged = own.parameters
+        ground = own.ground
+        used = self.contacts[:CONTACTS]
+        ground.contacts = len(used)
+        for k, one in enumerate(used):
+            ground.contact[k] = one.forward, one.right, one.down
+            ground.stands[k] = one.stands
+        ground.turnover = _TURNOVER_SHARE * self.aircraft.stall_speed
+        ground.stage = IN_AIR
+        if self.ways.take_off is not None:
+            self._begin_take_off(self.ways.take_off, ground)
+        if self.ways.approach is not None:
+            self._begin_landing(self.ways.approach, ground)
+
+    def _begin_take_off(self, take_off: TakeOff, ground: Record) -> None:
+        made, launch = self.parameters, take_off.launch
+        ground.stage, ground.rolls = TAKING_OFF, launch.method == "runway"
+        ground.motor = self.motor_start
+        ground.slew, ground.full = takeoff_slew(made), made.takeoff_throttle or made.throttle_max
+        ground.base, ground.top, ground.low = take_off.base, take_off.top, take_off.home[2]
+        ground.pitch, ground.leg = take_off.pitch, take_off.waypoint
+        pushed = launch.acceleration(self.aircraft.stall_speed)
+        # Since it moved at 5 m/s, at which its course over the ground is known.
+        ground.fast = max(0.0, launch.release_speed(self.aircraft.stall_speed) - _MOVES) / pushed if pushed else 0.0
+
+    def _begin_landing(self, approach: Approach, ground: Record) -> None:
+        up = float(approach.point[2])
+        glide = self.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
+        ground.lands, ground.landing_leg = True, approach.leg
+        ground.east, ground.north, ground.up = approach.point
+        ground.begin, ground.slope = approach.begin, glide.slope
+        ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
+        ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)
+
+
+# Faster than this share of its slowest flight no aircraft touches the ground with its nose, its tail or a wing.
+_TURNOVER_SHARE = 0.75
+# Faster over the ground than this ArduPlane knows its course, m/s.
+_MOVES = 5.0
 
 # `Plane::verify_loiter_heading` lines up with the place of the next item; a return has none, which is 0 N 0 E.
 _BEFORE_RETURN = "ArduPlane leaves its circle heading for 0° N 0° E, and returns from there: flown heading for home"

@@ -487,7 +487,7 @@ def fly_as_ardupilot(
         memory.height_error = estimated.up - b.up
     factor = true_by_equivalent(estimated.up)
     if not own.begun:
-        _begin(state, estimated, waypoints, memory, parameters, own)
+        begin_law(state, estimated, waypoints, memory, parameters, own)
     own.clock -= dt
     if own.clock < 0.5 * dt:
         own.clock += NAVIGATION_TICK
@@ -499,11 +499,11 @@ def fly_as_ardupilot(
         wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
         memory.speed_command = wanted * factor
         update_tecs(state, estimated, parameters, own, wanted * factor, factor, NAVIGATION_TICK)
-    _follow(state, estimated, gains, memory, parameters, own, factor, commands, dt)
+    follow_attitude(state, estimated, gains, memory, parameters, own, factor, commands, dt)
 
 
 @inner
-def _begin(
+def begin_law(
     state: Record, estimated: Record, waypoints: Records, memory: Record, parameters: Record, own: Record
 ) -> None:  # pragma: no cover - compiled
     """Take over in steady flight at the first waypoint."""
@@ -526,7 +526,7 @@ def _begin(
 
 
 @inner
-def _follow(
+def follow_attitude(
     state: Record,
     estimated: Record,
     gains: Record,

@@ -107,6 +107,21 @@ DEFINITIONS = {
     "landing_sink": Definition("TECS_LAND_SINK", 0.25, 0.0, 100.0),
     "landing_airspeed": Definition("TECS_LAND_ARSPD", -1.0, -1.0, 500.0),
     "landing_head_wind": Definition("LAND_WIND_COMP", 50.0, 0.0, 100.0, _PERCENT),
+    "takeoff_acceleration": Definition("TKOFF_THR_MINACC", 0.0, 0.0, 100.0),
+    "takeoff_delay": Definition("TKOFF_THR_DELAY", 2.0, 0.0, 127.0, 0.1),
+    "takeoff_ground_speed": Definition("TKOFF_THR_MINSPD", 0.0, 0.0, 100.0),
+    "takeoff_rotation": Definition("TKOFF_ROTATE_SPD", 0.0, 0.0, 100.0),
+    "takeoff_ground_pitch": Definition("TKOFF_GND_PITCH", 5.0, -10.0, 20.0, _DEGREE),
+    "takeoff_level_height": Definition("TKOFF_LVL_ALT", 5.0, 0.0, 1000.0),
+    "takeoff_leveling": Definition("TKOFF_PLIM_SEC", 2.0, 0.0, 100.0),
+    "takeoff_slew": Definition("TKOFF_THR_SLEW", 0.0, -1.0, 127.0, _PERCENT),
+    "takeoff_throttle": Definition("TKOFF_THR_MAX", 0.0, 0.0, 100.0, _PERCENT),
+    "landing_pitch": Definition("LAND_PITCH_DEG", 0.0, -20.0, 20.0, _DEGREE, ("LAND_PITCH_CD", _CENTI)),
+    "landing_pitch_max": Definition("TECS_LAND_PMAX", 10.0, -5.0, 45.0, _DEGREE),
+    "landing_speed_weight": Definition("TECS_LAND_SPDWGT", -1.0, -1.0, 2.0),
+    "landing_time": Definition("TECS_LAND_TCONST", 2.0, 0.1, 20.0),
+    "landing_sink_change": Definition("TECS_LAND_SRC", 0.0, -2.0, 2.0),
+    "flare_holdoff": Definition("TECS_FLARE_HGT", 1.0, 0.0, 15.0),
     "throttle_failsafe": Definition("THR_FAILSAFE", 1.0, 0.0, 2.0),
     "short_failsafe": Definition("FS_SHORT_ACTN", 0.0, 0.0, 4.0),
     "long_failsafe": Definition("FS_LONG_ACTN", 0.0, 0.0, 5.0),
@@ -170,6 +185,16 @@ class ArduPilotParameters:
         begins at.  flare_weight: share of the flare that is flown with the sink of its end.
     landing_sink: m/s, at the flare's end.  landing_airspeed: m/s, negative for the mean of cruise and minimum.
     landing_head_wind: share of the head wind by which that is raised, up to the cruise airspeed.
+    takeoff_acceleration: m/s^2 along the nose that starts the motor; 0 where it needs none.
+    takeoff_delay: s after that.
+    takeoff_ground_speed: m/s that it needs by then.  takeoff_rotation: m/s, until then the nose is at
+        takeoff_ground_pitch (rad).  takeoff_level_height: m, to which the bank of a take-off is level_roll_limit; it is
+        free at three times that.  takeoff_leveling: s before its end that a take-off begins to level off.
+    takeoff_slew: of the throttle's range in a take-off, 1/s; 0 for throttle_slew, negative for no limit.
+    takeoff_throttle: 0..1, 0 for throttle_max.
+    landing_pitch: rad, least of the flare.  landing_pitch_max: rad, its largest; 0 for that of flight.
+    landing_speed_weight: of TECS in a landing, negative for one that falls to 0 on its way.  landing_time: s, of TECS.
+    landing_sink_change: m/s of sink a metre beyond the landing point.  flare_holdoff: m, at which the sink is the last.
     throttle_failsafe to fence_auto_enable: when it leaves its mission by itself, and what it does then; see
         `flight.autopilots.arduplane.failsafes`.
     """
@@ -230,6 +255,21 @@ class ArduPilotParameters:
     landing_sink: float = field(init=False)
     landing_airspeed: float = field(init=False)
     landing_head_wind: float = field(init=False)
+    takeoff_acceleration: float = field(init=False)
+    takeoff_delay: float = field(init=False)
+    takeoff_ground_speed: float = field(init=False)
+    takeoff_rotation: float = field(init=False)
+    takeoff_ground_pitch: float = field(init=False)
+    takeoff_level_height: float = field(init=False)
+    takeoff_leveling: float = field(init=False)
+    takeoff_slew: float = field(init=False)
+    takeoff_throttle: float = field(init=False)
+    landing_pitch: float = field(init=False)
+    landing_pitch_max: float = field(init=False)
+    landing_speed_weight: float = field(init=False)
+    landing_time: float = field(init=False)
+    landing_sink_change: float = field(init=False)
+    flare_holdoff: float = field(init=False)
     throttle_failsafe: float = field(init=False)
     short_failsafe: float = field(init=False)
     long_failsafe: float = field(init=False)

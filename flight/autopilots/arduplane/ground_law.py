@@ -1,0 +1,431 @@
+"""How ArduPlane takes off and lands, compiled: one tick of a flight from the ground, or to it, or both.
+
+In the air it is the law of `flight.autopilots.arduplane.law`.  A take-off and a landing are the same law with other
+parameters and demands:
+
+Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp): wings level until the ground speed has
+been above 5 m/s for two seconds; then the heading is held that the course over the ground had then, less what the nose
+has turned since the launch.  Full throttle, speed by pitch, never below the pitch that the item states; bank no more
+than LEVEL_ROLL_LIMIT until TKOFF_LVL_ALT, free from three times that.  It ends above the item's height, and the next
+leg begins where the aircraft is.
+
+Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the line beyond the landing point, on the glide of
+`flight.autopilots.arduplane.landing`.  The approach stage begins when it is lined up, and with it the flare may begin:
+below LAND_FLARE_ALT, or LAND_FLARE_SEC before the ground at this sink on the second half, or beyond the point.  In the
+flare the motor is off, the bank at most LEVEL_ROLL_LIMIT, the pitch at least LAND_PITCH_DEG, and the sink is brought
+to TECS_LAND_SINK.  How ArduPlane's sink really comes to the ground is not known so well: see `docs/measured.md`.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY
+from flight.autopilots.arduplane.law import (
+    ARDUPILOT_MEMORY,
+    NAVIGATION_TICK,
+    begin_law,
+    fly_as_ardupilot,
+    follow_attitude,
+    update_tecs,
+)
+from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
+from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
+from flight.guidance.path import find_on_path
+from flight.simulation.tick import (
+    BANKED,
+    COMPLETED,
+    EMPTY,
+    GROUND,
+    NO_MOTOR,
+    NOT_A_NUMBER,
+    PATH_ROW,
+    STALLED,
+    STEEPEST_BANK,
+    TIPPED,
+    WORKSPACE,
+    WORKSPACE_NUMBERS,
+    begin_tick,
+    fill_tick,
+    status_in_air,
+)
+from world.geometry import wrap
+from world.kernels import Record, Records, compiled, inner, record_dtype
+from world.terrain import Heights
+
+Floats = NDArray[np.float64]
+
+# Points of an aircraft that may meet the ground, at most.
+CONTACTS = 12
+# What it is doing, in the order of a flight.
+TAKING_OFF, IN_AIR, ON_GLIDE, APPROACHING, FLARING = 0, 1, 2, 3, 4
+GROUND_STATE = record_dtype(
+    ("stage", np.int64),
+    ("lands", np.bool_),
+    ("rolls", np.bool_),  # whether it takes off from a runway, where it may touch the ground
+    ("lifted", np.bool_),
+    ("landed", np.bool_),  # it has touched down
+    "time",  # s since the release
+    # Where it may meet the ground, from the centre of gravity: m forward, right, down.
+    ("contact", np.float64, (CONTACTS, 3)),
+    ("stands", np.int64, (CONTACTS,)),  # whether it stands on that point, 0 or 1
+    ("contacts", np.int64),
+    ("touches", np.bool_),
+    ("tipped", np.bool_),  # a point touches that the aircraft does not stand on
+    "turnover",  # m/s, over which that ends the flight
+    "rest",  # s at rest
+    # Take-off.
+    "motor",  # s, when it starts
+    "slew",  # of the throttle's range, 1/s
+    "full",  # 0..1, throttle
+    "base",  # m AMSL, of home; and where the take-off ends
+    "top",
+    "low",  # m AMSL, where the launch was
+    "pitch",  # rad, least of the climb
+    ("leg", np.int64),  # that follows
+    "fast",  # s since the ground speed was first above `_MOVES`
+    "yaw",  # rad, of the nose at the launch
+    ("held", np.bool_),
+    "heading",  # rad, that is held
+    "leveling",  # m, below the end at which it began to level off; 0 before
+    "fastest",  # m/s, equivalent
+    # Landing.
+    ("landing_leg", np.int64),
+    "east",  # m, of the landing point
+    "north",
+    "up",  # m AMSL
+    "begin",  # m AMSL, of the waypoint before
+    "slope",
+    "flare_height",  # m over the landing point, and before it
+    "flare_distance",
+    "airspeed",  # m/s, equivalent
+    "entry_sink",  # m/s and m, where the flare began
+    "entry_height",
+)
+ARDUPLANE_GROUND = record_dtype(
+    ("memory", ARDUPILOT_MEMORY),
+    ("parameters", ARDUPILOT_PARAMETERS),
+    ("staged", ARDUPILOT_PARAMETERS),  # those of the present stage
+    ("ground", GROUND_STATE),
+)
+GROUND_NUMBERS = ARDUPLANE_GROUND.itemsize // 8
+
+# Faster over the ground than this its course is known, m/s; it is held from so long after, s (GPS_GND_CRS_MIN_SPD).
+_MOVES, _SETTLES = 5.0, 2.0
+# L1's frequency at a period: sqrt(2) pi over it.
+_HEADING_GAIN = 4.4428
+# A take-off levels off only above so much over home, m.
+_LEVELS_ABOVE = 10.0
+# An aircraft is lined up within this angle (rad) and this far beside the line (m); it is on its approach by then, below
+# where the glide began beyond this share of it, and beyond the next in any case.
+_LINED_UP, _ON_LINE, _SOME, _HALF = math.radians(10.0), 5.0, 0.15, 0.5
+# The line is followed to so far beyond the aircraft, m.
+_AHEAD = 200.0
+# Nearer than this to the landing point (m) the first contact is a touch-down.
+_NEAR_POINT = 150.0
+# At rest: slower than this (m/s) for so long (s).
+_STANDS, _RESTS = 0.2, 5.0
+# An aircraft on a runway whose motor has not started by then never takes off, s.
+_GIVEN_UP = 10.0
+
+
+@compiled
+def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+    """One tick on the block of a `flight.simulation.tick.Workspace`: a key of its `ENDS`, or 0 to fly on."""
+    path_begins = WORKSPACE_NUMBERS + GROUND_NUMBERS
+    work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
+    own = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE_GROUND)[0]
+    path: Record = block[path_begins:].view(PATH_ROW)
+    settings, ground, memory = work.settings, own.ground, own.memory
+    if not begin_tick(work, heights):
+        return NOT_A_NUMBER
+    ground.time = work.timing.tick * work.timing.dt
+    waypoints = path.waypoint[: settings.waypoints]
+    pieces = path.piece[: settings.pieces]
+    _feel(work.state, work.place.clearance, ground)
+    if ground.stage == TAKING_OFF:
+        _take_off(work, own, waypoints, pieces)
+    elif ground.stage == IN_AIR:
+        fly_as_ardupilot(
+            work.state, work.estimated, pieces, path.node[: settings.nodes], waypoints, work.gains, work.memory,
+            own.parameters, memory, work.commands, work.timing.dt,
+        )  # fmt: skip
+        if ground.lands and memory.leg >= ground.landing_leg:
+            ground.stage = ON_GLIDE
+    else:
+        find_on_path(work.estimated, pieces, work.memory)
+        _land(work, own)
+    fill_tick(work)
+    return _ended(work, ground)
+
+
+@inner
+def _feel(state: Record, clearance: float, ground: Record) -> None:  # pragma: no cover - compiled
+    """Note which points touch the ground, which is level as JSBSim has it.  clearance: of the centre of gravity, m."""
+    ground.touches, ground.tipped = False, False
+    nose, tilt = math.sin(state.pitch), math.cos(state.pitch)
+    for k in range(ground.contacts):
+        place = ground.contact[k]
+        down = tilt * (math.sin(state.roll) * place[1] + math.cos(state.roll) * place[2]) - nose * place[0]
+        if clearance <= down:
+            ground.touches = True
+            ground.tipped = ground.tipped or ground.stands[k] == 0
+
+
+@inner
+def _ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
+    """How the flight ends by now: a key of `ENDS`, or 0 to fly on."""
+    state, speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
+    empty = work.air.energy >= work.settings.battery
+    if ground.stage == IN_AIR:
+        return GROUND if ground.touches else status_in_air(work)
+    if abs(state.roll) > STEEPEST_BANK:
+        return BANKED
+    if ground.tipped and speed > ground.turnover:
+        return TIPPED
+    if ground.stage == TAKING_OFF:
+        if ground.touches and (ground.lifted or not ground.rolls):
+            return GROUND
+        if ground.rolls and ground.motor > ground.time and ground.time > _GIVEN_UP:
+            return NO_MOTOR
+        return EMPTY if empty else 0
+    if ground.touches and not ground.landed:
+        if math.hypot(ground.east - work.true.east, ground.north - work.true.north) > _NEAR_POINT:
+            return GROUND
+        ground.landed = True
+    if ground.touches and speed < _STANDS:
+        ground.rest += work.timing.dt
+        return COMPLETED if ground.rest >= _RESTS else 0
+    ground.rest = 0.0
+    if not ground.touches and ground.stage < FLARING and state.airspeed < work.settings.slowest:
+        return STALLED
+    return EMPTY if empty and not ground.touches else 0
+
+
+# ----------------------------------------------------------------------
+# The take-off.
+
+
+@inner
+def _take_off(work: Record, own: Record, waypoints: Records, pieces: Records) -> None:  # pragma: no cover - compiled
+    """One tick of the take-off: commands, and at its end the first leg."""
+    state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
+    dt, staged = work.timing.dt, own.staged
+    factor = true_by_equivalent(estimated.up)
+    # What the track is measured against begins where the take-off ends.
+    work.memory.leg, work.memory.distance = ground.leg, pieces[0].start
+    work.memory.cross_track, work.memory.height_error = 0.0, 0.0
+    if not memory.begun:
+        begin_law(state, estimated, waypoints, work.memory, own.parameters, memory)
+        ground.yaw = state.yaw
+    ground.fastest = max(ground.fastest, state.airspeed / factor)
+    ground.lifted = ground.lifted or (ground.rolls and estimated.up > ground.low + 2.0 and not ground.touches)
+    memory.clock -= dt
+    if memory.clock < 0.5 * dt:
+        memory.clock += NAVIGATION_TICK
+        _hold_heading(state, estimated, own.parameters, ground, memory)
+        memory.height_asked, memory.height_limited = estimated.up, estimated.up
+        memory.height_demand, memory.height_rate = estimated.up, 0.0
+        memory.climb_share, memory.sink_share = 1.0, 1.0
+        _stage_take_off(estimated, own.parameters, staged, ground)
+        wanted = min(staged.airspeed_max, max(staged.airspeed_min, waypoints[ground.leg].airspeed))
+        work.memory.speed_command = wanted * factor
+        update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
+        if ground.fastest < own.parameters.takeoff_rotation:
+            memory.pitch_demand = own.parameters.takeoff_ground_pitch
+    wanted_throttle = ground.full if ground.time >= ground.motor else 0.0
+    step = ground.slew * dt
+    throttle = min(work.commands.throttle + step, max(work.commands.throttle - step, wanted_throttle))
+    memory.throttle_demand = throttle
+    follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
+    if estimated.up > ground.top:
+        _leave(estimated, waypoints, pieces, work.memory, ground, memory)
+
+
+@inner
+def _stage_take_off(
+    estimated: Record, parameters: Record, staged: Record, ground: Record
+) -> None:  # pragma: no cover - compiled
+    """Parameters of the take-off's law: speed by pitch, a least pitch, and a bank limit that goes with the height."""
+    staged.tecs_speed_weight = 2.0
+    staged.tecs_pitch_min = 0.0
+    staged.pitch_limit_min = ground.pitch * _levels_off(estimated, parameters, ground)
+    # A least pitch, but no take-off that was seen had more: TECS's integrals are wound up, and unwind for longer.
+    staged.pitch_limit_max = staged.pitch_limit_min
+    low, over = parameters.takeoff_level_height, estimated.up - ground.low
+    share = min(1.0, max(0.0, (over - low) / (2.0 * low))) if low > 0.0 else 1.0
+    least = min(parameters.level_roll_limit, parameters.roll_limit)
+    staged.roll_limit = least + share * (parameters.roll_limit - least)
+
+
+@inner
+def _levels_off(estimated: Record, parameters: Record, ground: Record) -> float:  # pragma: no cover - compiled
+    """Share of the least pitch that is kept near the take-off's end, where it would come to it in TKOFF_PLIM_SEC."""
+    left = ground.top - estimated.up
+    if ground.leveling > 0.0:
+        share: float = min(1.0, max(0.0, left / ground.leveling))
+        return share
+    soon = left <= parameters.takeoff_leveling * estimated.velocity_up
+    if soon and left > 0.0 and estimated.velocity_up > 0.1 and estimated.up - ground.base >= _LEVELS_ABOVE:
+        ground.leveling = left
+    return 1.0
+
+
+@inner
+def _hold_heading(
+    state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record
+) -> None:  # pragma: no cover - compiled
+    """Demand the side acceleration to the heading that is held; none before it is known."""
+    speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+    if ground.fast > 0.0 or speed > _MOVES:
+        ground.fast += NAVIGATION_TICK
+    if not ground.held and ground.fast >= _SETTLES:
+        ground.held = True
+        course = math.atan2(estimated.velocity_east, estimated.velocity_north)
+        ground.heading = course - wrap(state.yaw - ground.yaw)
+    memory.side_acceleration = 0.0
+    if ground.held:
+        angle = min(0.5 * math.pi, max(-0.5 * math.pi, wrap(ground.heading - state.yaw)))
+        memory.side_acceleration = 2.0 * math.sin(angle) * speed * _HEADING_GAIN / parameters.navl1_period
+
+
+@inner
+def _leave(
+    estimated: Record, waypoints: Records, pieces: Records, guided: Record, ground: Record, memory: Record
+) -> None:  # pragma: no cover - compiled
+    """Begin the leg that follows the take-off, from here."""
+    ground.stage = IN_AIR
+    memory.leg = ground.leg
+    memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+    # At the first piece of that leg.
+    while pieces[guided.piece].leg < ground.leg and guided.piece + 1 < pieces.shape[0]:
+        guided.piece += 1
+
+
+# ----------------------------------------------------------------------
+# The landing.
+
+
+@inner
+def _land(work: Record, own: Record) -> None:  # pragma: no cover - compiled
+    """One tick of the landing."""
+    state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
+    dt, staged = work.timing.dt, own.staged
+    factor = true_by_equivalent(estimated.up)
+    work.memory.done = False
+    memory.clock -= dt
+    if memory.clock < 0.5 * dt:
+        memory.clock += NAVIGATION_TICK
+        left = _follow_line_to_point(estimated, own.parameters, ground, memory)
+        _find_stage(estimated, own.parameters, ground, memory, left)
+        _demand_glide(estimated, own.parameters, ground, memory, left[0])
+        _stage_landing(estimated, own.parameters, staged, ground, left[1])
+        work.memory.speed_command = ground.airspeed * factor
+        update_tecs(state, estimated, staged, memory, ground.airspeed * factor, factor, NAVIGATION_TICK)
+    work.memory.height_error = estimated.up - memory.height_demand
+    before = work.commands.throttle
+    follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
+    if ground.stage == FLARING:
+        work.commands.throttle = max(0.0, before - max(1e-3, own.parameters.throttle_slew) * dt)
+
+
+@inner
+def _follow_line_to_point(
+    estimated: Record, parameters: Record, ground: Record, memory: Record
+) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
+    """Demand the side acceleration along the line to the landing point and beyond.
+
+    Returns how far before the point the aircraft is (m), which share of the line it has flown, how far off the angle is
+    that it flies at (rad), and how far beside the line it is (m).
+    """
+    leg_e, leg_n = ground.east - memory.from_east, ground.north - memory.from_north
+    run = max(1e-6, math.hypot(leg_e, leg_n))
+    unit_e, unit_n = leg_e / run, leg_n / run
+    off_e, off_n = estimated.east - memory.from_east, estimated.north - memory.from_north
+    along, aside = off_e * unit_e + off_n * unit_n, off_e * unit_n - off_n * unit_e
+    far = math.hypot(off_e, off_n) + _AHEAD
+    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
+    length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
+    angle, aim = l1_angles(
+        estimated, memory.from_east, memory.from_north, memory.from_east + far * unit_e,
+        memory.from_north + far * unit_n, length,
+    )  # fmt: skip
+    memory.cross_track_sum = l1_integrate(aim, memory.cross_track_sum, parameters.navl1_xtrack_i, NAVIGATION_TICK)
+    if not math.isnan(aim):
+        angle += aim + memory.cross_track_sum
+    memory.side_acceleration = l1_acceleration(angle, speed, length, parameters.navl1_damping)
+    return run - along, along / run, abs(angle), abs(aside)
+
+
+@inner
+def _find_stage(
+    estimated: Record, parameters: Record, ground: Record, memory: Record, left: tuple[float, float, float, float]
+) -> None:  # pragma: no cover - compiled
+    """Go on to the approach and to the flare when their time has come.  left: as `_follow_line_to_point` returns it."""
+    _, share, angle, aside = left
+    height, sink = estimated.up - ground.up, -estimated.velocity_up
+    if ground.stage == ON_GLIDE:
+        lined_up = angle < _LINED_UP
+        below = share > _SOME and lined_up and estimated.up < ground.begin
+        if (share >= 0.0 and lined_up and aside < _ON_LINE) or below or share > _HALF:
+            ground.stage = APPROACHING
+    if ground.stage == FLARING:
+        return
+    low = height <= parameters.flare_height
+    soon = parameters.flare_time > 0.0 and height <= sink * parameters.flare_time and share > _HALF
+    if (ground.stage == APPROACHING and (low or soon)) or share >= 1.0:
+        ground.stage = FLARING
+        ground.entry_sink, ground.entry_height = sink, height
+        # With the motor off the speed is held by pitch, from the attitude that it has.
+        ground.airspeed = memory.airspeed / true_by_equivalent(estimated.up)
+        memory.airspeed_demand, memory.speed_sum = memory.airspeed, 0.0
+        memory.balance_sum = memory.pitch_demand * memory.airspeed * GRAVITY
+
+
+@inner
+def _demand_glide(
+    estimated: Record, parameters: Record, ground: Record, memory: Record, left: float
+) -> None:  # pragma: no cover - compiled
+    """Demand the height of the glide, and in the flare a sink that goes to its last.  left: m before the point."""
+    memory.climb_share, memory.sink_share = 1.0, 1.0
+    if ground.stage < FLARING:
+        speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+        glide = ground.up + ground.flare_height + ground.slope * (left - ground.flare_distance)
+        memory.height_demand = min(ground.begin, glide)
+        memory.height_rate = -ground.slope * speed if glide < ground.begin else 0.0
+    else:
+        height, entry = estimated.up - ground.up, ground.entry_height
+        share = 1.0
+        if entry > parameters.flare_holdoff:
+            share = min(1.0, max(0.0, (entry - height) / (entry - parameters.flare_holdoff)))
+        last = parameters.landing_sink + parameters.landing_sink_change * max(0.0, -left)
+        memory.height_rate = -ground.entry_sink * (1.0 - share) - last * share
+        memory.height_demand = estimated.up
+    memory.height_asked, memory.height_limited = memory.height_demand, memory.height_demand
+
+
+@inner
+def _stage_landing(
+    estimated: Record, parameters: Record, staged: Record, ground: Record, share: float
+) -> None:  # pragma: no cover - compiled
+    """Parameters of the landing's law.  share: of the line that is flown."""
+    staged.tecs_time = parameters.landing_time
+    weight = parameters.landing_speed_weight
+    if weight < 0.0:
+        weight = parameters.tecs_speed_weight * (1.0 - min(1.0, max(0.0, share)))
+    staged.tecs_speed_weight = weight
+    staged.roll_limit, staged.pitch_limit_max = parameters.roll_limit, parameters.pitch_limit_max
+    bottom = parameters.pitch_limit_min
+    if parameters.tecs_pitch_min < 0.0:
+        bottom = max(bottom, parameters.tecs_pitch_min)
+    staged.tecs_pitch_min = 0.0
+    if ground.stage == FLARING:
+        staged.roll_limit = min(parameters.roll_limit, parameters.level_roll_limit)
+        staged.tecs_speed_weight = 2.0
+        down = min(1.0, max(0.0, 1.0 - (estimated.up - ground.up) / max(0.1, ground.entry_height)))
+        bottom = (1.0 - down) * bottom + down * max(bottom, parameters.landing_pitch)
+        if parameters.landing_pitch_max != 0.0:
+            staged.tecs_pitch_max, staged.pitch_limit_max = parameters.landing_pitch_max, parameters.landing_pitch_max
+    staged.pitch_limit_min = bottom

@@ -1,0 +1,195 @@
+"""The flown ways from the ground and to it: where a mission's take-off begins and ends, and where its landing does.
+
+A take-off is flown where the scenario says how the aircraft is launched and the mission begins with a take-off item; a
+landing where the scenario has a strip and the mission ends with a landing item.  Everything else begins and ends in the
+air.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import Command, Mission, MissionItem
+from flight.mission.placing import return_places
+from flight.mission.route import Route
+from world.airfield import LandingStrip, Launch
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+# Pitch (rad) that a take-off item without one climbs at: ArduPlane's own where the first number is 0.
+USUAL_PITCH = math.radians(4.0)
+# So high a catapult's rail begins over the ground, and so high a hand lets go, m.
+_RAIL, _HAND = 1.0, 1.8
+
+
+@dataclass(frozen=True, slots=True)
+class TakeOff:
+    """A take-off that is flown.
+
+    launch: the scenario's.
+    item: the mission item's number.
+    home: (3,) m, on the ground there.
+    course: of the launch, rad on the map.
+    top: height at which it ends, m AMSL; base: home's, that the autopilot counts from.
+    pitch: least of the climb, rad.
+    waypoint: of the route, from which the mission goes on.
+    """
+
+    launch: Launch
+    item: int
+    home: Floats
+    course: float
+    top: float
+    base: float
+    pitch: float
+    waypoint: int
+
+    def release(self, speed: float) -> tuple[Floats, Floats]:
+        """Where the aircraft leaves rail or hand at a speed (m/s), and its velocity: (3,) m and m/s, east, north, up.
+
+        Of a runway the place is the ground, for whoever knows how high the aircraft stands.
+        """
+        launch, along = self.launch, np.array([math.sin(self.course), math.cos(self.course)])
+        if launch.method == "runway":
+            return self.home.copy(), np.zeros(3)
+        level, rise = math.cos(launch.incline), math.sin(launch.incline)
+        run = launch.run if launch.method == "catapult" else 0.0
+        above = _RAIL + run * rise if launch.method == "catapult" else _HAND
+        place = np.array([*(self.home[:2] + run * level * along), self.home[2] + above])
+        return place, speed * np.array([*(level * along), rise])
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """A landing that is flown.
+
+    strip: the scenario's.
+    item: the mission item's number.
+    leg: of the route, the last: it leads to the landing point.
+    point: (3,) m, the landing point at the height that the mission states.
+    course: of the landing, rad.  run: length of the leg, m.  begin: height at its beginning, m AMSL.
+    tail_wind: m/s on that course at the landing point.
+    """
+
+    strip: LandingStrip
+    item: int
+    leg: int
+    point: Floats
+    course: float
+    run: float
+    begin: float
+    tail_wind: float
+
+    def place(self, position: Floats) -> tuple[Floats, Floats]:
+        """How far beyond the landing point, and to the right of its course, positions (n, 3) are, (n,) m."""
+        east, north = position[..., 0] - self.point[0], position[..., 1] - self.point[1]
+        sin, cos = math.sin(self.course), math.cos(self.course)
+        return east * sin + north * cos, east * cos - north * sin
+
+
+@dataclass(frozen=True, slots=True)
+class GroundWays:
+    """What of a flight is flown from the ground and to it; None for what is not.
+
+    notes: why a launch or a strip of the scenario is not flown, in sentences.
+    """
+
+    take_off: TakeOff | None = None
+    approach: Approach | None = None
+    notes: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Whether any of it is flown."""
+        return self.take_off is not None or self.approach is not None
+
+
+def find_ground_ways(scenario: Scenario, mission: Mission, route: Route) -> GroundWays:
+    """What of a mission is flown from the ground and to it in a scenario, whose route this is.
+
+    >>> from world.scenario import load_scenario
+    >>> bool(find_ground_ways(load_scenario("tight"), Mission(None, ()), None))
+    False
+    """
+    take_off, no_start = _find_take_off(scenario, mission, route) if scenario.launch is not None else (None, "")
+    approach, no_end = _find_approach(scenario, mission, route) if scenario.landing is not None else (None, "")
+    return GroundWays(take_off, approach, tuple(note for note in (no_start, no_end) if note))
+
+
+def _find_take_off(scenario: Scenario, mission: Mission, route: Route) -> tuple[TakeOff | None, str]:
+    """The take-off, or why none is flown."""
+    launch, places = scenario.launch, return_places(mission, scenario.origin, scenario.terrain)
+    items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
+    numbers = route.items.tolist()
+    first = next((k for k, seq in enumerate(numbers) if seq >= 0), 0)
+    if launch is None or not items or numbers[first] not in items:
+        return None, "[launch]: the mission does not begin with a NAV_TAKEOFF: its flight begins in the air"
+    if not places:
+        return None, "[launch]: the mission has no home to take off from: its flight begins in the air"
+    if first + 1 >= len(numbers):
+        return None, "[launch]: nothing comes after the take-off: it is not flown"
+    item, base = items[numbers[first]], places[0].up
+    here = np.array([places[0].east, places[0].north])
+    ground = scenario.terrain.height(*here) if scenario.terrain is not None else base
+    if math.isnan(ground):
+        return None, "[launch]: the ground at home is not known: the flight begins in the air"
+    # Where the take-off item has a place of its own, ArduPlane does not go there: the next item is the first place.
+    ahead = route.waypoints[first + 1, :2] - here
+    course = launch.course if launch.course is not None else math.atan2(ahead[0], ahead[1])
+    home = np.array([*here, float(ground)])
+    top, pitch = float(route.waypoints[first, 2]), _climb_pitch(item)
+    return TakeOff(launch, item.seq, home, course, top, base, pitch, first), ""
+
+
+def _climb_pitch(item: MissionItem) -> float:
+    pitch = item.params[0]
+    return math.radians(pitch) if pitch > 0.0 else USUAL_PITCH
+
+
+def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[Approach | None, str]:
+    """The landing, or why none is flown."""
+    strip, last = scenario.landing, route.legs
+    items = {item.seq: item for item in mission.items if item.command == Command.NAV_LAND}
+    if strip is None or not items or int(route.items[last]) not in items or last < 1:
+        return None, "[landing]: the mission does not end with a NAV_LAND at a place: its flight ends in the air"
+    up = route.landing_ground
+    begin, end = route.waypoints[last - 1], route.waypoints[last]
+    if math.isnan(up):
+        return None, "[landing]: the height of the landing point is not known: the flight ends in the air"
+    if begin[2] <= up:
+        return None, "[landing]: the approach begins no higher than the landing point: the flight ends in the air"
+    step = end[:2] - begin[:2]
+    course, run = math.atan2(step[0], step[1]), float(np.hypot(*step))
+    point = np.array([end[0], end[1], up])
+    wind = scenario.wind.along(course, up)[0]
+    return Approach(strip, int(route.items[last]), last - 1, point, course, run, float(begin[2]), wind), ""
+
+
+def airborne_route(route: Route, ways: GroundWays, begun: Floats | None) -> Route:
+    """The part of a route that is flown in the air, of which the usual rules judge.
+
+    begun: (3,) m, where the take-off ended and the first leg begins; None for where the route begins.
+    Without the leg to the landing point; numbers of legs and waypoints stay.
+    """
+    points = np.array(route.waypoints)
+    if ways.take_off is not None and begun is not None:
+        points[: ways.take_off.waypoint + 1] = begun
+        # Waypoints before it are none of the flight's: each a little before the next, so that legs have a length.
+        for k in range(ways.take_off.waypoint - 1, -1, -1):
+            step = points[k + 1, :2] - points[k + 2, :2]
+            points[k, :2] += step / max(1e-6, float(np.hypot(*step)))
+    if ways.approach is None or ways.approach.leg < 1:
+        return replace(route, waypoints=points)
+    kept = ways.approach.leg + 1
+    return replace(
+        route,
+        waypoints=points[:kept],
+        airspeed=route.airspeed[: kept - 1],
+        acceptance=route.acceptance[:kept],
+        fly_over=route.fly_over[:kept],
+        items=route.items[:kept],
+        arcs=route.arcs[:kept],
+        stops=route.stops[:kept],
+    )
