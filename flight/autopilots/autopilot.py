@@ -376,6 +376,11 @@ class Autopilot(ABC):
         return None
 
     @property
+    def launch_trigger(self) -> tuple[float, str] | None:
+        """Least acceleration of a launch that starts its motor, m/s^2, and the parameter; None where none is needed."""
+        return None
+
+    @property
     def speed_limits(self) -> SpeedLimits | None:
         """Airspeeds that it takes from a mission; None for no limits."""
         return None

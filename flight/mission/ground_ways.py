@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Command, Mission, MissionItem
+from flight.mission.itinerary import LANDING_NOTE
 from flight.mission.placing import return_places
-from flight.mission.route import Route
+from flight.mission.route import Route, part_of_route
 from world.airfield import LandingStrip, Launch
 from world.scenario import Scenario
 
@@ -36,6 +37,7 @@ class TakeOff:
     top: height at which it ends, m AMSL; base: home's, that the autopilot counts from.
     pitch: least of the climb, rad.
     waypoint: of the route, from which the mission goes on.
+    speed: where the launch ends, over the ground, m/s.  acceleration: along it, m/s^2; 0 of a runway.
     """
 
     launch: Launch
@@ -46,9 +48,11 @@ class TakeOff:
     base: float
     pitch: float
     waypoint: int
+    speed: float
+    acceleration: float
 
-    def release(self, speed: float) -> tuple[Floats, Floats]:
-        """Where the aircraft leaves rail or hand at a speed (m/s), and its velocity: (3,) m and m/s, east, north, up.
+    def release(self) -> tuple[Floats, Floats]:
+        """Where the aircraft leaves rail or hand, and its velocity: (3,) m and m/s, east, north, up.
 
         Of a runway the place is the ground, for whoever knows how high the aircraft stands.
         """
@@ -59,7 +63,16 @@ class TakeOff:
         run = launch.run if launch.method == "catapult" else 0.0
         above = _RAIL + run * rise if launch.method == "catapult" else _HAND
         place = np.array([*(self.home[:2] + run * level * along), self.home[2] + above])
-        return place, speed * np.array([*(level * along), rise])
+        return place, self.speed * np.array([*(level * along), rise])
+
+    def described(self) -> str:
+        """How it begins, in words."""
+        how = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
+        course = math.degrees(self.course) % 360.0
+        return (
+            f"NAV_TAKEOFF (item {self.item}): launched {how} at home, {self.home[2]:.1f} m AMSL, on course"
+            f" {course:.0f} degrees; the first leg begins above {self.top:.1f} m AMSL"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,19 +119,25 @@ class GroundWays:
         return self.take_off is not None or self.approach is not None
 
 
-def find_ground_ways(scenario: Scenario, mission: Mission, route: Route) -> GroundWays:
+def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> GroundWays:
     """What of a mission is flown from the ground and to it in a scenario, whose route this is.
 
+    slowest: of level flight, m/s, by which a launch goes that states no speed.
+
     >>> from world.scenario import load_scenario
-    >>> bool(find_ground_ways(load_scenario("tight"), Mission(None, ()), None))
+    >>> bool(find_ground_ways(load_scenario("tight"), Mission(None, ()), None, 15.0))
     False
     """
-    take_off, no_start = _find_take_off(scenario, mission, route) if scenario.launch is not None else (None, "")
-    approach, no_end = _find_approach(scenario, mission, route) if scenario.landing is not None else (None, "")
+    no_start = no_end = ""
+    take_off = approach = None
+    if scenario.launch is not None:
+        take_off, no_start = _find_take_off(scenario, mission, route, slowest)
+    if scenario.landing is not None:
+        approach, no_end = _find_approach(scenario, mission, route)
     return GroundWays(take_off, approach, tuple(note for note in (no_start, no_end) if note))
 
 
-def _find_take_off(scenario: Scenario, mission: Mission, route: Route) -> tuple[TakeOff | None, str]:
+def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> tuple[TakeOff | None, str]:
     """The take-off, or why none is flown."""
     launch, places = scenario.launch, return_places(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
@@ -140,7 +159,8 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     course = launch.course if launch.course is not None else math.atan2(ahead[0], ahead[1])
     home = np.array([*here, float(ground)])
     top, pitch = float(route.waypoints[first, 2]), _climb_pitch(item)
-    return TakeOff(launch, item.seq, home, course, top, base, pitch, first), ""
+    speed, pushed = launch.release_speed(slowest), launch.acceleration(slowest)
+    return TakeOff(launch, item.seq, home, course, top, base, pitch, first, speed, pushed), ""
 
 
 def _climb_pitch(item: MissionItem) -> float:
@@ -152,8 +172,9 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     """The landing, or why none is flown."""
     strip, last = scenario.landing, route.legs
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_LAND}
-    if strip is None or not items or int(route.items[last]) not in items or last < 1:
-        return None, "[landing]: the mission does not end with a NAV_LAND at a place: its flight ends in the air"
+    if strip is None or not items or int(route.items[last]) not in items or last < 2:
+        reason = "the mission does not end with two places and a NAV_LAND at a third"
+        return None, f"[landing]: {reason}: its flight ends in the air"
     up = route.landing_ground
     begin, end = route.waypoints[last - 1], route.waypoints[last]
     if math.isnan(up):
@@ -180,16 +201,12 @@ def airborne_route(route: Route, ways: GroundWays, begun: Floats | None) -> Rout
         for k in range(ways.take_off.waypoint - 1, -1, -1):
             step = points[k + 1, :2] - points[k + 2, :2]
             points[k, :2] += step / max(1e-6, float(np.hypot(*step)))
-    if ways.approach is None or ways.approach.leg < 1:
-        return replace(route, waypoints=points)
-    kept = ways.approach.leg + 1
-    return replace(
-        route,
-        waypoints=points[:kept],
-        airspeed=route.airspeed[: kept - 1],
-        acceptance=route.acceptance[:kept],
-        fly_over=route.fly_over[:kept],
-        items=route.items[:kept],
-        arcs=route.arcs[:kept],
-        stops=route.stops[:kept],
-    )
+    moved = replace(route, waypoints=points, notes=flown_notes(route, ways))
+    return moved if ways.approach is None or ways.approach.leg < 1 else part_of_route(moved, 0, ways.approach.leg)
+
+
+def flown_notes(route: Route, ways: GroundWays) -> tuple[str, ...]:
+    """A route's notes without that of a landing which is flown."""
+    if ways.approach is None:
+        return route.notes
+    return tuple(note for note in route.notes if LANDING_NOTE not in note)

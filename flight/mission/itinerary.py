@@ -29,6 +29,9 @@ _MAX_STEPS = 200_000
 # A loiter without end is flown for this long, s, and the mission ends there.
 UNLIMITED = 60.0
 
+# Noted of a landing item, but where its landing is flown.
+LANDING_NOTE = "not flown to the ground; the flight ends above it at the last height"
+
 
 @dataclass(frozen=True, slots=True)
 class Loiter:
@@ -348,7 +351,7 @@ class _Walk:
             return
         self.ended = True
         if item.has_position:
-            self.notes.add(f"{name}: not flown to the ground; the flight ends above it at the last height", item.seq)
+            self.notes.add(f"{name}: {LANDING_NOTE}", item.seq)
             self.landing = self._stop(item)
             self.stops.append(replace(self.landing, alt=math.nan))
         else:

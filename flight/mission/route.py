@@ -111,6 +111,34 @@ def goes_no_further(route: Route, mission: Mission) -> bool:
     return last in PLACES and route.arcs[-1] == route.arcs[-2] == 0.0 and route.return_to is None
 
 
+def part_of_route(route: Route, first: int, last: int) -> Route:
+    """A route from one of its waypoints to another, both included.
+
+    >>> way = np.array([[0.0, 1000.0 * k, 300.0] for k in range(4)])
+    >>> whole = Route(way, np.full(3, 25.0), np.zeros(4), np.zeros(4, bool), np.arange(4), "")
+    >>> part_of_route(whole, 1, 3).items.tolist()
+    [1, 2, 3]
+    """
+    if (first, last) == (0, route.legs):
+        return route
+    points = slice(first, last + 1)
+    return replace(
+        route,
+        waypoints=route.waypoints[points],
+        airspeed=route.airspeed[first:last],
+        acceptance=route.acceptance[points],
+        fly_over=route.fly_over[points],
+        items=route.items[points],
+        arcs=route.arcs[points],
+        stops=route.stops[points],
+        endless=-1,
+        takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
+        landing_ground=route.landing_ground if last == route.legs else math.nan,
+        return_from=max(0, route.return_from - first) if 0 <= route.return_from < last else -1,
+        return_to=route.return_to if route.return_from < last else None,
+    )
+
+
 # ----------------------------------------------------------------------
 # Which waypoints a fly-by arc would miss: by more than the acceptance radius that the mission states there.
 

@@ -11,7 +11,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
-from flight.mission.ground_ways import GroundWays, find_ground_ways
+from flight.mission.ground_ways import GroundWays, find_ground_ways, flown_notes
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
@@ -247,9 +247,27 @@ class FlightSetup:
     @property
     def ground_ways(self) -> GroundWays:
         """What of the flight is flown from the ground and to it: nothing by an autopilot that does neither."""
-        if self.source is not None or not self.autopilot.flies_ground:
+        asked = self.scenario.launch is not None or self.scenario.landing is not None
+        if self.source is not None or not asked:
             return GroundWays()
-        return find_ground_ways(self.scenario, self.mission, self.route)
+        if not self.autopilot.flies_ground:
+            title = self.autopilot.title
+            return GroundWays(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
+        slowest = self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
+        return find_ground_ways(self.scenario, self.mission, self.route, slowest)
+
+    @property
+    def started(self) -> str:
+        """How the flight starts, in words, and why a launch or a landing of its scenario is not flown."""
+        ways, started = self.ground_ways, self.route.started
+        if ways.take_off is not None:
+            started = ways.take_off.described()
+        return "; ".join([*([started] if started else []), *ways.notes])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the mission is not flown as written, in sentences."""
+        return flown_notes(self.route, self.ground_ways)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
         """Set the same flight in another scenario; route, limits and path stay as they are."""

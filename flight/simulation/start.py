@@ -123,7 +123,7 @@ def find_release(
 ) -> Release:
     """Where and how a take-off begins."""
     launch = take_off.launch
-    place, velocity = take_off.release(launch.release_speed(aircraft.stall_speed))
+    place, velocity = take_off.release()
     if launch.method == "runway":
         stands = [one.down for one in contacts_of(aircraft, "wheels") if one.stands]
         place[2] += max(stands, default=0.0)

@@ -21,8 +21,8 @@ from logs.verdict.judge_geometry import (
     unflyable_items,
     with_suggestions,
 )
+from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import Disagreement, LevelAnswer, Place, ReferenceFlights
 from logs.verdict.summary import headline, summary_lines, undecided_text
 
@@ -68,13 +68,14 @@ def judge_flight(
     requirements = route_requirements(setup, envelope=envelope)
     if not len(track):
         return judge_unflown(requirements, ended, log_complete=log_complete)
-    aligned = align_track(requirements, track)
+    whole = requirements
+    requirements, aligned = flown_phases(whole, track)
     findings = flown_findings(requirements, aligned, ended, log_complete)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not any(item.ok is False for item in findings)
     findings = with_suggestions(requirements, aligned, findings)
-    levels = _levels(requirements, findings, flyable, reference)
+    levels = _levels(whole, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
     conditions = setup_conditions(setup)
     lines = summary_lines(findings, setup, "flown", levels, conditions, deciding)
@@ -82,8 +83,8 @@ def judge_flight(
         *(findings, flyable, complete, lines, "flown"),
         levels=levels,
         deciding=deciding,
-        notes=setup.route.notes,
-        leg_ends=() if aligned is None else aligned.leg_ends(),
+        notes=setup.notes,
+        leg_ends=() if aligned is None else leg_ends(requirements, aligned),
         program=setup.autopilot.program,
         parameters=setup.autopilot.parameters,
         unjudged=unjudged,

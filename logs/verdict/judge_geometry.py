@@ -128,7 +128,7 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
         summary_lines(findings, setup, "geometric", levels, conditions),
         "geometric",
         levels,
-        notes=setup.route.notes,
+        notes=setup.notes,
         unjudged=unjudged,
         conditions=conditions,
     )
@@ -163,7 +163,7 @@ def judge_unflown(requirements: RouteRequirements, ended: str, *, log_complete: 
     )
     conditions = setup_conditions(setup)
     lines = summary_lines(findings, setup, "geometric", levels, conditions)
-    return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.route.notes, conditions=conditions)
+    return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.notes, conditions=conditions)
 
 
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:

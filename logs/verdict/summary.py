@@ -173,7 +173,7 @@ def summary_lines(
     """
     *others, own = levels
     lines = [own.headline, *_whose_fault(levels, deciding, setup)]
-    lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
+    lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
     lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
     lines += _parameter_lines(setup) if level == "flown" else []
     silent: dict[str, str] = {}
@@ -194,8 +194,8 @@ def summary_lines(
         if RULES[item.rule].warns and item.ok is None
     ]
     lines += _less_error(findings, setup)
-    if setup.route.notes:
-        lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
+    if setup.notes:
+        lines.append(f"Not flown as written: {'; '.join(setup.notes)}")
     if level == "flown":
         lines += [line] if (line := corridor_line(setup)) else []
     if level == "geometric":

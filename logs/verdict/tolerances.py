@@ -226,6 +226,25 @@ POINT_ERROR = 10.0
 # m.  Least height above ground of a go-around's way: it turns on it, and turns are not laid out.
 GO_AROUND_ROOM = 20.0
 
+# The take-off and the landing that are flown
+
+# m.  Least height above ground of a climb-out beyond `LAUNCH_RUN`: less than the usual elevation files' own error, and
+# more than the wing of a small aircraft banks down to.
+LAUNCH_ROOM = 2.0
+# m.  So much height a launched aircraft may lose: of twenty that ArduPlane flew from a catapult none lost any; from a
+# hand at 1.8 m more than this leaves no room for a wing.
+LAUNCH_SINK = 1.0
+# m.  The legs that follow a take-off and those of a landing sequence are near the ground by nature: they need no more
+# height above it than a go-around, `GO_AROUND_ROOM`, where the scenario asks for more.
+GROUND_LEG_ROOM = GO_AROUND_ROOM
+# rad.  A leg that follows a take-off is held to its corridor once the aircraft has come to its course within this.
+ON_COURSE = math.radians(10.0)
+# m.  So near to a contact's height over the ground the aircraft has touched it: rows stand 1/60 s apart.
+TOUCHED = 0.02
+# m.  A touch-down by the law is out by so much along the strip: 5 of ArduPlane's in steady wind were 6 to 13 m off it,
+# those in light turbulence up to 26 m.  The strip has to be as much longer either way.
+TOUCH_ERROR = 30.0
+
 # The track beside its route
 
 # m.  A waypoint further than this from the track draws no row to itself.

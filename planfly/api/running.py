@@ -243,7 +243,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
             folder, flown.setup, flown.track, flown.verdict, ended=flown.ended, versions=package_versions(),
             command=task.command, events=flown.events, returns=beside.drawn(),
         )  # fmt: skip
-    notes = (*setup.scenario.notes, *setup.route.notes)
+    notes = (*setup.scenario.notes, *setup.notes)
     has_log = len(flown.track) > 0
     return Round(
         number, (), flown.verdict, flown=True, folder=folder, notes=notes, has_log=has_log, returns_line=beside.line

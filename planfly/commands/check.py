@@ -64,7 +64,7 @@ def check(args: argparse.Namespace) -> int:
     give_answer(args, lambda: _document(judged))
     give_junit(args, {args.what: judged.verdict})
     print_warnings([judged.loss] if judged.loss else [])
-    print_verdict(judged.verdict, judged.setup.route.notes)
+    print_verdict(judged.verdict, judged.setup.notes)
     print_returns(judged.returns_line)
     if judged.lossy:
         return LOSS

@@ -46,7 +46,7 @@ def fly(args: argparse.Namespace) -> int:
     log = args.log if named else f"{RUN_FOLDER}/flight.mcap"
     flown = call(planfly.fly, args, log=log, overwrite=args.overwrite or not named)
     print_warnings([*flown.mission.warnings, *flown.setup.scenario.notes])
-    print_verdict(flown.verdict, flown.setup.route.notes)
+    print_verdict(flown.verdict, flown.setup.notes)
     print_returns(flown.returns_line)
     if flown.log is None:
         print("log       none: nothing was flown")

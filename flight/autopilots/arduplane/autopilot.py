@@ -169,6 +169,12 @@ class ArduPlane(Autopilot):
         airspeed = self.landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
+    @property
+    def launch_trigger(self) -> tuple[float, str] | None:
+        """TKOFF_THR_MINACC."""
+        least = self.parameters.takeoff_acceleration
+        return (least, "TKOFF_THR_MINACC") if least > 0.0 else None
+
     def go_around_height(self, asked: float, takeoff: float) -> float | None:
         """The landing item's first number, or the take-off's height, or 30 m."""
         return go_around_height(asked, takeoff)
@@ -308,9 +314,9 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         ground.slew, ground.full = takeoff_slew(made), made.takeoff_throttle or made.throttle_max
         ground.base, ground.top, ground.low = take_off.base, take_off.top, take_off.home[2]
         ground.pitch, ground.leg = take_off.pitch, take_off.waypoint
-        pushed = launch.acceleration(self.aircraft.stall_speed)
         # Since it moved at 5 m/s, at which its course over the ground is known.
-        ground.fast = max(0.0, launch.release_speed(self.aircraft.stall_speed) - _MOVES) / pushed if pushed else 0.0
+        pushed = take_off.acceleration
+        ground.fast = max(0.0, take_off.speed - _MOVES) / pushed if pushed else 0.0
 
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
         up = float(approach.point[2])

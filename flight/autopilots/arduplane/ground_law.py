@@ -73,7 +73,7 @@ GROUND_STATE = record_dtype(
     ("stands", np.int64, (CONTACTS,)),  # whether it stands on that point, 0 or 1
     ("contacts", np.int64),
     ("touches", np.bool_),
-    ("tipped", np.bool_),  # a point touches that the aircraft does not stand on
+    ("tipped", np.bool_),  # what touches first is a point that the aircraft does not stand on
     "turnover",  # m/s, over which that ends the flight
     "rest",  # s at rest
     # Take-off.
@@ -165,13 +165,14 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
 def _feel(state: Record, clearance: float, ground: Record) -> None:  # pragma: no cover - compiled
     """Note which points touch the ground, which is level as JSBSim has it.  clearance: of the centre of gravity, m."""
     ground.touches, ground.tipped = False, False
+    lowest = clearance
     nose, tilt = math.sin(state.pitch), math.cos(state.pitch)
     for k in range(ground.contacts):
         place = ground.contact[k]
         down = tilt * (math.sin(state.roll) * place[1] + math.cos(state.roll) * place[2]) - nose * place[0]
-        if clearance <= down:
-            ground.touches = True
-            ground.tipped = ground.tipped or ground.stands[k] == 0
+        if down >= lowest:
+            # Of points that touch the lowest counts: on its skids an aircraft may be pressed into the ground.
+            lowest, ground.touches, ground.tipped = down, True, ground.stands[k] == 0
 
 
 @inner

@@ -376,7 +376,7 @@ def _take_over(
 ) -> None:  # pragma: no cover - compiled
     """Fill the state from what flies over the ground, and the law's memory as after a long steady flight of it.
 
-    As `flight.autopilots.arduplane.law._begin` takes over, but on a slope: the height asked for is ahead by its lag.
+    As `flight.autopilots.arduplane.law.begin_law` takes over, but on a slope: the height asked for is ahead by its lag.
     """
     wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
     air_east = start.velocity_east - wind * aircraft.wind_east

@@ -1,12 +1,11 @@
 """Which legs of a route each stretch of a flight was flown on: an imported log may hold a part of them, or none."""
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.route import Route
+from flight.mission.route import part_of_route
 from flight.simulation.setup import FlightSetup, Gap, MissionStretch
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -130,34 +129,6 @@ def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDA
     inside = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
     near = np.where(inside, aligned.distance < CAPTURE_RADIUS, aligned.distance <= edge)
     return np.flatnonzero(near)
-
-
-def part_of_route(route: Route, first: int, last: int) -> Route:
-    """A route from one of its waypoints to another, both included.
-
-    >>> way = np.array([[0.0, 1000.0 * k, 300.0] for k in range(4)])
-    >>> whole = Route(way, np.full(3, 25.0), np.zeros(4), np.zeros(4, bool), np.arange(4), "")
-    >>> part_of_route(whole, 1, 3).items.tolist()
-    [1, 2, 3]
-    """
-    if (first, last) == (0, route.legs):
-        return route
-    points = slice(first, last + 1)
-    return replace(
-        route,
-        waypoints=route.waypoints[points],
-        airspeed=route.airspeed[first:last],
-        acceptance=route.acceptance[points],
-        fly_over=route.fly_over[points],
-        items=route.items[points],
-        arcs=route.arcs[points],
-        stops=route.stops[points],
-        endless=-1,
-        takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
-        landing_ground=route.landing_ground if last == route.legs else math.nan,
-        return_from=max(0, route.return_from - first) if 0 <= route.return_from < last else -1,
-        return_to=route.return_to if route.return_from < last else None,
-    )
 
 
 # ----------------------------------------------------------------------

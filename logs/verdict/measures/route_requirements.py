@@ -22,9 +22,11 @@ from aircraft.path_limits import (
 )
 from flight.guidance.path import FlyByPath, path_polyline
 from flight.mission.fences import fence_zones
+from flight.mission.ground_ways import GroundWays
 from flight.mission.route import Route
 from flight.mission.surveys import Survey, camera_spacing, find_surveys
 from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
 from logs.verdict.places import Place
 from logs.verdict.tolerances import LARGEST_OFFSET, OFF_SPEED, U_TURN
 from world.airspace.zone_kernels import ZoneRecords, zone_records
@@ -220,6 +222,33 @@ class PlannedPath:
 
 
 @dataclass(frozen=True, slots=True)
+class FlownGround:
+    """What of a flight was flown from the ground and to it.
+
+    ways: what was to be flown.
+    whole: the requirements of the whole route, with take-off and landing.
+    track: of the whole flight.
+    begun, left: rows of it where the take-off had ended, and where the landing began; the first and the last for none.
+    """
+
+    ways: GroundWays
+    whole: "RouteRequirements"
+    track: Track
+    begun: int
+    left: int
+
+    @property
+    def launch(self) -> Track:
+        """The take-off."""
+        return self.track.rows(0, self.begun + 1)
+
+    @property
+    def landing(self) -> Track:
+        """The landing."""
+        return self.track.rows(self.left, len(self.track))
+
+
+@dataclass(frozen=True, slots=True)
 class RouteRequirements:
     """A route's turns and legs in numbers, the aircraft's limits at each, and its planned path: made once a verdict.
 
@@ -240,6 +269,7 @@ class RouteRequirements:
     envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
     airspace: the zones of scenario and mission.
     surveys: those of a mission that a person brought, where the scenario judges surveys by their lines.
+    ground: of a flight that took off or landed, whose part in the air the rest is of; None for any other.
     """
 
     setup: FlightSetup
@@ -266,6 +296,7 @@ class RouteRequirements:
     envelope: bool
     airspace: Airspace
     surveys: tuple[Survey, ...]
+    ground: FlownGround | None = None
 
     @property
     def limits(self) -> Limits:

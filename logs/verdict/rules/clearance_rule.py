@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from flight.mission.items import OVER_TERRAIN
+from flight.mission.items import OVER_TERRAIN, Command
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -12,7 +12,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
 from logs.verdict.suggestions import fly_higher
-from logs.verdict.tolerances import CLEARANCE_TOLERANCE
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE, GROUND_LEG_ROOM
 
 
 def clearance_findings(
@@ -28,16 +28,34 @@ def clearance_findings(
                 "clearance", FLIGHT, ok=None, reason=reason, limit=limit, source=requirements.limits_source, unit="m"
             )
         ]
+    near = _near_ground(requirements)
     legs = requirements.path.legs
     low, _ = path_clearance(ground.heights, ground.to_pixel.record, requirements.path.points)
     planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(requirements.legs)]
     out = []
     for leg in range(requirements.legs):
+        least = min(limit, GROUND_LEG_ROOM) if leg in near else limit
         if geometric:
-            out.append(_planned_clearance(requirements, leg, planned[leg], limit, ground.vertical_error))
+            out.append(_planned_clearance(requirements, leg, planned[leg], least, ground.vertical_error))
         else:
-            out.append(_flown_clearance(requirements, aligned, leg, planned[leg], limit))
+            out.append(_flown_clearance(requirements, aligned, leg, planned[leg], least))
     return out
+
+
+def _near_ground(requirements: RouteRequirements) -> set[int]:
+    """Legs that lead away from a take-off that is flown, and to a landing: from DO_LAND_START on, or the last two."""
+    setup, ground = requirements.setup, requirements.ground
+    ways = setup.ground_ways if ground is None else ground.ways
+    near = set() if ways.take_off is None else {ways.take_off.waypoint}
+    if ways.approach is not None:
+        starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
+        begun = max((seq for seq in starts if seq < ways.approach.item), default=None)
+        first = max(0, ways.approach.leg - 1)
+        if begun is not None:
+            after = np.flatnonzero(setup.route.items > begun)
+            first = max(0, int(after[0]) - 1) if after.size else first
+        near |= set(range(first, ways.approach.leg + 1))
+    return near
 
 
 def _less_error(clearance: float, limit: float, error: float | None) -> str:
@@ -135,7 +153,7 @@ RULE = Rule(
     title="clearance",
     asks="Does each leg stay the required height above the ground?",
     margin=Margin("height above ground", "m", 10.0),
-    tolerances=("CLEARANCE_TOLERANCE",),
+    tolerances=("CLEARANCE_TOLERANCE", "GROUND_LEG_ROOM"),
     judge=clearance_findings,
     suggest=fly_higher,
     log=LogNeeds(("heights",)),

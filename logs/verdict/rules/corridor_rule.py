@@ -2,12 +2,14 @@
 
 import math
 
+import numpy as np
+
 from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
 from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.measures.track_alignment import AlignedTrack, along_across
 from logs.verdict.rule import Margin, Rule
-from logs.verdict.tolerances import ROUNDING
+from logs.verdict.tolerances import ON_COURSE, ROUNDING
 
 
 def corridor_findings(
@@ -38,7 +40,7 @@ def _corridor(requirements: RouteRequirements, aligned: AlignedTrack | None, leg
     elif aligned is None or not aligned.flew(leg):
         facts.append("the leg was not flown")
     else:
-        rows = aligned.leg_rows(leg)
+        rows = _after_take_off(requirements, aligned, leg, limit)
         near = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
         flown, row = farthest_from_legs(aligned.track.position[rows], requirements.points[near])
         ok = flown <= limit
@@ -63,6 +65,20 @@ def _corridor(requirements: RouteRequirements, aligned: AlignedTrack | None, leg
     )
 
 
+def _after_take_off(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, limit: float) -> slice:
+    """A leg's rows; of one that follows a take-off, from where the aircraft first flies along it within the limit (m).
+
+    A take-off ends on the course of its launch, wherever the leg leads from there.
+    """
+    rows, ground = aligned.leg_rows(leg), requirements.ground
+    if ground is None or ground.ways.take_off is None or ground.ways.take_off.waypoint != leg:
+        return rows
+    off = np.abs(np.sin(0.5 * (aligned.course[rows] - requirements.courses[leg])))
+    aside = along_across(requirements, leg, np.asarray(aligned.track.position[rows], dtype=np.float64))[1]
+    on_course = (off < math.sin(0.5 * ON_COURSE)) & (np.abs(aside) <= limit)
+    return slice(rows.start + int(np.argmax(on_course)), rows.stop) if on_course.any() else rows
+
+
 def _when_and_where(aligned: AlignedTrack, row: int) -> str:
     east, north, _ = aligned.track.position[row]
     return f"at {aligned.track.time[row]:.1f} s, east {east:.0f} m, north {north:.0f} m"
@@ -73,6 +89,6 @@ RULE = Rule(
     title="corridor",
     asks="How far from the legs did the flight get, its turns included?",
     margin=Margin("distance from the legs", "m", 10.0),
-    tolerances=("ROUNDING", "PASS"),
+    tolerances=("ROUNDING", "PASS", "ON_COURSE"),
     judge=corridor_findings,
 )

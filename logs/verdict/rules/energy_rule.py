@@ -30,8 +30,10 @@ def energy_findings(
     guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     used, current = predicted, peak
     if not geometric:
-        used = math.nan if aligned is None else float(aligned.track.energy.max())
-        current = math.nan if aligned is None else float(aligned.track.current.max())
+        # Of a flight that took off and landed that counts, too.
+        track = requirements.ground.track if requirements.ground is not None else aligned and aligned.track
+        used = math.nan if track is None else float(track.energy.max())
+        current = math.nan if track is None else float(track.current.max())
     measured = setup.source is not None and not geometric
     most = used * (1.0 + (0.0 if measured else UNDECIDED * setup.envelope.power_sd))
     doubt = not faults and not guessed and used <= usable < most

@@ -1,6 +1,7 @@
 """The climb-out, approach and go-around rules: what stands in the way up from home, and down to the landing point.
 
-A flight of ours begins and ends in the air.  These ways are not flown: they are laid out from the mission's items and
+A flight of ours begins and ends in the air, but where its scenario has a launch or a strip: what is flown of that, the
+launch rule and the touchdown rule judge.  Other ways are not flown: they are laid out from the mission's items and
 judged against ground, missile spheres and zones, whether the mission was flown or not.
 
 Where a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course that the
@@ -14,7 +15,6 @@ course to a height over home, whatever the height of the field, and flies back t
 """
 
 import math
-from collections.abc import Sequence
 from itertools import groupby
 from typing import NamedTuple
 
@@ -25,11 +25,9 @@ from flight.mission.items import TAKEOFFS, Command, MissionItem
 from flight.mission.placing import SAME_PLACE, landing_starts, return_places
 from flight.mission.return_path import nearest_landing
 from logs.verdict.findings import GROUND_WAY, Finding, Message, make_finding, message
-from logs.verdict.measures.path_moves import straight_moves
-from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.zone_visits import path_zones
+from logs.verdict.measures.ways import Profile, Way, entered_by_way, straight_way, way_clearance
 from logs.verdict.places import Place
 from logs.verdict.rule import Margin, Rule, located
 from logs.verdict.tolerances import (
@@ -43,84 +41,21 @@ from logs.verdict.tolerances import (
     ON_THE_SPOT,
     PLAN_TOLERANCE,
     POINT_ERROR,
-    ROUNDING,
 )
-from logs.verdict.wording import place_text, shortened
-from world.airspace.zone_kernels import zone_records
+from logs.verdict.wording import shortened
 from world.frames import to_map
 from world.geometry import wrap
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
-# Heights (m AMSL) at runs (m from a way's beginning) that rise.
-Profile = list[tuple[float, float]]
 
 # Degrees between two courses that a launch is tried on; heights over home that a go-around is tried with, m.
 _COURSE_STEP = 10
 _HEIGHT_STEP, _HIGHEST = 5.0, 1000.0
-# m of a way that is looked at in one piece: what is known of the ground before it ends counts by pieces.
-_PIECE = 100.0
 
 
 # ----------------------------------------------------------------------
-# A straight way on the map, and what is in it.
-
-
-class _Way(NamedTuple):
-    """A way of n points: (n, 3) m, and the run to each, (n,) m."""
-
-    points: Floats
-    run: Floats
-
-    def between(self, first: float, last: float) -> "_Way":
-        """The part between two runs, m."""
-        inner = self.run[(self.run > first) & (self.run < last)]
-        at = np.concatenate([[first], inner, [max(first, last)]])
-        return _Way(np.stack([np.interp(at, self.run, self.points[:, k]) for k in range(3)], axis=1), at)
-
-
-def _straight(begin: Sequence[float] | Floats, course: float, profile: Profile) -> _Way:
-    """A way on one course (rad) from a place (east, north, m)."""
-    run, up = np.array(profile, dtype=np.float64).T
-    east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
-    return _Way(np.stack([east, north, up], axis=1), run)
-
-
-def _clearance(ground: Terrain, way: _Way) -> tuple[float, float]:
-    """Least height above ground on a way and the run where that is, m.
-
-    NaN where the ground is not known all along, and what is known of it is not met.
-    """
-    first, last = float(way.run[0]), float(way.run[-1])
-    cuts = np.linspace(first, last, max(2, math.ceil((last - first) / _PIECE) + 1))
-    run = np.union1d(cuts, way.run)
-    points = np.stack([np.interp(run, way.run, way.points[:, k]) for k in range(3)], axis=1)
-    found = [ground.clearance(*points[k : k + 2]) for k in range(len(run) - 1)]
-    low = np.array([clearance for clearance, _ in found])
-    # Of a NaN, where there is one, but for ground that is met.
-    k = int(np.nanargmin(low)) if (low < 0.0).any() else int(np.argmin(low))
-    return float(low[k]), float(run[k] + found[k][1] * (run[k + 1] - run[k]))
-
-
-def _entered(requirements: RouteRequirements, way: _Way) -> str:
-    """The missile's sphere or the zone that a way enters, in words; "" for none.
-
-    A zone that the way begins in is none: whoever stands there knows.  Nor is one to stay in that has a floor.
-    """
-    scenario, airspace = requirements.setup.scenario, requirements.airspace
-    if not scenario.external:
-        threats = scenario.threats
-        visits = path_spheres(way.points, way.run, threats.position, threats.kill_radius, threats.kill_scale)
-        for m in np.flatnonzero(visits.inside > 0.0).tolist():
-            return place_text(Place("missile", m, name=scenario.spec.threats[m].name or ""))
-    asked = [z for z, zone in enumerate(airspace.zones) if zone.kind == "exclusion" or zone.floor is None]
-    if asked:
-        records = zone_records([airspace.zones[z] for z in asked])
-        met = path_zones(straight_moves(way.points, way.run), records, scenario.terrain)
-        for z, visit in zip(asked, met, strict=True):
-            if visit.depth > ROUNDING and visit.entry_time > 0.0:
-                return place_text(airspace.place(z))
-    return ""
+# What a way meets.
 
 
 class _Met(NamedTuple):
@@ -182,6 +117,8 @@ def climbout_findings(
     home, ground = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not _is_judged(requirements) or home is None or ground is None:
         return []
+    if requirements.ground is not None and requirements.ground.ways.take_off is not None:
+        return []
     east, north = to_map(requirements.setup.scenario.origin, home.lat_deg, home.lon_deg)
     begin = (float(east), float(north))
     first, takeoff = _first_item(requirements)
@@ -203,14 +140,14 @@ def climbout_findings(
         reason = "the aircraft cannot climb there at this speed and in this wind"
         return [make_finding("climbout", place, ok=None, reason=reason, unit="m")]
     if takeoff is None:
-        way = _straight(begin, course, _way_up(low, float(here[2]), run, steepest))
+        way = straight_way(begin, course, _way_up(low, float(here[2]), run, steepest))
         return [_by_hand(place, _look(requirements, way))]
     up = float(requirements.points[0, 2])
     if up <= low:
         reason = f"the take-off's height is not above the ground at home, which is at {low:.0f} m AMSL"
         return [make_finding("climbout", place, ok=None, reason=reason, unit="m")]
     met, least = (
-        _look(requirements, _straight(begin, course, _take_off(low, up, run, slope, climb)))
+        _look(requirements, straight_way(begin, course, _take_off(low, up, run, slope, climb)))
         for climb in (steepest, max(1e-3, LEAST_CLIMB * certain))
     )
     return [_launched(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
@@ -261,13 +198,13 @@ def _take_off(low: float, up: float, run: float, slope: float, climb: float) -> 
     return [(0.0, low), (reached, low + climb * reached)]
 
 
-def _look(requirements: RouteRequirements, way: _Way) -> _Met:
+def _look(requirements: RouteRequirements, way: Way) -> _Met:
     """What a way up from home meets, beyond `LAUNCH_RUN` of ground."""
     ground, end = requirements.setup.scenario.terrain, float(way.run[-1])
-    entered = _entered(requirements, way)
+    entered = entered_by_way(requirements, way)
     if ground is None or end <= LAUNCH_RUN:
         return _Met(math.inf, 0.0, entered)
-    return _Met(*_clearance(ground, way.between(LAUNCH_RUN, end)), entered)
+    return _Met(*way_clearance(ground, way.between(LAUNCH_RUN, end)), entered)
 
 
 def _by_hand(place: Place, met: _Met) -> Finding:
@@ -327,7 +264,7 @@ def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], 
         climb, _ = _climb(requirements, 0, course, low)
         if not climb > 0.0:
             return False
-        return _look(requirements, _straight(begin, course, [(0.0, low), ((up - low) / climb, up)])).free
+        return _look(requirements, straight_way(begin, course, [(0.0, low), ((up - low) / climb, up)])).free
 
     courses = list(range(0, 360, _COURSE_STEP))
     free = [is_free(math.radians(course)) for course in courses]
@@ -361,6 +298,8 @@ def approach_findings(
     found, ground, setup = _landing(requirements), requirements.setup.scenario.terrain, requirements.setup
     if found is None or ground is None or not _is_judged(requirements):
         return []
+    if requirements.ground is not None and requirements.ground.ways.approach is not None:
+        return []
     at, leg = found[0], found[0] - 1
     place, item = requirements.waypoint(at), _item_text(requirements.waypoint(at))
     begin, point = requirements.points[leg], requirements.points[at]
@@ -374,11 +313,11 @@ def approach_findings(
         return [make_finding("approach", place, ok=None, reason=reason, unit="m")]
     glide = setup.autopilot.landing_glide(high - low, run, setup.scenario.wind.along(course, low)[0], low)
     flare = (run - glide.flare_distance, low + glide.flare_height)
-    way = _straight(begin, course, [(0.0, high), *([flare] if glide.flare_distance > 0.0 else []), (run, low)])
+    way = straight_way(begin, course, [(0.0, high), *([flare] if glide.flare_distance > 0.0 else []), (run, low)])
     last, room, at_run = run - EARLY_TOUCH, math.inf, 0.0
     if last > 0.0:
-        room, at_run = _clearance(ground, way.between(0.0, last))
-    met = _Met(room, run - at_run, _entered(requirements, way))
+        room, at_run = way_clearance(ground, way.between(0.0, last))
+    met = _Met(room, run - at_run, entered_by_way(requirements, way))
     subject = f"the glide to {item}"
     if math.isnan(met.clearance) and not met.entered:
         return [_finding("approach", place, met, None, message(f"the ground below {subject} is not known"))]
@@ -393,7 +332,7 @@ def approach_findings(
         fault = message(f"the landing point of {item} is {low - under:.0f} m above the ground")
         return [_finding("approach", place, met, None, fault, GROUND_WAY)]
     until = run - glide.flare_distance - max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope
-    room = _clearance(ground, way.between(0.0, until))[0] if until > 0.0 else math.inf
+    room = way_clearance(ground, way.between(0.0, until))[0] if until > 0.0 else math.inf
     if room < GLIDE_ERROR:
         fault = message(
             f"{subject} passes the ground by {room:.1f} m",
@@ -405,7 +344,8 @@ def approach_findings(
         reason += (
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
-    reason += f"; {_room(met)} until {EARLY_TOUCH:.0f} m before it; not flown: the flight ends in the air"
+    reason += f"; {_room(met)} until {EARLY_TOUCH:.0f} m before it"
+    reason += "" if setup.ground_ways.approach is not None else "; not flown: the flight ends in the air"
     return [_finding("approach", place, met, True, message(reason))]
 
 
@@ -431,6 +371,7 @@ def go_around_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
     """One finding of a mission that lands and has a home: a warning where its go-around comes near to the ground."""
+    requirements = requirements if requirements.ground is None else requirements.ground.whole
     found, ground, setup = _landing(requirements), requirements.setup.scenario.terrain, requirements.setup
     if found is None or ground is None or not _is_judged(requirements) or setup.mission.home is None:
         return []
@@ -474,10 +415,10 @@ def _go_around_room(requirements: RouteRequirements, ground: Terrain, asked: _Go
     climb = LEAST_CLIMB * _climb(requirements, asked.leg, asked.course, low)[1]
     if not climb > 0.0:
         return math.nan
-    ahead = _straight(asked.point, asked.course, [(0.0, low), (max(1.0, (top - low) / climb), top)])
+    ahead = straight_way(asked.point, asked.course, [(0.0, low), (max(1.0, (top - low) / climb), top)])
     end = float(ahead.run[-1])
     if end > LAUNCH_RUN:
-        met = _clearance(ground, ahead.between(LAUNCH_RUN, end))[0]
+        met = way_clearance(ground, ahead.between(LAUNCH_RUN, end))[0]
         if not met >= 0.0:
             return met
     turned, to = ahead.points[-1], asked.target
@@ -492,7 +433,7 @@ def _go_around_room(requirements: RouteRequirements, ground: Terrain, asked: _Go
         profile = [(0.0, top), (run, top + max(0.0, back) * run)]
         if reached < run:
             profile = [(0.0, top), (reached, float(to[2])), (run, float(to[2]))]
-    return _clearance(ground, _straight(turned, course, profile))[0]
+    return way_clearance(ground, straight_way(turned, course, profile))[0]
 
 
 # ----------------------------------------------------------------------

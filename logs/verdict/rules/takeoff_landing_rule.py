@@ -28,7 +28,12 @@ _BEYOND = {"takeoff": None, "landing": False}
 def takeoff_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a mission with a take-off: the climb from the ground at home to where the item has its place."""
+    """One finding of a mission with a take-off: the climb from the ground at home to where the item has its place.
+
+    None of one that was flown, which the launch rule judges.
+    """
+    if requirements.ground is not None and requirements.ground.ways.take_off is not None:
+        return []
     route, mission = requirements.setup.route, requirements.setup.mission
     items = [item for item in mission.items if item.command in TAKEOFFS]
     at = _waypoint_of(requirements, items[0].seq) if items else -1
@@ -84,7 +89,12 @@ def _never_started(requirements: RouteRequirements, launch: Launch) -> list[Find
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a mission with a landing: the descent from the last place before it to where it is."""
+    """One finding of a mission with a landing: the descent from the last place before it to where it is.
+
+    None of one that was flown, which the touchdown rule judges.
+    """
+    if requirements.ground is not None and requirements.ground.ways.approach is not None:
+        return []
     items = [item for item in requirements.setup.mission.items if item.command in LANDINGS]
     found = [at for item in items if (at := _waypoint_of(requirements, item.seq)) > 0]
     if not found:
@@ -113,7 +123,10 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(high - low):.0f} m in {run:.0f} m, {math.degrees(abs(slope)):.1f}°"
     within = abs(slope) <= limit + PLAN_TOLERANCE
-    reason = f"{text} of {math.degrees(limit):.1f}°; not flown: the flight {_ENDS[rule]} in the air"
+    ways = requirements.setup.ground_ways
+    flown = (ways.take_off if rule == "takeoff" else ways.approach) is not None
+    reason = f"{text} of {math.degrees(limit):.1f}°"
+    reason += "" if flown else f"; not flown: the flight {_ENDS[rule]} in the air"
     fault = message(text, f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind")
     ok = True if within else _BEYOND[rule]
     return make_finding(

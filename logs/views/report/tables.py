@@ -221,7 +221,7 @@ def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
 
 def notes_of(setup: FlightSetup) -> list[str]:
     """List the mission file's warnings, the scenario's notes, and what of it cannot be flown as written."""
-    return [*setup.mission.warnings, *setup.scenario.notes, *setup.route.notes]
+    return [*setup.mission.warnings, *setup.scenario.notes, *setup.notes]
 
 
 def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:

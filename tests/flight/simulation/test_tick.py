@@ -20,10 +20,12 @@ from flight.simulation.tick import (
     FAR,
     GROUND,
     MISSED,
+    NO_MOTOR,
     NOT_A_NUMBER,
     OUTPUT,
     READ_FIELDS,
     STALLED,
+    TIPPED,
     Workspace,
     end_return,
 )
@@ -275,8 +277,8 @@ def test_a_return_does_not_miss_the_end_of_a_path_that_it_need_not_follow() -> N
 
 
 def test_each_end_is_told_apart_by_people() -> None:
-    assert set(ENDS) == {COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY}
-    assert len(set(ENDS.values())) == 7
+    assert set(ENDS) == {COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY, NO_MOTOR, TIPPED}
+    assert len(set(ENDS.values())) == 9
     assert "75 degrees" in ENDS[BANKED]
     assert f"{FAR:.0f} m" in ENDS[MISSED]
 

@@ -17,8 +17,8 @@ from flight.autopilots.arduplane.law import (
     AIRSPEED_READING,
     ARDUPILOT_MEMORY,
     ROLL_LAG,
-    _follow,
     demand_height,
+    follow_attitude,
     roll_demand,
     update_tecs,
 )
@@ -307,7 +307,7 @@ def even_gains() -> Record:
 def followed(own: Record, at: Record) -> tuple[Record, Record]:
     """Commands and memory after a tick of a sixtieth of a second, with ArduPlane's parameters."""
     kept, commands = record(GUIDANCE_MEMORY), record(COMMANDS)
-    _follow(at, flying(), even_gains(), kept, parameters(KFF_RDDRMIX=0.3), own, 1.0, commands, 1.0 / 60.0)
+    follow_attitude(at, flying(), even_gains(), kept, parameters(KFF_RDDRMIX=0.3), own, 1.0, commands, 1.0 / 60.0)
     return commands, kept
 
 

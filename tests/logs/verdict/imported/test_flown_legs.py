@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from flight.mission.return_path import ReturnCircle
+from flight.mission.route import part_of_route
 from flight.simulation.setup import FlightSetup, ImportedLog, MissionStretch
 from logs.recording.example_log import example_log
-from logs.verdict.imported.flown_legs import flown_legs, part_of_route, plan_mismatch
+from logs.verdict.imported.flown_legs import flown_legs, plan_mismatch
 from logs.verdict.tolerances import ANOTHER_PLACE, PARTLY_FLOWN
 from tests.setups import route_along
 from tests.synthetic import fly_path, make_setup

@@ -1,0 +1,82 @@
+"""Ways on the map that no path was planned of, and what is in them: ground, missile spheres and zones."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from logs.verdict.measures.path_moves import straight_moves
+from logs.verdict.measures.path_sweeps import path_spheres
+from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.zone_visits import path_zones
+from logs.verdict.places import Place
+from logs.verdict.tolerances import ROUNDING
+from logs.verdict.wording import place_text
+from world.airspace.zone_kernels import zone_records
+from world.terrain import Terrain
+
+Floats = NDArray[np.float64]
+# Heights (m AMSL) at runs (m from a way's beginning) that rise.
+Profile = list[tuple[float, float]]
+
+# m of a way that is looked at in one piece: what is known of the ground before it ends counts by pieces.
+_PIECE = 100.0
+
+
+class Way(NamedTuple):
+    """A way of n points: (n, 3) m, and the run to each, (n,) m."""
+
+    points: Floats
+    run: Floats
+
+    def between(self, first: float, last: float) -> "Way":
+        """The part between two runs, m."""
+        inner = self.run[(self.run > first) & (self.run < last)]
+        at = np.concatenate([[first], inner, [max(first, last)]])
+        return Way(np.stack([np.interp(at, self.run, self.points[:, k]) for k in range(3)], axis=1), at)
+
+
+def straight_way(begin: Sequence[float] | Floats, course: float, profile: Profile) -> Way:
+    """A way on one course (rad) from a place (east, north, m)."""
+    run, up = np.array(profile, dtype=np.float64).T
+    east, north = begin[0] + run * math.sin(course), begin[1] + run * math.cos(course)
+    return Way(np.stack([east, north, up], axis=1), run)
+
+
+def way_clearance(ground: Terrain, way: Way) -> tuple[float, float]:
+    """Least height above ground on a way and the run where that is, m.
+
+    NaN where the ground is not known all along, and what is known of it is not met.
+    """
+    first, last = float(way.run[0]), float(way.run[-1])
+    cuts = np.linspace(first, last, max(2, math.ceil((last - first) / _PIECE) + 1))
+    run = np.union1d(cuts, way.run)
+    points = np.stack([np.interp(run, way.run, way.points[:, k]) for k in range(3)], axis=1)
+    found = [ground.clearance(*points[k : k + 2]) for k in range(len(run) - 1)]
+    low = np.array([clearance for clearance, _ in found])
+    # Of a NaN, where there is one, but for ground that is met.
+    k = int(np.nanargmin(low)) if (low < 0.0).any() else int(np.argmin(low))
+    return float(low[k]), float(run[k] + found[k][1] * (run[k + 1] - run[k]))
+
+
+def entered_by_way(requirements: RouteRequirements, way: Way) -> str:
+    """The missile's sphere or the zone that a way enters, in words; "" for none.
+
+    A zone that the way begins in is none: whoever stands there knows.  Nor is one to stay in that has a floor.
+    """
+    scenario, airspace = requirements.setup.scenario, requirements.airspace
+    if not scenario.external:
+        threats = scenario.threats
+        visits = path_spheres(way.points, way.run, threats.position, threats.kill_radius, threats.kill_scale)
+        for m in np.flatnonzero(visits.inside > 0.0).tolist():
+            return place_text(Place("missile", m, name=scenario.spec.threats[m].name or ""))
+    asked = [z for z, zone in enumerate(airspace.zones) if zone.kind == "exclusion" or zone.floor is None]
+    if asked:
+        records = zone_records([airspace.zones[z] for z in asked])
+        met = path_zones(straight_moves(way.points, way.run), records, scenario.terrain)
+        for z, visit in zip(asked, met, strict=True):
+            if visit.depth > ROUNDING and visit.entry_time > 0.0:
+                return place_text(airspace.place(z))
+    return ""

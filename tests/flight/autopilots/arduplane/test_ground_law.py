@@ -1,0 +1,130 @@
+"""Take-offs and landings by ArduPlane's law, beside those that ArduPlane itself flew, and those that fail."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flight.simulation.tick import ENDS, GROUND, NO_MOTOR
+from tests.flight.autopilots.arduplane.flown_grounds import FLIGHTS, HOME, Flown, circuit, fly, fly_kept, kept
+from tests.soak import SOAK
+from world.airfield import LandingStrip, Launch
+
+# In every run those whose slope, flare and wind differ most.
+ALWAYS = ("a", "b", "d")
+STRIP = LandingStrip(500.0, 600.0, length=600.0)
+RAIL = Launch("catapult", math.radians(90.0), 20.0, 6.0, math.radians(12.0))
+flights = pytest.mark.parametrize("flight", [name for name in FLIGHTS if SOAK or name in ALWAYS])
+
+
+def touch(flown: Flown) -> int:
+    """The row of the touch-down: where the aircraft is first as low as it stands."""
+    track = flown.track
+    return int(np.argmax((track.time > 60.0) & (track.clearance < track.clearance[-1] + 0.02)))
+
+
+@flights
+def test_take_offs_are_those_of_arduplane(flight: str) -> None:
+    """Place within 10 m of 280 m and height within 2.5 m of 65 m after 14 s; airspeed and pitch all along."""
+    flown, real = fly_kept(flight).track, kept(flight, "takeoff")
+    # Times count from the first kept row, which is a tenth of a second after the rail.
+    first = np.interp(-real["east_m"][0], -flown.position[:60, 0], flown.time[:60])
+    rows = np.searchsorted(flown.time, first + real["time_s"])
+    aside = np.hypot(flown.position[rows, 0] - real["east_m"], flown.position[rows, 1] - real["north_m"])
+    assert aside.max() < 10.0
+    assert np.abs(flown.position[rows, 2] - real["amsl_m"]).max() < 2.5
+    # Into the first second the motor of the real one came a tenth later.
+    assert np.abs(flown.airspeed[rows] - real["tas_mps"])[1:].max() < 1.3
+    assert np.abs(flown.attitude[rows, 1] - real["pitch_rad"])[3:].max() < math.radians(2.0)
+
+
+@flights
+def test_landings_are_those_of_arduplane(flight: str) -> None:
+    """Slope within 0.2 degrees, flare within 2 m and 25 m, touch-down within 30 m: what is asked of the law."""
+    flown, real = fly_kept(flight), kept(flight, "landing")
+    approach, track = flown.approach, flown.track
+    glide = flown.setup.autopilot.landing_glide(
+        approach.begin - approach.point[2], approach.run, approach.tail_wind, float(approach.point[2])
+    )
+    assert flown.flight.ended == "completed"
+    along, aside = approach.place(np.stack([real["east_m"], real["north_m"]], axis=1))
+    over = real["amsl_m"] - approach.point[2]
+    final = (along < -glide.flare_distance - 10.0) & (along > -approach.run + 100.0)
+    if flight != "d":  # where the last descent was too steep to be flown straight
+        slope = np.polyfit(-along[final], over[final], 1)[0]
+        assert math.degrees(abs(math.atan(slope) - math.atan(glide.slope))) < 0.2
+    # The flare begins where the motor is cut.
+    way = approach.place(np.asarray(track.position, dtype=np.float64))[0]
+    # As fast as it may be closed, for a fifth of a second.
+    closing = track.commands[12:, 3] < track.commands[:-12, 3] - 0.19
+    k = int(np.argmax((track.time[:-12] > 60.0) & (way[:-12] > -200.0) & closing))
+    began = float(approach.place(np.asarray(track.position[k], dtype=np.float64))[0])
+    assert -began == pytest.approx(glide.flare_distance, abs=25.0)
+    assert track.position[k, 2] - approach.point[2] == pytest.approx(glide.flare_height, abs=2.0)
+    mine = approach.place(np.asarray(track.position[touch(flown)], dtype=np.float64))
+    down = int(np.argmax(real["amsl_m"] - real["ground_m"] < 0.35))
+    assert float(mine[0]) == pytest.approx(along[down], abs=15.0)
+    assert float(mine[1]) == pytest.approx(aside[down], abs=1.0)
+    rest = approach.place(np.asarray(track.position[-1], dtype=np.float64))
+    assert float(rest[0]) == pytest.approx(along[-1], abs=20.0)
+
+
+def test_a_launch_below_minacc_never_gets_its_motor() -> None:
+    """10 m/s over 6 m: it glides down from the rail, and ends on the ground within 30 m."""
+    slow = Launch("catapult", math.radians(90.0), 10.0, 6.0, math.radians(8.0))
+    flown = fly(circuit(slow, None, TKOFF_THR_MINACC=15.0))
+    assert flown.flight.ended == ENDS[GROUND]
+    assert flown.track.controls[:, 3].max() == 0.0
+    assert flown.track.position[-1, 0] < 30.0
+
+
+def test_a_runway_is_left_at_rotate_speed_and_the_climb_is_steep_only_then() -> None:
+    """The real one lifted off after 37 m at 22 m/s in this wind."""
+    runway = Launch("runway", math.radians(90.0))
+    flown = fly(circuit(runway, None, TKOFF_ROTATE_SPD=19.0))
+    track = flown.track
+    lifted = int(np.argmax(track.clearance > 0.6))
+    assert track.position[lifted, 0] == pytest.approx(37.0, abs=8.0)
+    assert track.airspeed[lifted] == pytest.approx(22.0, abs=1.5)
+    assert track.airspeed[int(np.argmax(track.attitude[:, 1] > math.radians(8.0)))] > 19.0
+    assert flown.flight.ended == "completed"
+
+
+def test_on_a_runway_minacc_is_never_felt() -> None:
+    flown = fly(circuit(Launch("runway"), None, TKOFF_THR_MINACC=5.0))
+    assert flown.flight.ended == ENDS[NO_MOTOR]
+
+
+@pytest.mark.parametrize(("aircraft", "speed"), [("zagi", None), ("ultrastick25e", None)])
+def test_small_aircraft_are_thrown_and_land(aircraft: str, speed: float | None) -> None:
+    """From a hand at the usual 10 m/s, in a light wind, to rest on the strip."""
+    hand = Launch("hand", math.radians(90.0), speed, None, math.radians(10.0))
+    flown = fly(circuit(hand, STRIP, wind=(2.0, 60.0), aircraft=aircraft))
+    assert flown.flight.ended == "completed"
+    along, aside = flown.approach.place(np.asarray(flown.track.position[-1], dtype=np.float64))
+    assert abs(float(along)) < 150.0
+    assert abs(float(aside)) < 15.0
+
+
+def test_the_heading_is_held_that_the_launch_had_and_the_climb_ends_above_its_height() -> None:
+    """In calm air the course is the launch's: 20 degrees off the first leg it stays so until 60 m over home."""
+    flown = fly(circuit(Launch("catapult", math.radians(70.0), 20.0, 6.0, 0.2), None, wind=(0.0, 0.0)))
+    track = flown.track
+    end = int(np.argmax(track.position[:, 2] > 60.0))
+    course = math.atan2(*(track.position[end, :2] - track.position[0, :2]).tolist())
+    assert math.degrees(course) == pytest.approx(70.0, abs=1.5)
+    # Level until 5 m, and no bank to speak of in calm air; then it turns to the leg.
+    assert np.abs(track.attitude[:end, 0]).max() < math.radians(4.0)
+    assert math.degrees(math.atan2(*track.velocity[end + 900, :2].tolist())) > 90.0
+
+
+def test_a_landing_point_below_the_ground_is_no_reason_to_fly_into_it_far_from_it() -> None:
+    """A point 20 m under the ground: the glide meets it some 200 m before, which is no landing."""
+    flown = fly(circuit(RAIL, STRIP, point=-20.0))
+    assert flown.flight.ended == ENDS[GROUND]
+
+
+def test_home_is_where_kept_flights_began() -> None:
+    take_off = fly_kept("a").setup.ground_ways.take_off
+    assert take_off is not None
+    assert take_off.home == pytest.approx(HOME, abs=0.05)

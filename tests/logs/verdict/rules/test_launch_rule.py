@@ -1,0 +1,86 @@
+"""Take-offs as flown: what passes, a motor that never starts, height lost, ground and a zone in the climb."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flight.autopilots.autopilot import StoredAutopilot
+from flight.autopilots.catalog import restore_autopilot
+from flight.autopilots.planfly.autopilot import PlanflyGuidance
+from logs.verdict.findings import Finding
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from tests.flight.autopilots.arduplane.flown_grounds import circuit, fly
+from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
+from world.airfield import Launch
+
+
+def geometric(speed: float, **parameters: float) -> list[Finding]:
+    launch = Launch("catapult", math.radians(90.0), speed, 6.0, 0.2)
+    verdict = judge_geometry(circuit(launch, None, **parameters))
+    return [item for item in verdict.findings if item.rule == "launch"]
+
+
+def test_a_good_take_off_passes_and_the_rules_of_the_items_are_silent() -> None:
+    flown = flown_circuit()
+    verdict = judge_flight(flown.setup, flown.track, flown.flight.ended)
+    assert verdict.flyable, verdict.summary
+    rules = {item.rule for item in verdict.findings}
+    assert {"launch", "touchdown", "go_around"} <= rules
+    assert not {"takeoff", "climbout", "landing", "approach"} & rules
+    one = found(flown.setup, flown.track, "launch")
+    assert one.ok is True
+    assert "launched from a catapult on 90° at 20.0 m/s, 33.3 m/s²" in one.reason
+    assert "Start: NAV_TAKEOFF (item 1): launched from a catapult at home" in verdict.summary
+
+
+def test_a_launch_that_starts_no_motor_fails_before_the_flight() -> None:
+    (one,) = geometric(10.0, TKOFF_THR_MINACC=15.0)
+    assert one.ok is False
+    assert one.brief == "the launch accelerates at 8.3 m/s², less than TKOFF_THR_MINACC 15"
+    assert geometric(10.0) == []
+
+
+def test_a_flight_whose_motor_never_started_says_so_and_not_that_it_landed_badly() -> None:
+    flown = fly(circuit(Launch("catapult", 1.5, 10.0, 6.0, 0.14), STRIP, TKOFF_THR_MINACC=15.0))
+    one = found(flown.setup, flown.track, "launch", flown.flight.ended)
+    assert one.ok is False
+    assert "the motor does not start" in one.reason
+    assert "short of 60 m" in one.reason
+    assert found(flown.setup, flown.track, "touchdown", flown.flight.ended).ok is None
+
+
+def test_a_climb_through_a_zone_fails_and_one_beside_it_does_not() -> None:
+    flown = flown_circuit()
+
+    def over(north: float) -> bool | None:
+        corners = [[x, north + y] for x, y in ((100.0, -20.0), (140.0, -20.0), (140.0, 20.0), (100.0, 20.0))]
+        zone = {"name": "town", "kind": "exclusion", "polygon_m": corners}
+        setup = circuit(RAIL, STRIP, TKOFF_THR_MINACC=15.0, world={"zones": [zone]})
+        return found(setup, flown.track, "launch").ok
+
+    assert over(0.0) is False
+    assert over(500.0) is True
+
+
+def test_the_first_leg_is_held_to_its_corridor_once_it_is_flown_along() -> None:
+    """Launched the other way, the aircraft is 260 m off the leg before it has turned onto it; the corridor is 180 m."""
+    launch = Launch("catapult", math.radians(250.0), 20.0, 6.0, 0.2)
+    flown = fly(circuit(launch, None))
+    track = flown.track
+    corridor = [item for item in judge_flight(flown.setup, track, "completed").findings if item.rule == "corridor"]
+    assert corridor[0].ok is True
+    assert np.abs(track.position[:, 1]).max() > 200.0
+    # Off the leg once it is on course, it fails.
+    off = moved(track, slice(int(np.argmax(track.position[:, 0] > 800.0)), len(track)), north=-200.0)
+    again = [item for item in judge_flight(flown.setup, off, "completed").findings if item.rule == "corridor"]
+    assert again[0].ok is False
+
+
+@pytest.mark.parametrize("autopilot", [PlanflyGuidance.name, "px4"])
+def test_an_autopilot_that_flies_no_take_off_says_so_in_a_line(autopilot: str) -> None:
+    setup = flown_circuit().setup
+    other = replace(setup, autopilot=restore_autopilot(autopilot, StoredAutopilot()))
+    assert not other.ground_ways
+    assert "take-off and landing are not flown, and not judged as flown" in judge_geometry(other).summary
