@@ -65,10 +65,9 @@ def judge_flight(
     """
     if setup.source is not None:
         return judge_imported_flight(setup, track, log_complete=log_complete)
-    requirements = route_requirements(setup, envelope=envelope)
+    whole = route_requirements(setup, envelope=envelope)
     if not len(track):
-        return judge_unflown(requirements, ended, log_complete=log_complete)
-    whole = requirements
+        return judge_unflown(whole, ended, log_complete=log_complete)
     requirements, aligned = flown_phases(whole, track)
     findings = flown_findings(requirements, aligned, ended, log_complete)
     complete = all(item.ok is True for item in findings if item.rule == "completion")

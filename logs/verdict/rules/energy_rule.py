@@ -31,7 +31,9 @@ def energy_findings(
     used, current = predicted, peak
     if not geometric:
         # Of a flight that took off and landed that counts, too.
-        track = requirements.ground.track if requirements.ground is not None else aligned and aligned.track
+        track = None if aligned is None else aligned.track
+        if requirements.ground is not None:
+            track = requirements.ground.track
         used = math.nan if track is None else float(track.energy.max())
         current = math.nan if track is None else float(track.current.max())
     measured = setup.source is not None and not geometric

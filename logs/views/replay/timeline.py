@@ -133,7 +133,7 @@ def _start(log: FlightLog) -> TimelineEntry:
     scenario = "a mission without a scenario" if setup.scenario.external else f"scenario {setup.scenario.name}"
     place = f"from {float(lat):.5f}, {float(lon):.5f} at {up:.0f} m AMSL"
     if setup.source is None:
-        text = f"{setup.aircraft}, {scenario}, seed {setup.seed}; {place}. {setup.route.started}"
+        text = f"{setup.aircraft}, {scenario}, seed {setup.seed}; {place}. {setup.started}"
     else:
         # A real flight was drawn from no seed, and nobody trimmed it.
         text = f"{setup.aircraft}, {scenario}; imported log {setup.source.file}, {place}"

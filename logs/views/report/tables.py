@@ -194,7 +194,7 @@ def flight_facts(setup: FlightSetup, track: Track | None, ended: str) -> Facts:
         ("Descent", f"the propeller {braking}"),
         ("Mission", f"{setup.mission.source}: {len(setup.mission.items)} items, {route.legs} legs"),
         ("Route", f"{quantity(float(path_length(route.waypoints)) / 1000.0, 'km')} long"),
-        ("Started", route.started),
+        ("Started", setup.started),
     ]
     if setup.plan is not None:
         plan = setup.plan
