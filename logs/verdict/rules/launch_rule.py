@@ -26,14 +26,9 @@ Floats = NDArray[np.float64]
 def launch_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a take-off that was flown; before the flight, of an acceleration that is too little."""
-    setup = requirements.setup
-    if requirements.ground is None:
-        take_off = setup.ground_ways.take_off
-        too_slow = [] if take_off is None else _no_motor(requirements, take_off)
-        return [_unlaunched(requirements, take_off, too_slow)] if take_off is not None and too_slow else []
+    """One finding of a take-off that was flown."""
     ground = requirements.ground
-    if ground.ways.take_off is None:
+    if ground is None or ground.ways.take_off is None:
         return []
     return [_flown(requirements, ground, ground.ways.take_off)]
 
@@ -45,13 +40,6 @@ def _no_motor(requirements: RouteRequirements, take_off: TakeOff) -> list[Messag
         return []
     brief = f"the launch accelerates at {pushed:.1f} m/s², less than {trigger[1]} {trigger[0]:g}"
     return [message(brief, ": the motor does not start")]
-
-
-def _unlaunched(requirements: RouteRequirements, take_off: TakeOff, faults: list[Message]) -> Finding:
-    place = requirements.waypoint(take_off.waypoint)
-    return make_finding(
-        "launch", place, ok=False, reason=reason_of(faults), faults=faults, unit="m", method="v²/2L of the launch"
-    )
 
 
 def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:

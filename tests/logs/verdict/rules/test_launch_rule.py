@@ -9,17 +9,10 @@ import pytest
 from flight.autopilots.autopilot import StoredAutopilot
 from flight.autopilots.catalog import restore_autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
-from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from tests.flight.autopilots.arduplane.flown_grounds import circuit, fly
 from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
 from world.airfield import Launch
-
-
-def geometric(speed: float, **parameters: float) -> list[Finding]:
-    launch = Launch("catapult", math.radians(90.0), speed, 6.0, 0.2)
-    verdict = judge_geometry(circuit(launch, None, **parameters))
-    return [item for item in verdict.findings if item.rule == "launch"]
 
 
 def test_a_good_take_off_passes_and_the_rules_of_the_items_are_silent() -> None:
@@ -33,13 +26,6 @@ def test_a_good_take_off_passes_and_the_rules_of_the_items_are_silent() -> None:
     assert one.ok is True
     assert "launched from a catapult on 90° at 20.0 m/s, 33.3 m/s²" in one.reason
     assert "Start: NAV_TAKEOFF (item 1): launched from a catapult at home" in verdict.summary
-
-
-def test_a_launch_that_starts_no_motor_fails_before_the_flight() -> None:
-    (one,) = geometric(10.0, TKOFF_THR_MINACC=15.0)
-    assert one.ok is False
-    assert one.brief == "the launch accelerates at 8.3 m/s², less than TKOFF_THR_MINACC 15"
-    assert geometric(10.0) == []
 
 
 def test_a_flight_whose_motor_never_started_says_so_and_not_that_it_landed_badly() -> None:
