@@ -1,0 +1,103 @@
+"""Which take-offs and landings are flown, where they begin and end, and why others are not."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flight.mission.ground_ways import USUAL_PITCH, airborne_route
+from flight.mission.items import Command, Mission, MissionItem
+from flight.simulation.setup import FlightSetup
+from tests.flight.autopilots.arduplane.flown_grounds import circuit, make_ground_setup
+from world.airfield import LandingStrip, Launch
+
+RAIL = Launch("catapult", math.radians(90.0), 20.0, 6.0, math.radians(30.0))
+STRIP = LandingStrip(500.0, 600.0)
+
+
+def with_items(setup: FlightSetup, *items: MissionItem) -> FlightSetup:
+    mission = setup.mission
+    return make_ground_setup(setup.scenario, Mission(mission.home, items))
+
+
+def test_a_catapult_lets_go_at_its_end_and_a_hand_where_it_stands() -> None:
+    """6 m of rail at 30 degrees lead 5.196 m ahead and 3 m up, from a metre over the ground."""
+    take_off = circuit(RAIL, None).ground_ways.take_off
+    assert take_off is not None
+    place, velocity = take_off.release()
+    assert place == pytest.approx([5.196, 0.0, 4.0], abs=1e-3)
+    assert velocity == pytest.approx([17.321, 0.0, 10.0], abs=1e-3)
+    assert take_off.acceleration == pytest.approx(33.33, abs=0.01)
+    hand = circuit(replace(RAIL, method="hand"), None).ground_ways.take_off
+    assert hand is not None
+    assert hand.release()[0] == pytest.approx([0.0, 0.0, 1.8])
+    runway = circuit(replace(RAIL, method="runway", speed=None), None).ground_ways.take_off
+    assert runway is not None
+    assert runway.release()[0] == pytest.approx([0.0, 0.0, 0.0])
+    assert not runway.release()[1].any()
+
+
+def test_without_a_course_it_is_launched_along_the_first_leg_and_without_a_pitch_at_four_degrees() -> None:
+    take_off = circuit(replace(RAIL, course=None), None, pitch=0.0).ground_ways.take_off
+    assert take_off is not None
+    assert take_off.course == pytest.approx(math.radians(90.0), abs=1e-3)
+    assert take_off.pitch == USUAL_PITCH
+    assert (take_off.top, take_off.base) == pytest.approx((60.0, 0.0))
+
+
+def test_the_landing_is_that_of_the_last_leg_and_its_wind() -> None:
+    approach = circuit(None, STRIP).ground_ways.approach
+    assert approach is not None
+    assert (approach.leg, approach.item) == (3, 5)
+    assert approach.point == pytest.approx([500.0, 600.0, 0.0], abs=0.02)
+    assert approach.run == pytest.approx(600.0, abs=0.05)
+    # From 60 degrees at 5 m/s, to the west: cos 30 of it from behind.
+    assert approach.tail_wind == pytest.approx(4.33, abs=0.01)
+    along, aside = approach.place(np.array([[450.0, 610.0, 0.0], [520.0, 595.0, 0.0]]))
+    assert along == pytest.approx([50.0, -20.0], abs=0.1)
+    assert aside == pytest.approx([10.0, -5.0], abs=0.1)
+
+
+def test_what_a_mission_does_not_hold_is_not_flown_and_says_why() -> None:
+    setup = circuit(RAIL, STRIP)
+    takeoff, *way, land = setup.mission.items
+    no_takeoff = with_items(setup, *way, land).ground_ways
+    assert no_takeoff.take_off is None
+    assert no_takeoff.approach is not None
+    assert "does not begin with a NAV_TAKEOFF" in no_takeoff.notes[0]
+    no_landing = with_items(setup, takeoff, *way).ground_ways
+    assert no_landing.approach is None
+    assert "a NAV_LAND at a third" in no_landing.notes[0]
+    low = with_items(setup, takeoff, *way[:-1], replace(way[-1], alt=-5.0), land)
+    assert "no higher than the landing point" in low.ground_ways.notes[0]
+    homeless = make_ground_setup(setup.scenario, Mission(None, setup.mission.items))
+    assert homeless.ground_ways.take_off is None
+
+
+def test_a_scenario_without_launch_and_strip_flies_in_the_air_as_ever() -> None:
+    setup = circuit(None, None)
+    assert not setup.ground_ways
+    assert setup.started == setup.route.started
+    assert any("not flown to the ground" in note for note in setup.notes)
+
+
+def test_the_route_in_the_air_begins_where_the_take_off_ended_and_ends_before_the_landing() -> None:
+    setup = circuit(RAIL, STRIP)
+    begun = np.array([300.0, 40.0, 60.5])
+    route = airborne_route(setup.route, setup.ground_ways, begun)
+    assert route.waypoints[0].tolist() == begun.tolist()
+    assert route.items.tolist() == [1, 2, 3, 4]
+    assert np.array_equal(route.waypoints[1:], setup.route.waypoints[1:4])
+    assert not any("not flown to the ground" in note for note in route.notes)
+
+
+def test_a_take_off_item_with_a_place_of_its_own_goes_on_from_there() -> None:
+    """ArduPlane does not fly to the item's place: the leg that follows begins where the take-off ends."""
+    setup = circuit(RAIL, None)
+    takeoff, *rest = setup.mission.items
+    away = replace(takeoff, lon_deg=takeoff.lon_deg + 0.004)
+    take_off = with_items(setup, away, *rest).ground_ways.take_off
+    assert takeoff.command == Command.NAV_TAKEOFF
+    assert take_off is not None
+    assert take_off.waypoint == 1
