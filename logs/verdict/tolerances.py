@@ -231,8 +231,8 @@ GO_AROUND_ROOM = 20.0
 # m.  Least height above ground of a climb-out beyond `LAUNCH_RUN`: less than the usual elevation files' own error, and
 # more than the wing of a small aircraft banks down to.
 LAUNCH_ROOM = 2.0
-# m.  So much height a launched aircraft may lose: of twenty that ArduPlane flew from a catapult none lost any; from a
-# hand at 1.8 m more than this leaves no room for a wing.
+# m.  So much height a launched aircraft may lose: those that ArduPlane flew from a catapult at 14 m/s and more lost
+# none; from a hand at 1.8 m more than this leaves no room for a wing.
 LAUNCH_SINK = 1.0
 # m.  The legs that follow a take-off and those of a landing sequence are near the ground by nature: they need no more
 # height above it than a go-around, `GO_AROUND_ROOM`, where the scenario asks for more.
@@ -241,8 +241,9 @@ GROUND_LEG_ROOM = GO_AROUND_ROOM
 ON_COURSE = math.radians(10.0)
 # m.  So near to a contact's height over the ground the aircraft has touched it: rows stand 1/60 s apart.
 TOUCHED = 0.02
-# m.  A touch-down by the law is out by so much along the strip: 5 of ArduPlane's in steady wind were 6 to 13 m off it,
-# those in light turbulence up to 26 m.  The strip has to be as much longer either way.
+# m.  A touch-down by the law is out by so much along the strip: 5 of ArduPlane's in steady wind were 5 to 13 m off it,
+# three in light turbulence up to 26 m, and one in turbulence and 5 m/s across 52 m, which this leaves out.  The strip
+# has to be as much longer either way.
 TOUCH_ERROR = 30.0
 
 # The track beside its route
