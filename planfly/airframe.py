@@ -42,8 +42,10 @@ class Airframe:
         return self.limits.max_bank
 
 
-def laid_from_the_ground(plan: Plan, airframe: Airframe) -> Plan:
+def laid_from_the_ground(plan: Plan, airframe: Airframe, flown: Plan | None = None) -> Plan:
     """A plan with the ways from and to the ground that its scenario asks for; the plan as it is where it asks for none.
+
+    flown: the plan that is being flown, whose way up stays.
 
     >>> import numpy as np
     >>> from planner.plan import Certificate
@@ -60,7 +62,8 @@ def laid_from_the_ground(plan: Plan, airframe: Airframe) -> Plan:
         airspeed=lambda tail, amsl: autopilot.landing_airspeed(cruise, tail, amsl),
         slope=lambda height, run, tail, amsl: autopilot.landing_glide(height, run, tail, amsl).slope,
     )
-    return with_ground_ways(plan, airframe.limits.surely(), law)
+    climbed = None if flown is None or flown.ways is None else flown.ways.climb
+    return with_ground_ways(plan, airframe.limits.surely(), law, climbed)
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:

@@ -292,7 +292,7 @@ def _planned(
         else:
             old, leg = flown
             made = replan_path(world, limits, old, leg, seed=number, algorithm=algorithm, progress=advance, stop=ends)
-    made = laid_from_the_ground(made, airframe)
+    made = laid_from_the_ground(made, airframe, None if flown is None else flown[0])
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, plan_json(made))

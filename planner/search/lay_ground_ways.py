@@ -17,12 +17,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, aircraft_slopes
+from aircraft.tracking import SPEED_SHARES
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import ANGLE_MARGIN, Problem, make_problem
 from planner.ground_ways import ClimbOut, Descent, GroundWays
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
-from planner.search.pose_chains import LAP_SIDE, MOST_LAPS, Spot, chains, fallen, measure, risen
+from planner.search.pose_chains import (
+    LAP_SIDE,
+    MOST_LAPS,
+    Spot,
+    TurnLengths,
+    arc_lengths,
+    chains,
+    fallen,
+    measure,
+    risen,
+)
 from world.airfield import LandingStrip, Launch
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
@@ -63,6 +74,8 @@ _EARLY, _GLIDE_SHARE, _GLIDE_ROOM = 60.0, 0.4, 10.0
 STEEPEST_STRIP = 0.10
 # A go-around: least height over home and above ground, m, steps and the highest that is tried, m.
 _GO_AROUND, _GO_AROUND_ROOM, _HEIGHT_STEP, _HIGHEST = 50.0, 30.0, 10.0, 1000.0
+# Share of the wind by which the ground speed is higher that a turn's length is taken for.
+_WIND_SHARE = 0.5
 # Ways that are certified at most for each end, and finals that are tried.
 _CERTIFIED, _FINALS = 500, 8
 
@@ -79,10 +92,11 @@ class FinalLaw(NamedTuple):
     slope: Callable[[float, float, float, float], float]
 
 
-def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw) -> Plan:
+def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw, climbed: ClimbOut | None = None) -> Plan:
     """The plan with the ways that its scenario's `[launch]` and `[landing]` ask for, or why there are none.
 
-    limits: that it was planned within.  A plan whose scenario has neither table stays as it is.
+    limits: that it was planned within.  climbed: the way up of a plan whose first legs are flown, which stays.
+    A plan whose scenario has neither table stays as it is.
     """
     scenario = plan.scenario
     if scenario.home is None or scenario.terrain is None or (scenario.launch is None and scenario.landing is None):
@@ -90,7 +104,9 @@ def with_ground_ways(plan: Plan, limits: Limits, final: FinalLaw) -> Plan:
     site = _make_site(plan, limits, scenario.home, scenario.terrain)
     climb = descent = None
     problems: list[str] = []
-    if scenario.launch is not None:
+    if plan.flown_legs:
+        climb = climbed
+    elif scenario.launch is not None:
         climb, why = _climb_out(site, scenario.launch)
         problems += [f"climb-out: {why}"] if why else []
     if scenario.landing is not None:
@@ -109,7 +125,7 @@ class _Site:
     """A plan, and what its ways are certified by.
 
     low: the problem of what lies below the required clearance: of its certificate the distances from missiles and zones
-    count.  radius: of the tightest turn, m.
+    count.  radius: of the tightest turn, m.  turning: what turns take of their legs.
     """
 
     plan: Plan
@@ -119,6 +135,7 @@ class _Site:
     problem: Problem
     low: Problem
     radius: float
+    turning: TurnLengths
 
     @property
     def scenario(self) -> Scenario:
@@ -179,7 +196,18 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
     low = replace(low, certified=low.certified._replace(clearance=-1e5))
     up = float(max(scenario.start[2], scenario.destination[2]))
     radius = max(within.turn_radius(course, course + math.pi, up) for course in (0.0, 0.5 * math.pi))
-    return _Site(plan, within, home, terrain, problem, low, radius)
+    turning = arc_lengths(radius)
+    if (tracking := within.tracking) is not None:
+        # Ground speeds differ by course: what fits is certified.
+        share = 1.0 + _WIND_SHARE * scenario.wind.speed / within.airspeed
+        before, after = (_at_speed(table, share) for table in (tracking.before, tracking.after))
+        turning = TurnLengths(*(tuple(map(max, own, arcs)) for own, arcs in zip((before, after), turning, strict=True)))
+    return _Site(plan, within, home, terrain, problem, low, radius, turning)
+
+
+def _at_speed(table: Floats, share: float) -> list[float]:
+    """Column of a tracking error's table, (t,) m, at a ground speed as a share of the airspeed."""
+    return [float(np.interp(share, SPEED_SHARES, row)) for row in table]
 
 
 def _locked(place: Floats) -> Floats:
@@ -317,7 +345,7 @@ def _ways_up(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tup
         tail = site.scenario.wind.along(course, float(site.home[2]))[0]
         for corners in chains(begin, course, end, onward, site.radius, laps):
             spots = [home, begin, *corners, end]
-            way = measure([*spots, after], site.radius)
+            way = measure([*spots, after], site.turning)
             if way.fits and way.length >= least:
                 yield way.cost + (_TAIL_COST if tail > _TAIL else 0.0), course, spots
 
@@ -459,7 +487,7 @@ def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
     least = site.least_length(high - goal, side) + aside
     for laps in _lap_counts(site, high - goal, side):
         ways = [[begin, *corners, end] for corners in chains(begin, course, end, final.course, site.radius, laps)]
-        measured = [(measure([*flown, *spots, after], site.radius), spots) for spots in ways]
+        measured = [(measure([*flown, *spots, after], site.turning), spots) for spots in ways]
         fitting = [(way.cost, spots) for way, spots in measured if way.fits and way.length >= least]
         for _, spots in sorted(fitting):
             for share in _GENTLER:

@@ -21,8 +21,10 @@ Slope = Callable[[float], float]
 
 # Turns sharper than this are not laid out, rad.
 SHARPEST = math.radians(120.0)
+# Turns that lengths are known at, rad: from none in steps, so many of them.
+STEP, STEPS = math.radians(15.0), 11
 # Share of a leg that its turns may take: the rest is to settle in.
-TURN_SHARE = 0.85
+TURN_SHARE = 0.95
 # m of way that a turn of one radian is worth, and one of two radians four times.
 _SHARP_COST = 250.0
 # Lengths in radii of the tightest turn: of the last leg; of the first beside it; of a leg across the last one's line.
@@ -76,6 +78,33 @@ def _moved(spot: Spot, course: float, run: float) -> Spot:
     return spot[0] + run * math.sin(course), spot[1] + run * math.cos(course)
 
 
+class TurnLengths(NamedTuple):
+    """Lengths of leg (m) that turns take before and after their corners: at turns in steps of `STEP`, from none on."""
+
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+
+    def of(self, turn: float) -> tuple[float, float]:
+        """Before and after the corner of a turn, rad."""
+        place = min(turn / STEP, len(self.before) - 1.001)
+        k = int(place)
+        u = place - k
+        return (
+            self.before[k] + u * (self.before[k + 1] - self.before[k]),
+            self.after[k] + u * (self.after[k + 1] - self.after[k]),
+        )
+
+
+def arc_lengths(radius: float) -> TurnLengths:
+    """What the tangents of arcs of a radius (m) take.
+
+    >>> [round(length) for length in arc_lengths(150.0).of(math.radians(90.0))]
+    [150, 150]
+    """
+    tangents = tuple(radius * math.tan(0.5 * STEP * k) for k in range(STEPS))
+    return TurnLengths(tangents, tangents)
+
+
 class Measured(NamedTuple):
     """A way across the ground.
 
@@ -90,32 +119,31 @@ class Measured(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Whether no turn is too sharp, and each leg holds the arcs at its ends."""
+        """Whether no turn is too sharp, and each leg holds the turns at its ends."""
         return self.sharpest <= SHARPEST and self.fullest <= TURN_SHARE
 
 
-def measure(spots: Sequence[Spot], radius: float) -> Measured:
-    """Measure a way whose turns are flown with a radius, m.  In plain numbers: there are tens of thousands of ways.
+def measure(spots: Sequence[Spot], turning: TurnLengths) -> Measured:
+    """Measure a way.  In plain numbers: there are tens of thousands of ways.
 
-    >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], 150.0).fits
+    >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(150.0)).fits
     True
-    >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], 900.0).fits
+    >>> measure([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_lengths(990.0)).fits
     False
     """
-    length = sharpest = fullest = turns = before = east = north = run = 0.0
+    length = sharpest = fullest = turns = taken = east = north = run = 0.0
     for k in range(len(spots) - 1):
         to_east, to_north = spots[k + 1][0] - spots[k][0], spots[k + 1][1] - spots[k][1]
         to_run = math.hypot(to_east, to_north)
         if to_run < 1.0:
             return Measured(length, math.inf, math.pi, math.inf)
-        turn = 0.0
         if k:
             turn = abs(math.atan2(east * to_north - north * to_east, east * to_east + north * to_north))
             sharpest, turns = max(sharpest, turn), turns + turn * turn
-            tangent = radius * math.tan(0.5 * min(turn, 3.0))
-            fullest, before = max(fullest, (before + tangent) / run), tangent
+            before, after = turning.of(turn)
+            fullest, taken = max(fullest, (taken + before) / run), after
         length, east, north, run = length + to_run, to_east, to_north, to_run
-    fullest = max(fullest, before / run) if run else math.inf
+    fullest = max(fullest, taken / run) if run else math.inf
     return Measured(length, length + _SHARP_COST * turns, sharpest, fullest)
 
 

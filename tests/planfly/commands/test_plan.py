@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from planfly.cli import main
 from tests.instances import make_instance, scenario_text
 
 # Without seeds a search goes on for all its generations: hours.
@@ -42,3 +43,41 @@ def test_ctrl_c_leaves_the_best_plan_so_far(endless: Path, tmp_path: Path) -> No
     assert plan["ended"] == "interrupted"
     assert plan["evaluations"] >= 2000
     assert len(plan["waypoints_east_north_amsl_m"]) == 10
+
+
+FIELD = """\
+name = "field"
+[terrain]
+kind = "flat"
+amsl_m = 100
+[area]
+east_m = [0, 8000]
+north_m = [0, 8000]
+ceiling_amsl_m = 900
+[home]
+place = "start"
+[start]
+east_m = 1500
+north_m = 1500
+height_m = 120
+[destination]
+east_m = 5500
+north_m = 5500
+height_m = 120
+[landing]
+east_m = 4000
+north_m = 6000
+slope_deg = {slope}
+"""
+
+
+def test_a_landing_that_cannot_be_flown_is_said_and_ends_with_4(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = tmp_path / "field.toml", tmp_path / "plan.json"
+    for slope, code in ((4.0, 0), (12.0, 4)):
+        file.write_text(FIELD.format(slope=slope), encoding="utf-8")
+        assert main(["plan", str(file), "--out", str(out)]) == code
+        text = capsys.readouterr().out
+        assert ("failed  landing: on 0° a glide of 12" in text) is (code == 4)
+        assert ("descent" in json.loads(out.read_text())["ground_ways"]) is (code == 0)

@@ -162,6 +162,17 @@ def test_a_launch_into_a_missile_is_none() -> None:
     assert "inside a missile's reach" in plan.certificate.problems[0]
 
 
+def test_what_is_flown_stays_and_is_not_laid_out_again() -> None:
+    before = laid(**NORTH)
+    assert before.ways is not None
+    # Meanwhile walls stand about home.
+    flown = replace(before, scenario=scenario_of(ring(200.0), **NORTH), flown_legs=1, ways=None)
+    again = with_ground_ways(flown, limits(), LAW, before.ways.climb)
+    assert again.ways is not None
+    assert again.ways.climb is before.ways.climb
+    assert again.feasible
+
+
 def test_a_high_start_is_climbed_to_in_laps() -> None:
     high = {"start": {"east_m": 0.0, "north_m": 0.0, "amsl_m": 900.0}}
     scenario = scenario_of(**NORTH, **high, destination={"east_m": 0.0, "north_m": 5000.0, "amsl_m": 900.0})
