@@ -97,9 +97,7 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
     scenario = setup.scenario
     spans = [_span(scenario, one) for one in drawn.worst]
     span = (min(low for low, _ in spans), max(high for _, high in spans))
-    panels = tuple(
-        _profile(scenario, one, number, span, drawn.returns.limit) for number, one in enumerate(drawn.worst, 1)
-    )
+    panels = tuple(_profile(scenario, one, number, span) for number, one in enumerate(drawn.worst, 1))
     return Chart(
         f"{shorten(scenario.name, 60)}: the worst returns to launch",
         "way since it turned back",
@@ -121,7 +119,7 @@ def _span(scenario: Scenario, one: WorstReturn) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[float, float], limit: float) -> Panel:
+def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
     way = one.way
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))]) / 1000.0
     plane = PathPlane(along, way, ground_under(scenario, way), *span)
@@ -133,7 +131,7 @@ def _profile(scenario: Scenario, one: WorstReturn, number: int, span: tuple[floa
         nearest = int(np.argmin(np.linalg.norm(way - one.at, axis=1)))
         layers.append(Layer("rings", "where it goes wrong", "fail", along[[nearest]], one.at[[2]], quiet=True))
     when = f"{number}: from {one.one.time:.0f} s"
-    note = outcome_text(one.one, limit)
+    note = way_text(one.one.kind).removeprefix("a return ")
     return Panel(when, "m AMSL", tuple(layers), span=span, note=note, labels=(*cut_names, *zone_names))
 
 

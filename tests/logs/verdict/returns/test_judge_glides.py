@@ -188,6 +188,8 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     way = HEAD + "".join(f"{k}\t0\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up}\t1\n" for k, x, up in rows)
     found = demanded(tmp_path, mission=way)
     assert "; 9 lower than 30 m above ground are left out" in found.reason
+    # 3 km at 25 m/s, and the start.
+    assert f"of {121 - 9} places home" in found.reason
     setup = hill_setup(tmp_path, '[returns]\nrequire = ["glide"]\n')
     bare = replace(setup, scenario=replace(setup.scenario, terrain=None))
     (unknown,) = [one for one in judge_geometry(bare).findings if one.rule == "return"]
