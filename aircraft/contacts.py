@@ -77,7 +77,7 @@ def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
     >>> from aircraft.catalog import load_aircraft
     >>> [contact.name for contact in contacts_of(load_aircraft("c172x"), "belly") if contact.wheel]
-    ['NOSE', 'LEFT_MAIN', 'RIGHT_MAIN']
+    ['Nose Gear', 'Left Main Gear', 'Right Main Gear']
     """
     own = _own_contacts(aircraft.model_file.read_bytes())
     return own or usual_contacts(aircraft, gear)

@@ -179,8 +179,9 @@ def _name(place: Floats, name: str) -> TextPrimitive:
 def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
     """Draw the legs between waypoints (w, 3) as a line, the waypoints as dots with their numbers and mission items."""
     entity = _entity(time_ns, "plan")
-    entity.lines.append(_line(_PLAN))
-    entity.lines[0].points.extend(_points(waypoints))
+    legs = _line(_PLAN)
+    legs.points.extend(_points(waypoints))
+    entity.lines.append(legs)
     for point in waypoints:
         entity.spheres.add(pose=_pose(point), size=Vector3(x=40.0, y=40.0, z=40.0), color=_colour(_PLAN))
     for number, (point, item) in enumerate(zip(waypoints, items, strict=True)):
@@ -242,8 +243,9 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
         for wall in walls:
             step = max(1, (len(wall) - 1) // MAX_POSTS)
             for path in (wall[:, 0], wall[:, 1], *wall[:-1:step]):
-                entity.lines.append(_line(_KEEP_OUT if zone.kind == "exclusion" else _STAY_IN))
-                entity.lines[-1].points.extend(_points(path))
+                edge = _line(_KEEP_OUT if zone.kind == "exclusion" else _STAY_IN)
+                edge.points.extend(_points(path))
+                entity.lines.append(edge)
         entity.texts.append(_name(_above_ground(walls[0][0, 1], scenario.terrain), zone.name))
     return _update(entity)
 

@@ -19,6 +19,8 @@ from world.terrain import Terrain
 
 # Inches: the map's own width, what stands around it, its legend, and the column beside it.
 _LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND, _COLUMN = 0.72, 7.72, 0.5, 0.55, 1.0, 8.72
+# Inches of a line of the legend.
+_LINE = 0.155
 _MIN_HEIGHT = 3.6
 # Inches from a line of the wind's note to the next.
 _LINE = 0.145
@@ -27,7 +29,9 @@ _LINE = 0.145
 def draw_map(chart: MapChart) -> Figure:
     """Top view, north up, equal scales, axes in m labelled in km from the scenario's origin."""
     with clean_style():
-        figure, axes = map_frame(chart.east, chart.north, _LEGEND)
+        handles = [legend_handle(entry) for entry in legend_entries([chart.panel])]
+        legend = _legend_height(handles)
+        figure, axes = map_frame(chart.east, chart.north, legend)
         axes.set_xlabel(f"east of {chart.origin} (km)")
         axes.set_ylabel("north (km)")
         axes.set_title(chart.title, fontweight="bold")
@@ -35,9 +39,14 @@ def draw_map(chart: MapChart) -> Figure:
         draw_layers(axes, chart.panel)
         write_labels(axes, chart.panel)
         draw_compass(figure, chart.winds, _COLUMN)
-        handles = [legend_handle(entry) for entry in legend_entries([chart.panel])]
-        draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
+        draw_legend(figure, handles + around, _LEFT, (legend - 0.02) / figure.get_figheight())
     return figure
+
+
+def _legend_height(handles: list[Any]) -> float:
+    """Inches that a legend of four columns takes, the contours' entry included; `_LEGEND` at least."""
+    lines = [1 + str(handle.get_label()).count("\n") for handle in handles] + [1]
+    return max(_LEGEND, 0.08 + _LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
 
 
 def map_frame(east: tuple[float, float], north: tuple[float, float], legend: float) -> tuple[Figure, Any]:
