@@ -20,7 +20,7 @@ from world.terrain import Terrain
 # Inches: the map's own width, what stands around it, its legend, and the column beside it.
 _LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND, _COLUMN = 0.72, 7.72, 0.5, 0.55, 1.0, 8.72
 # Inches of a line of the legend.
-_LINE = 0.155
+_LINE = 0.175
 _MIN_HEIGHT = 3.6
 # Inches from a line of the wind's note to the next.
 _LINE = 0.145
