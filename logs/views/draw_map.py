@@ -20,7 +20,7 @@ from world.terrain import Terrain
 # Inches: the map's own width, what stands around it, its legend, and the column beside it.
 _LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND, _COLUMN = 0.72, 7.72, 0.5, 0.55, 1.0, 8.72
 # Inches of a line of the legend.
-_LINE = 0.175
+_LEGEND_LINE = 0.165
 _MIN_HEIGHT = 3.6
 # Inches from a line of the wind's note to the next.
 _LINE = 0.145
@@ -46,7 +46,7 @@ def draw_map(chart: MapChart) -> Figure:
 def _legend_height(handles: list[Any]) -> float:
     """Inches that a legend of four columns takes, the contours' entry included; `_LEGEND` at least."""
     lines = [1 + str(handle.get_label()).count("\n") for handle in handles] + [1]
-    return max(_LEGEND, 0.08 + _LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
+    return max(_LEGEND, 0.08 + _LEGEND_LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
 
 
 def map_frame(east: tuple[float, float], north: tuple[float, float], legend: float) -> tuple[Figure, Any]:

@@ -8,8 +8,8 @@ import pytest
 
 from logs import theme
 from logs.verdict.places import Place
-from logs.views.charts import legend_entries
-from logs.views.draw_map import draw_compass, draw_ground
+from logs.views.charts import Layer, legend_entries
+from logs.views.draw_map import draw_compass, draw_ground, draw_map
 from logs.views.drawing import WIDTH, draw_legend, legend_handle, new_figure
 from logs.views.map import NamedWind, flight_map, map_json
 from tests.logs.views.figure_data import ALL, FAILED, ROUTE, drawn_map, make_scenario, make_track, make_verdict
@@ -132,6 +132,15 @@ def test_the_legend_stands_where_it_is_put() -> None:
     assert box.y1 == pytest.approx(0.3 * figure.bbox.height, abs=1.0)
     # 0.01 of the width further left, for its own frame.
     assert box.x0 == pytest.approx((0.8 / WIDTH - 0.01) * figure.bbox.width, abs=1.0)
+
+
+def test_a_legend_of_many_long_names_is_whole() -> None:
+    chart = flight_map(make_scenario(), **ALL, track=None, verdict=FAILED)
+    corners = np.array([0.0, 1.0, 1.0]), np.array([0.0, 0.0, 1.0])
+    areas = [Layer("area", f"home in reach from {k}50 m above the ground", "landable", *corners) for k in range(16)]
+    figure = draw_map(replace(chart, panel=replace(chart.panel, layers=(*chart.panel.layers, *areas))))
+    figure.canvas.draw()
+    assert figure.legends[0].get_window_extent().y0 >= 0.0
 
 
 # ----------------------------------------------------------------------
