@@ -69,6 +69,13 @@ def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
             assert told == pytest.approx(numbers(getattr(tolerances, name)), rel=1e-5), name
 
 
+def test_every_scale_that_ranks_flights_stands_on_its_page() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| (.*?) \| ([\d.]+) (.*?) \|$", text_of("campaigns.md"), re.MULTILINE)
+    stated = {rule: (of, float(scale), unit) for rule, of, scale, unit in rows}
+    margins = {rule.name: rule.margin for rule in RULES.values() if rule.scale is not None}
+    assert stated == {name: (margin.of, margin.scale, margin.unit) for name, margin in margins.items() if margin}
+
+
 def test_every_elevation_format_stands_on_its_page() -> None:
     kinds = section_of_table("your-dem.md", "kind")
     assert [suffix for suffix in SUFFIXES if f"(`{suffix}`)" not in kinds] == []
