@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, PLACES, Command, Mission, Notes, command_name
-from flight.mission.itinerary import Itinerary, ItineraryStop
+from flight.mission.itinerary import Itinerary, ItineraryStop, loiter_of
 from flight.mission.loiter_circles import (
     PLAIN_SLOPE,
     USUAL_LOITERS,
@@ -106,9 +106,8 @@ def goes_no_further(route: Route, mission: Mission) -> bool:
     >>> goes_no_further(route, Mission(None, ()))
     False
     """
-    commands = {item.seq: item.command for item in mission.items}
-    last = commands.get(int(route.items[-1]), -1)
-    return last in PLACES and route.arcs[-1] == route.arcs[-2] == 0.0 and route.return_to is None
+    last = next((item for item in mission.items if item.seq == route.items[-1]), None)
+    return last is not None and last.command in PLACES and loiter_of(last) is None and route.return_to is None
 
 
 def part_of_route(route: Route, first: int, last: int) -> Route:

@@ -79,6 +79,7 @@ class Airborne(ABC):
         """Make the workspace for a route, and say how long it may take."""
         self.setup, self.path, self.map = setup, setup.path, local_map
         waypoints = waypoint_records(setup.route, setup.mission)
+        waypoints["ends"] &= setup.autopilot.loiter_rules.ends_in_circle
         self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         self._workspace = Workspace(self._gains, self.path, waypoints, self._law(setup).own)
@@ -99,7 +100,7 @@ class Airborne(ABC):
             # An autopilot that returns by a law of its own may circle longer than its path does.
             wider = true_by_equivalent(setup.route.return_to.up) ** 2
             patience += longest_circling(wider * setup.route.return_to.radius)
-        if setup.autopilot.loiter_rules.ends_in_circle and waypoints["ends"][-1]:
+        if waypoints["ends"][-1]:
             patience += longest_circling(setup.autopilot.loiter_rules.radius)
         self.max_ticks = int(patience / self.dt)
 

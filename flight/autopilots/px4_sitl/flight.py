@@ -80,6 +80,12 @@ class Px4Flight(SitlFlight):
         """Items count from 0."""
         return len(self._mission.items) - 1
 
+    @property
+    def _is_ending(self) -> bool:
+        """Where it circles about its last waypoint: from when it has reached that."""
+        circles = self._workspace.path["waypoint"]["ends"][self.setup.route.legs]
+        return self._link.news.reached >= self.last_item if circles else super()._is_ending
+
     def keep_log(self, target: Path) -> bool:
         """Have PX4 close its log (.ulg), end it, and move the log to a file; whether there was one."""
         self._preflight.disarm()

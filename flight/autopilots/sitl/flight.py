@@ -37,6 +37,7 @@ from flight.simulation.tick import (
 )
 from world.errors import CrashError, FlightError
 from world.frames import to_geo
+from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner
 from world.terrain import Heights
 
@@ -56,8 +57,8 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     """Do a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
     The commands that stand in it are the other program's.  The flight completes where it passes the end of the path,
-    once the program says that it has nothing before it but that; a return to launch completes in its circle, and a
-    loiter without end after `UNLIMITED` on its own.
+    once the program says that it has nothing before it but that; a return to launch completes in its circle, a loiter
+    without end after `UNLIMITED` on its own, and a mission whose last waypoint is circled about once around that.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -72,6 +73,8 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
         end_return(work.true, last, memory, work.timing.dt)
     elif settings.on_last_leg and before.circle != 0.0 and before.stays == math.inf:
         end_circling(work.true, before, memory, work.timing.dt)
+    elif settings.on_last_leg and last.ends:
+        end_around(work.true, last, memory, work.timing.dt)
     elif settings.on_last_leg:
         across, beyond = beyond_end(work.true, path.waypoint[: settings.waypoints])
         memory.done = beyond >= 0.0
@@ -126,6 +129,31 @@ def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:  #
     memory.done = memory.circled > UNLIMITED
 
 
+# Nearer to a place than this, m, an aircraft does not fly around it; the narrowest circle of PX4 has 25 m.
+_OFF_MIDDLE = 20.0
+
+
+@inner
+def end_around(true: Record, b: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
+    """Count how far the aircraft has turned about the mission's last waypoint, and end the flight once around it.
+
+    true: a record of `flight.guidance.navigation_error.MOTION`.
+    b: that waypoint, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    """
+    # As wide as it is flown it has not missed the mission's end.
+    memory.returning = True
+    off_e, off_n = true.east - b.east, true.north - b.north
+    if math.hypot(off_e, off_n) < _OFF_MIDDLE:
+        return
+    bearing = math.atan2(off_e, off_n)
+    if memory.circled > 0.0:
+        memory.turned += wrap(bearing - memory.bearing)
+    memory.circled += dt
+    memory.bearing = bearing
+    memory.done = abs(memory.turned) >= 2.0 * math.pi
+
+
 @inner
 def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:  # pragma: no cover - compiled
     """How far right of the last leg (m), and how far past its end, the aircraft is."""
@@ -175,6 +203,11 @@ class SitlFlight(ProgramFlight):
     @abstractmethod
     def last_item(self) -> int:
         """The number by which the program knows the mission's last item."""
+
+    @property
+    def _is_ending(self) -> bool:
+        """Whether by the program's own account nothing but the end of its mission lies before it."""
+        return self._link.news.mission_item >= self.last_item
 
     @abstractmethod
     def _get_ready(self) -> None:
@@ -243,7 +276,7 @@ class SitlFlight(ProgramFlight):
     def _look(self) -> None:
         """Take in what the autopilot tells, above all which item it flies."""
         self._link.poll()
-        self._workspace.on_last_leg[0] = self._link.news.mission_item >= self.last_item
+        self._workspace.on_last_leg[0] = self._is_ending
 
     def _apply_gnss_error(self) -> None:
         """Have the satellites mistake the place by as much as they do at the start."""

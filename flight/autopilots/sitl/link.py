@@ -21,7 +21,7 @@ class AutopilotNews:
 
     vehicle: MAV_TYPE.  autopilot: MAV_AUTOPILOT.  mode: its own number.
     ekf: flags of EKF_STATUS_REPORT or ESTIMATOR_STATUS.
-    mission_item: the number of the item that it flies.
+    mission_item: the number of the item that it flies.  reached: of the last one that it has reached.
     texts: STATUSTEXT, in order.
     parameters: by name, as it has them.
     acknowledged: the result by command, MAV_RESULT.
@@ -35,6 +35,7 @@ class AutopilotNews:
     armed: bool = False
     ekf: int = 0
     mission_item: int = -1
+    reached: int = -1
     texts: list[str] = field(default_factory=list)
     parameters: dict[str, float] = field(default_factory=dict)
     acknowledged: dict[int, int] = field(default_factory=dict)
@@ -69,6 +70,7 @@ class AutopilotLink(ABC):
             "EKF_STATUS_REPORT": self._ekf,
             "ESTIMATOR_STATUS": self._ekf,
             "MISSION_CURRENT": self._mission_current,
+            "MISSION_ITEM_REACHED": self._mission_item_reached,
             "PARAM_VALUE": self._parameter,
             "COMMAND_ACK": self._command_ack,
             "MISSION_REQUEST": self._mission_request,
@@ -122,6 +124,9 @@ class AutopilotLink(ABC):
 
     def _mission_current(self, message: Any) -> None:
         self.news.mission_item = int(message.seq)
+
+    def _mission_item_reached(self, message: Any) -> None:
+        self.news.reached = int(message.seq)
 
     def _parameter(self, message: Any) -> None:
         value, form = float(message.param_value), _INTEGERS.get(message.param_type)

@@ -4,7 +4,7 @@ What a flight from air to air cannot hold is made a waypoint where the route has
 more, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it takes a waypoint as
 reached a radius early, and returns to launch after the last.  A mission that ends with a return to launch has that at
 its end, and its rally points go with it; one that ends with a loiter without end has that, of which the flight's own
-clock counts a minute.
+clock counts a minute.  An autopilot that circles about the last waypoint without end has no place more, either.
 """
 
 import math
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Home, MissionItem, on_grid
 from flight.mission.itinerary import loiter_of
-from flight.mission.route import Route
+from flight.mission.route import Route, goes_no_further
 from flight.simulation.setup import FlightSetup
 from world.frames import GeoOrigin, to_geo
 
@@ -34,7 +34,7 @@ class UploadedMission:
     """What goes to the autopilot.
 
     home: its home; alt is AMSL.
-    items: numbered from 1; the last is the place more, a return to launch, or a loiter without end.
+    items: numbered from 1; the last is the place more, or what the autopilot ends its mission with.
     rally: the points that a return may go to, numbered from 0; none without a return.
     """
 
@@ -61,6 +61,8 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
         kept.append(_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
     if route.return_from >= 0 or kept[-1].command == Command.NAV_LOITER_UNLIM:
         return UploadedMission(_home(setup), _renumbered(kept), setup.mission.rally)
+    if setup.autopilot.loiter_rules.ends_in_circle and goes_no_further(route, setup.mission):
+        return UploadedMission(_home(setup), _renumbered(kept))
     kept.append(_waypoint(kept[-1].seq + 1, _straight_on(route), 0.0, origin))
     return UploadedMission(_home(setup), _renumbered(kept))
 

@@ -119,7 +119,7 @@ def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Findi
                 f"{ends.get(number, f'turn-around {number}')} is too tight to be flown as drawn, and within"
                 f" {reach:.0f} m of it {'; '.join(found)}: only a flight tells"
             )
-            place, method = requirements.leg(min(first, requirements.legs - 1)), "what lies around it"
+            place, method = requirements.leg(first), "what lies around it"
             out.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
     return out
 

@@ -27,6 +27,8 @@ MANUAL, MISSION = 1 << 16, 4 << 16 | 4 << 24
 # As a PX4 that is not yet up, it answers every fifth step for so long, s.
 WAKES = 1.0
 GRAVITY = 9.80665
+# m.  Of its circle about the mission's last item.
+CIRCLE = 150.0
 
 
 class FakePx4(Fake):
@@ -87,6 +89,7 @@ class FakePx4(Fake):
             self.talk(time)
         controls = [0.0] * 16
         if self.armed and self.mode == MISSION:
+            self.circle_at_the_end()
             aileron, elevator, throttle = self.steer(self.state)
             controls[0], controls[1], controls[3] = aileron, elevator, throttle
             if time > self.auto_since + GOES_WRONG:
@@ -97,6 +100,17 @@ class FakePx4(Fake):
         if time > WAKES or self.frame % 5 == 0:
             answer = mavlink.MAVLink_hil_actuator_controls_message(sensed.time_usec, controls, 0, 0)
             self.simulator.sendall(answer.pack(self.hil))
+
+    def circle_at_the_end(self) -> None:
+        """Once at its mission's last item, say so, and fly around that to the right without end."""
+        last = self.items[-1]
+        if self.current < len(self.items) - 1 or last.command != mavlink.MAV_CMD_NAV_WAYPOINT:
+            return
+        north, east, _ = self.state["position"]
+        to_north, to_east, _ = self.place(last)
+        if math.hypot(to_north - north, to_east - east) < 10.0:
+            self.send(mavlink.MAVLink_mission_item_reached_message(self.current))
+            last.command, last.param3 = mavlink.MAV_CMD_NAV_LOITER_UNLIM, CIRCLE
 
     def sense(self, sensed: Any, time: float) -> None:
         """Attitude by the gyro from the accelerometer's at rest; everything else as it is told."""

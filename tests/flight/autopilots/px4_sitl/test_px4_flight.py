@@ -15,10 +15,12 @@ from flight.autopilots.px4_sitl import flight as px4_flight
 from flight.autopilots.px4_sitl import physics
 from flight.autopilots.px4_sitl.flight import Px4Flight
 from flight.autopilots.sitl import flight as sitl_flight
+from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import SimulatedFlight, fly_to_end
 from tests.flight.autopilots.px4_sitl.conftest import MakeFake
-from tests.setups import setup_maker
+from tests.flight.autopilots.px4_sitl.fake_px4 import CIRCLE
+from tests.setups import setup_maker, waypoint_mission
 from tests.soak import SOAK, some
 from world.errors import CrashError, FlightError
 
@@ -88,6 +90,23 @@ def test_px4s_link_flies_the_mission_to_its_end(fake_px4: MakeFake, tmp_path: Pa
     assert (program.changed, program.unused) == ({}, ())
     assert kept.read_bytes() == b"ULogfake"
     assert left_behind() == []
+
+
+@pytest.mark.usefixtures("short_run_in_but_for_a_soak")
+def test_the_flight_goes_once_around_where_px4_circles_about_its_last_waypoint(fake_px4: MakeFake) -> None:
+    made = make_setup()
+    mission = waypoint_mission(WAY, np.array([25.0]), made.scenario.origin)
+    route = make_route(mission, made.scenario.origin, made.scenario.terrain, 25.0, False, made.limits)
+    flown, _ = fly(replace(made, mission=mission, route=route), fake_px4())
+    off = flown.track.position[:, :2] - WAY[-1, :2]
+    distance = np.hypot(off[:, 0], off[:, 1])
+    assert flown.ended == "completed"
+    reached = int(np.argmin(distance))
+    assert distance[reached] < 10.0
+    # To the right by once around, less the part of it at the middle, and no more than the last look at the link takes.
+    around = np.unwrap(np.arctan2(off[reached:, 0], off[reached:, 1])[distance[reached:] > 30.0])
+    assert around[-1] - around[0] == pytest.approx(2.0 * math.pi, abs=0.1)
+    assert np.median(distance[reached:]) == pytest.approx(CIRCLE, rel=0.2)
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.verdict.measures.circle_reach import within_reach
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import default_parameters
+from logs.verdict.measures.circle_reach import beside_end, within_reach
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from tests.logs.verdict.rules.test_loiter_rule_own_radius import TIME, loiter, sphere
+from tests.logs.verdict.rules.test_loiter_rule_own_radius import TIME, loiter, radius_at, sphere
 
 REACH = 261.0
 
@@ -33,6 +35,16 @@ def with_ground(away: float, up: float) -> RouteRequirements:
     return route_requirements(
         replace(setup, scenario=replace(setup.scenario, terrain=replace(ground, heights=heights)))
     )
+
+
+def test_a_missions_end_has_circles_where_the_autopilot_flies_them() -> None:
+    """After the last waypoint ArduPlane returns; PX4 circles, within 2.25 radii of 30 degrees of bank."""
+    setup = loiter(TIME, {})
+    assert beside_end(route_requirements(setup)) is None
+    beside = beside_end(route_requirements(replace(setup, autopilot=Px4(default_parameters()))))
+    assert beside is not None
+    assert beside[0] == pytest.approx(2.25 * radius_at(30.0), rel=0.02)
+    assert beside[1] == []
 
 
 def test_the_lowest_height_counts_against_the_ground() -> None:
