@@ -19,7 +19,11 @@ UNKNOWN_AIRCRAFT = "unknown aircraft"
 UNKNOWN_WAY = "unknown way"
 # And of a way from the ground or to it that may not be free.
 GROUND_WAY = "ground way"
-_OPEN = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, GROUND_WAY)
+# And of returns or glides that a scenario requires, which are not known well enough.
+UNKNOWN_RETURN = "unknown return"
+# What stands beside the flight and no flight shows: a flight may go well all the same.
+BESIDE_FLIGHT = (GROUND_WAY, UNKNOWN_RETURN)
+_OPEN = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, *BESIDE_FLIGHT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +55,8 @@ class Finding:
     suggestions: of a failed finding, the smallest changes of the plan that would pass it, the least change first.
     brief: the reason in a few words, for a headline.
     placed: whether the reason begins with the place.
-    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY` or `GROUND_WAY` of what those
-    leave open; "" otherwise.
+    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `GROUND_WAY` or
+    `UNKNOWN_RETURN` of what those leave open; "" otherwise.
     facts: what was measured beside it and is no fault.
     """
 
@@ -139,15 +143,15 @@ class Verdict:
 
     @property
     def flies(self) -> bool:
-        """Whether it is flyable, but for ways from the ground or to it that are left open: no flight flies those.
+        """Whether it is flyable, but for ways from and to the ground and returns that are left open beside the flight.
 
         >>> open_way = make_finding("climbout", Place("waypoint", 0), ok=None, reason="", check=GROUND_WAY)
         >>> verdict = Verdict((open_way,), flyable=False, complete=True, lines=(), level="flown", unjudged="a way")
         >>> verdict.flies, replace(verdict, complete=False).flies
         (True, False)
         """
-        ground = all(item.check == GROUND_WAY for item in left_open(self.findings))
-        return self.flyable or (self.complete and self.undecided and ground)
+        beside = all(item.check in BESIDE_FLIGHT for item in left_open(self.findings))
+        return self.flyable or (self.complete and self.undecided and beside)
 
     @property
     def headline(self) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
-from logs.verdict.findings import GROUND_WAY, UNKNOWN_AIRCRAFT, UNKNOWN_WAY, Finding, Verdict, left_open
+from logs.verdict.findings import BESIDE_FLIGHT, UNKNOWN_AIRCRAFT, UNKNOWN_WAY, Finding, Verdict, left_open
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
 from logs.verdict.rules.mission_rule import lacks_landing
@@ -57,8 +57,8 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     ]
     circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
     known = _unknown_of_aircraft([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
-    ground = [item.brief for item in open_findings if item.check == GROUND_WAY]
-    return "; ".join(filter(None, [known, circles, *ground]))
+    beside = [item.brief for item in open_findings if item.check in BESIDE_FLIGHT]
+    return "; ".join(filter(None, [known, circles, *beside]))
 
 
 def _unknown_of_aircraft(every: Sequence[Finding]) -> str:

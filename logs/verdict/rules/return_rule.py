@@ -16,7 +16,7 @@ from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Command
 from flight.mission.itinerary import UNLIMITED
 from flight.simulation.tick import AT_HEIGHT, NEAR, WIDER
-from logs.verdict.findings import Finding, make_finding
+from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -88,10 +88,17 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
     ok = False if False in results else None if None in results else True
     reason, method = "; ".join(one.reason for one in found), "; ".join(one.method for one in found)
     method = f"from every {every:.0f} s of the way, {method}"
-    return [make_finding("return", FLIGHT, ok=ok, reason=reason, source="scenario", method=method)]
+    # A verdict that asks for them is not given without them.
+    faults, check = ([Message(reason, _NOT_KNOWN)], UNKNOWN_RETURN) if ok is None else ([], "")
+    return [
+        make_finding(
+            "return", FLIGHT, ok=ok, reason=reason, faults=faults, source="scenario", method=method, check=check
+        )
+    ]
 
 
 _METHOD = "on a point mass by ArduPlane's law"
+_NOT_KNOWN = "whether the aircraft gets home as the scenario requires is not known in full"
 
 
 class _Answer(NamedTuple):

@@ -192,9 +192,13 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     assert f"of {121 - 9} places home" in found.reason
     setup = hill_setup(tmp_path, '[returns]\nrequire = ["glide"]\n')
     bare = replace(setup, scenario=replace(setup.scenario, terrain=None))
-    (unknown,) = [one for one in judge_geometry(bare).findings if one.rule == "return"]
+    verdict = judge_geometry(bare)
+    (unknown,) = [one for one in verdict.findings if one.rule == "return"]
     assert unknown.ok is None
     assert unknown.reason == "without the engine: not judged: there is no elevation file"
+    # The scenario asks for it: nothing is flyable without.
+    assert (verdict.flyable, verdict.undecided, verdict.flies) == (False, True, True)
+    assert verdict.headline.endswith("whether the aircraft gets home as the scenario requires is not known in full")
     homeless = replace(setup, mission=replace(setup.mission, home=None))
     (nowhere,) = [one for one in judge_geometry(homeless).findings if one.rule == "return"]
     assert nowhere.ok is None
