@@ -10,7 +10,7 @@ under ArduPlane: a belly of 3000 N/m a skid, 0.18 m below the centre of gravity 
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 from xml.etree import ElementTree
 
@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 
 Gear = Literal["belly", "wheels"]
 _METRES = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
+# A model without wheels stands on its lowest points: on those that are at least so deep, as a share of the deepest.
+_SKIDS = 0.75
 
 # In spans, forward, to the right and down from the centre of gravity.  Of the belly and the wheels each side has one
 # more: all stand on three points.
@@ -71,7 +73,7 @@ def usual_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """The contacts that an aircraft flies with: those of its model, or the usual ones.
+    """The contacts that an aircraft flies with: those of its model, what it stands on first, or the usual ones.
 
     Raises ValueError for a model that is no XML.
 
@@ -116,7 +118,16 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, made: tuple[Contact, ...]
 
 
 def _own_contacts(model: bytes) -> tuple[Contact, ...]:
-    """The contacts that a model states."""
+    """The contacts that a model states: it stands on its wheels, or on its lowest points where it has none."""
+    found = _stated(model)
+    if not any(one.wheel for one in found):
+        deepest = max((one.down for one in found), default=0.0)
+        found = [replace(one, stands=one.down >= _SKIDS * deepest > 0.0) for one in found]
+    return tuple(sorted(found, key=lambda one: not one.stands))
+
+
+def _stated(model: bytes) -> list[Contact]:
+    """The contacts of a model, of which its wheels alone stand."""
     section = ElementTree.fromstring(model).find("ground_reactions")
     found, centre = [], _centre(model)
     for one in [] if section is None else section.findall("contact"):
@@ -126,7 +137,7 @@ def _own_contacts(model: bytes) -> tuple[Contact, ...]:
         wheel = one.get("type", "BOGEY") == "BOGEY"
         forward, right, down = np.array([-1.0, 1.0, -1.0]) * (place - centre)
         found.append(Contact(one.get("name", ""), float(forward), float(right), float(down), wheel, wheel))
-    return tuple(found)
+    return found
 
 
 def _centre(model: bytes) -> Floats:

@@ -47,6 +47,26 @@ def test_places_count_from_the_centre_of_gravity_and_in_the_model_s_unit() -> No
     assert (wheel.forward, wheel.right, wheel.down) == pytest.approx((20 * 0.0254, -10 * 0.0254, 40 * 0.0254))
 
 
+def contact_xml(kind: str, name: str, forward: float, down: float) -> str:
+    return (
+        f'<contact type="{kind}" name="{name}">'
+        f'<location unit="M"><x>{-forward}</x><y>0</y><z>{-down}</z></location></contact>'
+    )
+
+
+def test_a_model_with_skids_of_its_own_stands_on_its_lowest_points_and_one_with_wheels_on_those() -> None:
+    """A nose 0.05 m deep is none of the skids at 0.2 and 0.16 m, which are none where there is a wheel."""
+    skids = [("STRUCTURE", "nose", 0.6, 0.05), ("STRUCTURE", "front", 0.3, 0.2), ("STRUCTURE", "rear", -0.3, 0.16)]
+
+    def standing(*contacts: tuple[str, str, float, float]) -> list[str]:
+        text = "".join(contact_xml(*one) for one in contacts)
+        model = f"<fdm_config><ground_reactions>{text}</ground_reactions></fdm_config>".encode()
+        return [one.name for one in _own_contacts(model) if one.stands]
+
+    assert standing(*skids) == ["front", "rear"]
+    assert standing(*skids, ("BOGEY", "wheel", 0.1, 0.3)) == ["wheel"]
+
+
 @pytest.mark.parametrize(("name", "gear"), [("aerosonde", "belly"), ("zagi", "belly"), ("ultrastick25e", "wheels")])
 @pytest.mark.parametrize("slope", [0.0, 0.08])
 def test_an_aircraft_at_rest_stays_where_it_is(name: str, gear: Gear, slope: float) -> None:
