@@ -57,8 +57,8 @@ from world.terrain import Heights
 
 Floats = NDArray[np.float64]
 
-# Points of an aircraft that may meet the ground, at most.
-CONTACTS = 12
+# Points of an aircraft that may meet the ground, at most: JSBSim's own models have up to 19.
+CONTACTS = 24
 # What it is doing, in the order of a flight.
 TAKING_OFF, IN_AIR, ON_GLIDE, APPROACHING, FLARING = 0, 1, 2, 3, 4
 GROUND_STATE = record_dtype(
@@ -329,7 +329,9 @@ def _land(work: Record, own: Record) -> None:  # pragma: no cover - compiled
     before = work.commands.throttle
     follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
     if ground.stage == FLARING:
-        work.commands.throttle = max(0.0, before - max(1e-3, own.parameters.throttle_slew) * dt)
+        slew = own.parameters.throttle_slew
+        # One that knows no limit is closed at once.
+        work.commands.throttle = max(0.0, before - slew * dt) if slew > 0.0 else 0.0
 
 
 @inner

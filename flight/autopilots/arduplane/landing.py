@@ -7,15 +7,14 @@ before the point as it flies over the ground while the sink falls to TECS_LAND_S
 (libraries/AP_Landing/AP_Landing_Slope.cpp) in ArduPlane 4.6.
 """
 
-import math
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.autopilot import LandingGlide
 
 # The flare begins on the second half of the way at the earliest.
 _LATEST_HALF = 0.5
-# Slower over the ground than this it does not count itself, m/s.
-_SLOWEST = 0.5
+# Slower over the ground than this it does not count itself, and slower than this it does not sink in its flare, m/s.
+_SLOWEST, _LEAST_SINK = 0.5, 0.1
 # Height over home that a go-around climbs to where neither the landing item nor a take-off says one, m.
 _GO_AROUND = 30.0
 
@@ -23,13 +22,17 @@ _GO_AROUND = 30.0
 def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float:
     """Equivalent airspeed on the glide, m/s: between minimum and cruise, faster against the wind up to the cruise's.
 
+    No landing is faster than the cruise, whatever TECS_LAND_ARSPD says.
+
     >>> from flight.autopilots.arduplane.parameters import default_parameters
     >>> [landing_airspeed(default_parameters(), wind) for wind in (3.0, 0.0, -2.0, -8.0)]  # minimum 9, cruise 12
     [10.5, 10.5, 11.5, 12.0]
+    >>> landing_airspeed(default_parameters().changed(TECS_LAND_ARSPD=14.0), 0.0)
+    12.0
     """
     cruise, stated = parameters.airspeed_cruise, parameters.landing_airspeed
     base = stated if stated >= 0.0 else 0.5 * (cruise + parameters.airspeed_min)
-    return min(base + parameters.landing_head_wind * max(0.0, -tail_wind), max(base, cruise))
+    return min(base + parameters.landing_head_wind * max(0.0, -tail_wind), cruise)
 
 
 def landing_glide(height: float, run: float, ground_speed: float, parameters: ArduPilotParameters) -> LandingGlide:
@@ -44,6 +47,12 @@ def landing_glide(height: float, run: float, ground_speed: float, parameters: Ar
     >>> glide = landing_glide(54.0, 600.0, 20.0, default_parameters())
     >>> [round(number, 3) for number in glide]
     [0.095, 3.6, 70.244]
+
+    A flare at TECS_LAND_SINK alone, 0.05 m/s, counts as one at 0.1: 1 m, twice LAND_FLARE_ALT, takes 10 s.
+
+    >>> gentle = default_parameters().changed(TECS_LAND_SINK=0.05, LAND_FLARE_AIM=100.0, LAND_FLARE_ALT=0.5)
+    >>> [round(landing_glide(54.0, 600.0, 20.0, gentle)[k], 3) for k in (1, 2)]
+    [1.0, 200.0]
     """
     speed = max(_SLOWEST, ground_speed)
     sink = height * speed / run
@@ -51,7 +60,7 @@ def landing_glide(height: float, run: float, ground_speed: float, parameters: Ar
     if parameters.flare_height > 0.0:
         aim = min(aim, 2.0 * parameters.flare_height)
     mean = parameters.flare_weight * parameters.landing_sink + (1.0 - parameters.flare_weight) * sink
-    away = min(speed * aim / mean if mean > 0.0 else math.inf, _LATEST_HALF * run)
+    away = min(speed * aim / max(_LEAST_SINK, mean), _LATEST_HALF * run)
     return LandingGlide((height - aim) / (run - away), aim, away)
 
 

@@ -124,6 +124,15 @@ def test_a_landing_point_below_the_ground_is_no_reason_to_fly_into_it_far_from_i
     assert flown.flight.ended == ENDS[GROUND]
 
 
+def test_a_throttle_without_a_limit_is_closed_at_once_in_the_flare() -> None:
+    """THR_SLEWRATE 0 limits nothing: against the wind the motor runs on the glide, and not through the slide."""
+    flown = fly(circuit(None, STRIP, wind=(6.0, 270.0), THR_SLEWRATE=0.0))
+    track, down = flown.track, touch(flown)
+    assert flown.flight.ended == "completed"
+    assert track.commands[down - 600 : down, 3].max() > 0.05
+    assert track.commands[down:, 3].max() == 0.0
+
+
 def test_home_is_where_kept_flights_began() -> None:
     take_off = fly_kept("a").setup.ground_ways.take_off
     assert take_off is not None
