@@ -482,7 +482,7 @@ class LaunchTable(ScenarioTable):
     """[launch]: how the aircraft leaves the ground at home.
 
     course_deg: clockwise from north; along the mission's first leg where it is not given.
-    speed_mps: at the end of the launch.  length_m: of rail, throw or runway.  incline_deg: of the launch above level.
+    speed_mps: at the end of rail or throw.  length_m: of rail, throw or runway.  incline_deg: of it, above level.
     What is not given is the method's default (`world.airfield`).
     """
 
@@ -491,6 +491,12 @@ class LaunchTable(ScenarioTable):
     speed_mps: Annotated[float, within(0.0, 60.0)] | None = None
     length_m: Annotated[float, within(0.1, 3000.0)] | None = None
     incline_deg: Annotated[float, within(0.0, 45.0)] | None = None
+
+    @model_validator(mode="after")
+    def _pushed(self) -> "LaunchTable":
+        if self.method == "runway" and self.speed_mps is not None:
+            raise ValueError(f"speed_mps: {self.speed_mps:g}: not of a runway, where the aircraft's own motor pulls")
+        return self
 
 
 class LandingTable(PositionTable):

@@ -128,6 +128,10 @@ CASES = {
     "a launch by rocket": (HOME + '[launch]\nmethod = "rocket"', 'launch.method: "rocket": Input should be'),
     "a launch without a method": (HOME + "[launch]\nspeed_mps = 20", "launch.method: Field required"),
     "a launch too fast": (HOME + '[launch]\nmethod = "hand"\nspeed_mps = 61', "launch.speed_mps: 61: allowed 0..60"),
+    "a runway that pushes": (
+        HOME + '[launch]\nmethod = "runway"\nspeed_mps = 20',
+        "launch: speed_mps: 20: not of a runway, where the aircraft's own motor pulls",
+    ),
     "no rail": (HOME + '[launch]\nmethod = "catapult"\nlength_m = 0', "launch.length_m: 0: allowed 0.1..3000"),
     "a steep launch": (HOME + '[launch]\nmethod = "hand"\nincline_deg = 46', "launch.incline_deg: 46: allowed 0..45"),
     "a landing nowhere": (HOME + "[landing]\ncourse_deg = 9", "landing: position: give east_m and north_m"),
