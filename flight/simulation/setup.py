@@ -253,8 +253,12 @@ class FlightSetup:
         if not self.autopilot.flies_ground:
             title = self.autopilot.title
             return GroundWays(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
-        slowest = self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
-        return find_ground_ways(self.scenario, self.mission, self.route, slowest)
+        return find_ground_ways(self.scenario, self.mission, self.route, self.slowest_launched)
+
+    @property
+    def slowest_launched(self) -> float:
+        """Slowest level flight at the route's start, m/s: a launch that states no speed goes by it."""
+        return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
 
     @property
     def started(self) -> str:

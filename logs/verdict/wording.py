@@ -179,6 +179,17 @@ def deciding_text(deciding: DecidingParameter) -> str:
     return f"{deciding.name} {deciding.current:g} {does}; {deciding.passing:g} would pass"
 
 
+def gentle_launch_text(found: float, trigger: tuple[float, str]) -> str:
+    """That a launch pushes too little to start the motor.
+
+    found: m/s^2.  trigger: m/s^2 that starts it, and the parameter that says so.
+
+    >>> gentle_launch_text(8.33, (15.0, "TKOFF_THR_MINACC"))
+    'the launch accelerates at 8.3 m/s², less than TKOFF_THR_MINACC 15'
+    """
+    return f"the launch accelerates at {found:.1f} m/s², less than {trigger[1]} {trigger[0]:g}"
+
+
 def shortened(text: str) -> str:
     """A statement cut to the length that a headline takes.
 

@@ -277,10 +277,10 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     @property
     def motor_start(self) -> float:
         """When the motor starts, s after the release; inf for never."""
-        if self.ways.take_off is None:
+        take_off = self.ways.take_off
+        if take_off is None:
             return -math.inf
-        launch, slowest = self.ways.take_off.launch, self.aircraft.stall_speed
-        return motor_start(launch.acceleration(slowest), launch.release_speed(slowest), launch.incline, self.parameters)
+        return motor_start(take_off.acceleration, take_off.speed, take_off.launch.incline, self.parameters)
 
     @property
     def released_throttle(self) -> float:

@@ -7,20 +7,17 @@ is not judged: a climb-out of 30 degrees is what QGroundControl draws (its Takeo
 
 import math
 
-import numpy as np
-
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
 from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import PLAN_TOLERANCE
+from logs.verdict.wording import gentle_launch_text
 from world.airfield import Launch
 
 # How the flight does it instead.
 _ENDS = {"takeoff": "begins", "landing": "ends"}
-# ArduPlane's parameter of the acceleration that starts the motor at a launch, m/s^2.
-_STARTS_MOTOR = "TKOFF_THR_MINACC"
 # What is said of a slope beyond the limit.
 _BEYOND = {"takeoff": None, "landing": False}
 
@@ -42,12 +39,13 @@ def takeoff_findings(
         return []
     up, home = float(requirements.points[at, 2]), mission.home
     own = home is not None and (items[0].lat_deg, items[0].lon_deg) != (home.lat_deg, home.lon_deg)
-    if (launch := requirements.setup.scenario.launch) is not None and (at == 0 or not own):
-        held = _never_started(requirements, launch)
+    launch = requirements.setup.scenario.launch
+    if launch is not None and (held := _never_started(requirements, launch)):
+        return held
+    if launch is not None and (at == 0 or not own):
         # From the ground at home to the next place, on the launch course.
-        return held or [
-            _slope(requirements, "takeoff", at, at + 1, route.takeoff_ground, float(requirements.points[at + 1, 2]))
-        ]
+        high = float(requirements.points[at + 1, 2])
+        return [_slope(requirements, "takeoff", at, at + 1, route.takeoff_ground, high)]
     if at == 0 or not own:
         reason = f"to {up:.0f} m AMSL over home, on a course that is the autopilot's to choose"
         return [make_finding("takeoff", requirements.waypoint(at), ok=None, reason=reason, unit="deg")]
@@ -58,28 +56,21 @@ def takeoff_findings(
 def _never_started(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
     """A finding of a launch too gentle for the autopilot to start its motor by; nothing where it asks for none."""
     setup = requirements.setup
-    parameters, envelope = setup.autopilot.parameters, setup.envelope
-    values = {} if parameters is None else {name: value for name, value, _ in parameters.values}
-    asked = values.get(_STARTS_MOTOR, 0.0)
-    ground = setup.route.takeoff_ground
-    slowest = float(np.interp(0.0 if math.isnan(ground) else ground, envelope.amsl, envelope.level_speed_min))
-    found = launch.acceleration(slowest)
-    if found >= asked:
+    trigger, found = setup.autopilot.launch_trigger, launch.acceleration(setup.slowest_launched)
+    if trigger is None or found >= trigger[0]:
         return []
-    text = f"the {launch.method} launch accelerates with {found:.1f} m/s², {_STARTS_MOTOR} asks for {asked:g}"
-    fault = message(text, ": the motor never starts")
-    place = requirements.waypoint(0)
+    fault = message(gentle_launch_text(found, trigger), ": the motor never starts")
     return [
         make_finding(
             "takeoff",
-            place,
+            requirements.waypoint(0),
             ok=False,
             reason=fault.text,
             faults=[fault],
             planned=found,
-            limit=asked,
+            limit=trigger[0],
             source="autopilot",
-            margin=found - asked,
+            margin=found - trigger[0],
             unit="m/s2",
             method="v²/2L of the scenario's launch",
         )

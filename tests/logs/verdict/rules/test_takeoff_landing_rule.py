@@ -2,12 +2,11 @@
 
 import math
 from dataclasses import replace
-from typing import Any, cast
 
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.autopilot import ParameterValue
+from flight.autopilots.arduplane.parameters import default_parameters
 from flight.simulation.simulate import simulate
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
@@ -111,12 +110,6 @@ def test_a_take_off_in_the_air_and_a_mission_without_ends_have_no_finding() -> N
         assert not rules & {"takeoff", "landing"}
 
 
-class Stated:
-    """Parameters of which one is known."""
-
-    values = (ParameterValue("TKOFF_THR_MINACC", 15.0, "file"),)
-
-
 @pytest.mark.parametrize(
     ("launch", "ok"),
     [
@@ -131,13 +124,24 @@ def test_a_launch_too_gentle_for_the_motor_to_start(launch: Launch, ok: bool) ->
     setup = setup_of("3 22 15 0 0 0 0 0 100", *FAR, home=HOME)
     setup = replace(setup, scenario=replace(setup.scenario, launch=launch))
     requirements = route_requirements(setup)
-    judged = replace(requirements, setup=replace(setup, autopilot=ArduPlane(cast(Any, Stated()))))
+    asking = ArduPlane(default_parameters().changed(TKOFF_THR_MINACC=15.0))
+    judged = replace(requirements, setup=replace(setup, autopilot=asking))
     (found,) = takeoff_findings(judged, geometric=True)
     assert found.ok is ok
     if not ok:
-        assert found.reason.endswith("TKOFF_THR_MINACC asks for 15: the motor never starts")
+        assert found.reason.endswith("less than TKOFF_THR_MINACC 15: the motor never starts")
     # Without the parameter the motor waits for nothing.
     assert takeoff_findings(requirements, geometric=True)[0].ok is True
+
+
+def test_a_take_off_item_with_a_place_of_its_own_is_launched_as_any_other() -> None:
+    """As QGroundControl places it: ahead of home."""
+    setup = setup_of(*climb(5.0), home=HOME)
+    asking = ArduPlane(default_parameters().changed(TKOFF_THR_MINACC=15.0))
+    for speed, ok in ((13.5, True), (13.3, False)):
+        launch = Launch("catapult", speed=speed, length=6.0)
+        made = replace(setup, autopilot=asking, scenario=replace(setup.scenario, launch=launch))
+        assert of(judge_geometry(made), "takeoff").ok is ok
 
 
 def test_a_launch_is_judged_by_its_climb_from_the_ground_to_the_next_place() -> None:
