@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import LANDING_NOTE
-from flight.mission.placing import return_places
+from flight.mission.placing import home_place
 from flight.mission.route import Route, part_of_route
 from world.airfield import LandingStrip, Launch
 from world.scenario import Scenario
@@ -98,9 +98,25 @@ class Approach:
 
     def place(self, position: Floats) -> tuple[Floats, Floats]:
         """How far beyond the landing point, and to the right of its course, positions (n, 3) are, (n,) m."""
-        east, north = position[..., 0] - self.point[0], position[..., 1] - self.point[1]
-        sin, cos = math.sin(self.course), math.cos(self.course)
-        return east * sin + north * cos, east * cos - north * sin
+        return _along_aside(position, self.point, self.course)
+
+    def on_strip(self, position: Floats) -> tuple[Floats, Floats]:
+        """How far along the strip beyond its middle, and aside of that line, positions (n, 3) are, (n,) m.
+
+        The strip lies where the scenario has it, along its stated course, or along the landing's where none is stated.
+        A landing against the stated course is one along the same strip.
+        """
+        axis = self.course if self.strip.course is None else self.strip.course
+        if math.cos(self.course - axis) < 0.0:
+            axis += math.pi
+        return _along_aside(position, np.array([self.strip.east, self.strip.north]), axis)
+
+
+def _along_aside(position: Floats, begin: Floats, course: float) -> tuple[Floats, Floats]:
+    """How far positions (n, 3) are ahead of a place on a course (rad), and to the right of it, (n,) m."""
+    east, north = position[..., 0] - begin[0], position[..., 1] - begin[1]
+    sin, cos = math.sin(course), math.cos(course)
+    return east * sin + north * cos, east * cos - north * sin
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,19 +155,18 @@ def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest
 
 def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> tuple[TakeOff | None, str]:
     """The take-off, or why none is flown."""
-    launch, places = scenario.launch, return_places(mission, scenario.origin, scenario.terrain)
+    launch, base = scenario.launch, home_place(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
     numbers = route.items.tolist()
     first = next((k for k, seq in enumerate(numbers) if seq >= 0), 0)
     if launch is None or not items or numbers[first] not in items:
         return None, "[launch]: the mission does not begin with a NAV_TAKEOFF: its flight begins in the air"
-    if not places:
+    if base is None:
         return None, "[launch]: the mission has no home to take off from: its flight begins in the air"
     if first + 1 >= len(numbers):
         return None, "[launch]: nothing comes after the take-off: it is not flown"
-    item, base = items[numbers[first]], places[0].up
-    here = np.array([places[0].east, places[0].north])
-    ground = scenario.terrain.height(*here) if scenario.terrain is not None else base
+    item, here = items[numbers[first]], np.array([base.east, base.north])
+    ground = scenario.terrain.height(*here) if scenario.terrain is not None else base.up
     if math.isnan(ground):
         return None, "[launch]: the ground at home is not known: the flight begins in the air"
     # Where the take-off item has a place of its own, ArduPlane does not go there: the next item is the first place.
@@ -160,7 +175,7 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
     home = np.array([*here, float(ground)])
     top, pitch = float(route.waypoints[first, 2]), _climb_pitch(item)
     speed, pushed = launch.release_speed(slowest), launch.acceleration(slowest)
-    return TakeOff(launch, item.seq, home, course, top, base, pitch, first, speed, pushed), ""
+    return TakeOff(launch, item.seq, home, course, top, base.up, pitch, first, speed, pushed), ""
 
 
 def _climb_pitch(item: MissionItem) -> float:

@@ -1,7 +1,7 @@
 """The places of a mission on the map: east and north of its stops, and their heights above mean sea level."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +112,16 @@ def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) 
         return ()
     heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
     return _return_places(mission, mission.home, origin, heights)
+
+
+def home_place(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> ReturnPlace | None:
+    """Home of a mission on the map, wherever its rally points are; None where it has none.
+
+    >>> home_place(Mission(Home(36.5, 8.0, 300.0), ()), GeoOrigin(36.5, 8.0), None).up
+    300.0
+    """
+    places = return_places(replace(mission, rally=()), origin, terrain)
+    return places[0] if places else None
 
 
 def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[LandingStart, ...]:

@@ -234,9 +234,15 @@ LAUNCH_ROOM = 2.0
 # m.  So much height a launched aircraft may lose: those that ArduPlane flew from a catapult at 14 m/s and more lost
 # none; from a hand at 1.8 m more than this leaves no room for a wing.
 LAUNCH_SINK = 1.0
+# m.  So much of a runway is to be left where the aircraft leaves the ground: the law left it after 34 m where ArduPlane
+# did after 37 m, and one such flight is known.
+RUNWAY_ROOM = 10.0
 # m.  The legs that follow a take-off and those of a landing sequence are near the ground by nature: they need no more
 # height above it than a go-around, `GO_AROUND_ROOM`, where the scenario asks for more.
 GROUND_LEG_ROOM = GO_AROUND_ROOM
+# m.  So far from home, or from the landing point, at most: as long as the longest final that a plan lays out.  Beyond,
+# what the scenario asks for holds on them, too.
+NEAR_FIELD = 2000.0
 # rad.  A leg that follows a take-off is held to its corridor once the aircraft has come to its course within this.
 ON_COURSE = math.radians(10.0)
 # m.  So near to a contact's height over the ground the aircraft has touched it: rows stand 1/60 s apart.
@@ -245,6 +251,12 @@ TOUCHED = 0.02
 # three in light turbulence up to 26 m, and one in turbulence and 5 m/s across 52 m, which this leaves out.  The strip
 # has to be as much longer either way.
 TOUCH_ERROR = 30.0
+# m.  A final that the law flies lower over the ground than this, before its flare may begin, is left open: five of
+# ArduPlane's came to their flares within 2 m of the law's height.
+FINAL_ROOM = 3.0
+# m/s.  A faster sink towards the ground leaves a touch-down open: 15 landings of ArduPlane came down at 0.5 to 4.2 m/s,
+# and an aircraft that a flare drops from a height comes down faster than any of them.
+TOUCH_SINK = 5.0
 
 # The track beside its route
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.simulation.track import Track
 from logs.verdict.measures.path_moves import straight_moves
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -36,6 +37,13 @@ class Way(NamedTuple):
         inner = self.run[(self.run > first) & (self.run < last)]
         at = np.concatenate([[first], inner, [max(first, last)]])
         return Way(np.stack([np.interp(at, self.run, self.points[:, k]) for k in range(3)], axis=1), at)
+
+
+def track_way(track: Track) -> Way:
+    """The way of a flown track over the ground."""
+    position = np.asarray(track.position, dtype=np.float64)
+    step = np.diff(position[:, :2], axis=0)
+    return Way(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
 
 
 def straight_way(begin: Sequence[float] | Floats, course: float, profile: Profile) -> Way:

@@ -1,8 +1,10 @@
 """The clearance rule: the least height above ground on each leg, planned and flown."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flight.mission.items import OVER_TERRAIN, Command
 from logs.verdict.findings import Finding, make_finding
@@ -12,7 +14,9 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
 from logs.verdict.suggestions import fly_higher
-from logs.verdict.tolerances import CLEARANCE_TOLERANCE, GROUND_LEG_ROOM
+from logs.verdict.tolerances import CLEARANCE_TOLERANCE, GROUND_LEG_ROOM, NEAR_FIELD
+
+Floats = NDArray[np.float64]
 
 
 def clearance_findings(
@@ -29,24 +33,67 @@ def clearance_findings(
             )
         ]
     near = _near_ground(requirements)
-    legs = requirements.path.legs
-    low, _ = path_clearance(ground.heights, ground.to_pixel.record, requirements.path.points)
-    planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(requirements.legs)]
+    legs, points = requirements.path.legs, requirements.path.points
+    low, _ = path_clearance(ground.heights, ground.to_pixel.record, points)
     out = []
     for leg in range(requirements.legs):
-        least = min(limit, GROUND_LEG_ROOM) if leg in near else limit
+        asked = _Asked(limit, near.get(leg, ()))
+        of_leg = np.flatnonzero(legs == leg)
+        planned, least = asked.worst(low[of_leg], points[of_leg])
         if geometric:
-            out.append(_planned_clearance(requirements, leg, planned[leg], least, ground.vertical_error))
+            out.append(_planned_clearance(requirements, leg, planned, least, ground.vertical_error))
         else:
-            out.append(_flown_clearance(requirements, aligned, leg, planned[leg], least))
+            short = planned < least - CLEARANCE_TOLERANCE
+            out.append(_flown_clearance(requirements, aligned, leg, planned, asked, planned_short=short))
     return out
 
 
-def _near_ground(requirements: RouteRequirements) -> set[int]:
-    """Legs that lead away from a take-off that is flown, and to a landing: from DO_LAND_START on, or the last two."""
+class _Asked(NamedTuple):
+    """What height above ground a leg needs: less near a take-off or a landing that is flown.
+
+    limit: m, elsewhere.  fields: east and north of homes and landing points that it is near, m.
+    """
+
+    limit: float
+    fields: tuple[tuple[float, float], ...]
+
+    def of(self, points: Floats) -> Floats:
+        """At places (n, 3), (n,) m."""
+        asked = np.full(len(points), self.limit)
+        for east, north in self.fields:
+            away = np.hypot(points[:, 0] - east, points[:, 1] - north)
+            asked[away <= NEAR_FIELD] = min(self.limit, GROUND_LEG_ROOM)
+        return asked
+
+    def worst(self, low: Floats, points: Floats) -> tuple[float, float]:
+        """The height above ground, of some (n,) from places (n, 3) on, that is nearest to what is needed, and that, m.
+
+        NaN for the height where one is not known, and where there is none.
+        """
+        if not low.size or np.isnan(low).any():
+            return math.nan, self.limit
+        k, asked = self.least(low, points)
+        return float(low[k]), asked
+
+    def least(self, low: Floats, points: Floats) -> tuple[int, float]:
+        """Which of some heights (n,), of which one is known, is nearest to what is needed, and that, m."""
+        if not self.fields:
+            return int(np.nanargmin(low)), self.limit
+        asked = self.of(points)
+        k = int(np.nanargmin(low - asked))
+        return k, float(asked[k])
+
+
+def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
+    """Homes and landing points, m, by the legs that lead away from a take-off that is flown, and to a landing.
+
+    To a landing lead those from DO_LAND_START on, or else the last two.
+    """
     setup, ground = requirements.setup, requirements.ground
     ways = setup.ground_ways if ground is None else ground.ways
-    near = set() if ways.take_off is None else {ways.take_off.waypoint}
+    near: dict[int, tuple[tuple[float, float], ...]] = {}
+    if ways.take_off is not None:
+        near[ways.take_off.waypoint] = ((float(ways.take_off.home[0]), float(ways.take_off.home[1])),)
     if ways.approach is not None:
         starts = [item.seq for item in setup.mission.items if item.command == Command.DO_LAND_START]
         begun = max((seq for seq in starts if seq < ways.approach.item), default=None)
@@ -54,7 +101,9 @@ def _near_ground(requirements: RouteRequirements) -> set[int]:
         if begun is not None:
             after = np.flatnonzero(setup.route.items > begun)
             first = max(0, int(after[0]) - 1) if after.size else first
-        near |= set(range(first, ways.approach.leg + 1))
+        point = (float(ways.approach.point[0]), float(ways.approach.point[1]))
+        for leg in range(first, ways.approach.leg + 1):
+            near[leg] = (*near.get(leg, ()), point)
     return near
 
 
@@ -90,9 +139,15 @@ def _planned_clearance(
 
 
 def _flown_clearance(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, planned: float, limit: float
+    requirements: RouteRequirements,
+    aligned: AlignedTrack | None,
+    leg: int,
+    planned: float,
+    asked: _Asked,
+    *,
+    planned_short: bool,
 ) -> Finding:
-    least, ok, reason = math.nan, None, "the leg was not flown"
+    least, ok, reason, limit = math.nan, None, "the leg was not flown", asked.limit
     if aligned is not None and aligned.flew(leg):
         # The first leg has what came before it, the last what came after.
         first = 0 if leg == 0 else int(aligned.rows[leg])
@@ -100,7 +155,8 @@ def _flown_clearance(
         span = aligned.low[first:last]
         known = np.isfinite(span)
         if known.any():
-            k = first + int(np.nanargmin(span))
+            row, limit = asked.least(span, np.asarray(aligned.track.position[first:last], dtype=np.float64))
+            k = first + row
             least = float(aligned.low[k])
             reason = f"{least:.1f} m above ground {_when_and_where(aligned, k, float(aligned.low_at[k]))}"
             ok = least >= limit - CLEARANCE_TOLERANCE
@@ -113,7 +169,7 @@ def _flown_clearance(
             reason += f"; {limit:.0f} m are required{_straight(requirements, leg)}"
         ground = requirements.setup.scenario.terrain
         reason += _less_error(least, limit, None if ground is None else ground.vertical_error)
-    if planned < limit - CLEARANCE_TOLERANCE:
+    if planned_short:
         reason += f"; the planned path comes down to {planned:.1f} m"
     return make_finding(
         "clearance",
@@ -153,7 +209,7 @@ RULE = Rule(
     title="clearance",
     asks="Does each leg stay the required height above the ground?",
     margin=Margin("height above ground", "m", 10.0),
-    tolerances=("CLEARANCE_TOLERANCE", "GROUND_LEG_ROOM"),
+    tolerances=("CLEARANCE_TOLERANCE", "GROUND_LEG_ROOM", "NEAR_FIELD"),
     judge=clearance_findings,
     suggest=fly_higher,
     log=LogNeeds(("heights",)),

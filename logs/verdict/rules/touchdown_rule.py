@@ -1,24 +1,36 @@
 """The touchdown rule: a landing that was flown, from the last waypoint to where the aircraft stands.
 
-Judged are where it touches down and where it comes to rest against the strip, its bank, and what the final enters.  How
-fast it sinks towards the ground, which may rise before it, is stated and not judged: ArduPlane's law knows the glide to
-the flare, but not the last metres so well (`docs/measured.md`).  A landing that is not flown is judged by the landing
-and approach rules, by the mission's items.
+Judged are the height of the final above ground, what it enters, and where the aircraft touches down and comes to rest
+against the scenario's strip.  How fast it sinks towards the ground, which may rise before it, is stated: ArduPlane's
+law knows the glide to the flare, but not the last metres so well (`docs/measured.md`), so that a sink beyond all that
+was seen leaves the landing open, and none passes or fails it.  A landing that is not flown is judged by the landing and
+approach rules, by the mission's items.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.ground_ways import Approach
 from flight.simulation.track import Track
-from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import GROUND_WAY, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import Way, entered_by_way
+from logs.verdict.measures.ways import entered_by_way, track_way
+from logs.verdict.places import Place
 from logs.verdict.rule import Margin, Rule, located
-from logs.verdict.tolerances import TOUCH_ERROR, TOUCHED
+from logs.verdict.tolerances import (
+    ABOVE_FLARE,
+    EARLY_TOUCH,
+    FINAL_ROOM,
+    POINT_ERROR,
+    TOUCH_ERROR,
+    TOUCH_SINK,
+    TOUCHED,
+)
 from logs.verdict.wording import shortened
 from world.terrain import Terrain
 
@@ -26,6 +38,28 @@ Floats = NDArray[np.float64]
 
 # Along this much of the strip about the touch-down the ground's slope is taken, m.
 _SLOPE_OVER = 10.0
+
+
+class _Landing(NamedTuple):
+    """A landing in numbers.
+
+    along, aside: of the touch-down, beyond the landing point and to the right of it, m.
+    touch, stop: how far along the strip beyond its middle, and aside of it, m.
+    left: of the strip beyond where it stands, m.
+    sink, towards: m/s at the touch-down, down and towards the ground, which rises or falls.
+    room: least height above ground of the final, m; inf for none, NaN where that is not known.
+    over: height of the landing point above the ground there, m.
+    """
+
+    along: float
+    aside: float
+    touch: tuple[float, float]
+    stop: tuple[float, float]
+    left: float
+    sink: float
+    towards: float
+    room: float
+    over: float = math.nan
 
 
 def touchdown_findings(
@@ -41,60 +75,86 @@ def touchdown_findings(
     if ground.left >= len(ground.track) - 1:
         reason = "the flight did not get to its landing"
         return [make_finding("touchdown", place, ok=None, reason=reason, unit="m")]
+    over = math.nan if terrain is None else float(approach.point[2] - terrain.height(*approach.point[:2]))
+    if terrain is None or math.isnan(over):
+        reason = "the ground at the landing point is not known"
+        return [make_finding("touchdown", place, ok=None, reason=reason, unit="m")]
     k = _touched(track, terrain)
-    if k is None or terrain is None:
-        fault = message("the aircraft did not touch down", f" at {place_of(approach)}")
+    if k is None:
+        fault = message("the aircraft did not touch down", f" at {_place_of(approach)}")
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
-    along, aside = (float(value) for value in approach.place(np.asarray(track.position[k], dtype=np.float64)))
-    stop, off = (float(value) for value in approach.place(np.asarray(track.position[-1], dtype=np.float64)))
-    left = 0.5 * approach.strip.length - stop
-    faults = _off_strip(approach, (along, aside), (stop, off))
-    position = np.asarray(track.position, dtype=np.float64)
-    step = np.diff(position[:, :2], axis=0)
-    entered = entered_by_way(
-        requirements, Way(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
-    )
-    if entered:
+    landing = _measured(requirements, track, terrain, approach, k)._replace(over=over)
+    faults = _amiss(approach, landing)
+    if entered := entered_by_way(requirements, track_way(track)):
         faults.append(message(f"the final enters {entered}"))
+    return [_finding(place, approach, landing, faults)]
+
+
+def _measured(requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, k: int) -> _Landing:
+    """The numbers of a landing that touches down at a row, but for the height of its point."""
+    position = np.asarray(track.position, dtype=np.float64)
+    along, aside = _pair(approach.place(position[k]))
+    touch, stop = (_pair(approach.on_strip(position[row])) for row in (k, -1))
     sink, towards = _sinks(track, terrain, approach, k)
+    return _Landing(
+        along=along,
+        aside=aside,
+        touch=touch,
+        stop=stop,
+        left=0.5 * approach.strip.length - stop[0],
+        sink=sink,
+        towards=towards,
+        room=_final_room(requirements, position, terrain, approach),
+    )
+
+
+def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[Message]) -> Finding:
+    """The finding: what fails, or else what is open, or else what is not known."""
+    open_ = [] if faults else _left_open(approach, landing)
+    said = faults or open_
     inside = 0.5 * approach.strip.length - TOUCH_ERROR
-    return [
-        make_finding(
-            "touchdown",
-            place,
-            ok=not faults,
-            reason=reason_of(faults, _described(approach, (along, aside), (stop, left), (sink, towards))),
-            faults=faults,
-            flown=max(stop, abs(along)),
-            limit=inside,
-            source="scenario",
-            tolerance=0.0,
-            margin=inside - max(stop, abs(along)),
-            unit="m",
-            method="contact of skids or wheels with the ground, from the flown track",
-            facts=(
-                Fact("along", along, "m"),
-                Fact("aside", aside, "m"),
-                Fact("sink", sink, "m/s"),
-                Fact("sink towards the ground", towards, "m/s"),
-                Fact("strip left", left, "m"),
-            ),
-        )
-    ]
+    farthest = max(landing.stop[0], abs(landing.touch[0]))
+    return make_finding(
+        "touchdown",
+        place,
+        ok=False if faults else None if open_ or math.isnan(landing.room) else True,
+        reason=reason_of(said, _described(approach, landing)),
+        faults=said,
+        flown=farthest,
+        limit=inside,
+        source="scenario",
+        tolerance=0.0,
+        margin=inside - farthest,
+        unit="m",
+        method="contact of skids or wheels with the ground, from the flown track",
+        check=GROUND_WAY if open_ else "",
+        facts=(
+            Fact("along", landing.along, "m"),
+            Fact("aside", landing.aside, "m"),
+            Fact("sink", landing.sink, "m/s"),
+            Fact("sink towards the ground", landing.towards, "m/s"),
+            Fact("strip left", landing.left, "m"),
+            Fact("final above ground", landing.room, "m"),
+        ),
+    )
 
 
-def place_of(approach: Approach) -> str:
+def _place_of(approach: Approach) -> str:
     """The landing point in words."""
     return f"item {approach.item}"
 
 
-def _touched(track: Track, terrain: Terrain | None) -> int | None:
+def _pair(values: tuple[Floats, Floats]) -> tuple[float, float]:
+    return float(values[0]), float(values[1])
+
+
+def _touched(track: Track, terrain: Terrain) -> int | None:
     """The row at which the aircraft first stands as low over the ground as it does at rest; None for none."""
-    if terrain is None or not len(track):
+    if not len(track):
         return None
-    up = np.asarray(track.position[:, 2], dtype=np.float64)
-    under = np.array([float(terrain.height(east, north)) for east, north in track.position[:, :2].tolist()])
-    over, speed = up - under, np.hypot(*np.asarray(track.velocity[:, :2], dtype=np.float64).T)
+    position = np.asarray(track.position, dtype=np.float64)
+    over = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+    speed = np.hypot(*np.asarray(track.velocity[:, :2], dtype=np.float64).T)
     # It stands where it has come to rest; a flight that ended otherwise has not landed.
     if not speed[-1] < 1.0:
         return None
@@ -113,17 +173,30 @@ def _sinks(track: Track, terrain: Terrain, approach: Approach, k: int) -> tuple[
     return -up, -up + rise * over_ground
 
 
-def _off_strip(approach: Approach, touch: tuple[float, float], stop: tuple[float, float]) -> list[Message]:
-    """What of the landing is not on the strip, whose middle is the landing point.
+def _final_room(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
+    """Least height above ground until the flare may begin, or the aircraft may touch down: m, as of `_Landing.room`."""
+    up = float(approach.point[2])
+    glide = requirements.setup.autopilot.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
+    flares = glide.flare_distance + max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope
+    until = int(np.searchsorted(approach.place(position)[0], -max(EARLY_TOUCH, flares)))
+    if until < 2:
+        return math.inf
+    low, _ = path_clearance(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(position[:until]))
+    return float(low.min())
 
-    touch, stop: how far beyond the landing point and to the right of it, m.
-    """
+
+def _amiss(approach: Approach, landing: _Landing) -> list[Message]:
+    """What of the landing is not on the strip, or not on the ground."""
     half, side = 0.5 * approach.strip.length, 0.5 * approach.strip.width
+    touch, stop = landing.touch, landing.stop
     faults = []
+    if -landing.over > POINT_ERROR:
+        brief = f"the landing point of {_place_of(approach)} is {-landing.over:.0f} m below the ground"
+        faults.append(message(brief, ": the aircraft meets it before it flares"))
     if abs(touch[0]) > half - TOUCH_ERROR:
         where = "before" if touch[0] < 0.0 else "beyond"
-        brief = f"touches down {abs(touch[0]):.0f} m {where} the landing point"
-        faults.append(message(brief, f"; {half - TOUCH_ERROR:.0f} m are allowed on this strip"))
+        brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's middle"
+        faults.append(message(brief, f"; {max(0.0, half - TOUCH_ERROR):.0f} m are allowed on this strip"))
     if stop[0] > half - TOUCH_ERROR:
         brief = f"comes to rest {half - stop[0]:.0f} m before the strip's end"
         if stop[0] > half:
@@ -135,14 +208,32 @@ def _off_strip(approach: Approach, touch: tuple[float, float], stop: tuple[float
     return faults
 
 
-def _described(
-    approach: Approach, touch: tuple[float, float], stop: tuple[float, float], sinks: tuple[float, float]
-) -> list[str]:
-    """The landing in words; sinks: as `_sinks` gives them."""
-    before = "before" if touch[0] < 0.0 else "beyond"
-    known = [f"touches down {abs(touch[0]):.0f} m {before} the landing point, {abs(touch[1]):.1f} m aside"]
-    known.append(f"comes to rest with {stop[1]:.0f} m of the strip left")
-    known.append(f"sinks at {sinks[0]:.1f} m/s, {sinks[1]:.1f} m/s towards the ground, by a flare that is not judged")
+def _left_open(approach: Approach, landing: _Landing) -> list[Message]:
+    """What may be amiss with the landing, by what the law does not know so well."""
+    found = []
+    if landing.over > POINT_ERROR:
+        brief = f"the landing point of {_place_of(approach)} is {landing.over:.0f} m above the ground"
+        found.append(message(brief, ": it flares too early, and falls"))
+    if landing.room < FINAL_ROOM:
+        brief = f"the final passes the ground by {landing.room:.1f} m"
+        found.append(message(brief, f", and may be flown {FINAL_ROOM:.0f} m lower than by the law"))
+    if landing.towards > TOUCH_SINK:
+        brief = f"sinks at {landing.towards:.1f} m/s towards the ground at its touch-down"
+        found.append(message(brief, f"; up to {TOUCH_SINK:g} m/s are known of ArduPlane's landings"))
+    return found
+
+
+def _described(approach: Approach, landing: _Landing) -> list[str]:
+    """The landing in words."""
+    before = "before" if landing.along < 0.0 else "beyond"
+    known = [f"touches down {abs(landing.along):.0f} m {before} the landing point, {abs(landing.aside):.1f} m aside"]
+    known.append(f"comes to rest with {landing.left:.0f} m of the strip left")
+    sinks = f"sinks at {landing.sink:.1f} m/s, {landing.towards:.1f} m/s towards the ground"
+    known.append(f"{sinks}, by a flare that is not judged")
+    if math.isnan(landing.room):
+        known.append("the ground below the final is not known")
+    elif math.isfinite(landing.room):
+        known.append(f"the final stays {landing.room:.0f} m above ground or more")
     if approach.tail_wind > 0.1:
         known.append(f"with {approach.tail_wind:.1f} m/s of tail wind")
     return known
@@ -151,10 +242,20 @@ def _described(
 RULE = Rule(
     name="touchdown",
     title="touchdown",
-    asks="Does the aircraft touch down and come to rest on the strip, without entering anything on its final?",
+    asks="Does the aircraft touch down and come to rest on the strip, on a final free of ground, missiles and zones?",
     margin=Margin("strip", "m", 20.0),
-    tolerances=("TOUCH_ERROR", "TOUCHED", "ROUNDING"),
+    tolerances=(
+        "TOUCH_ERROR",
+        "TOUCHED",
+        "TOUCH_SINK",
+        "EARLY_TOUCH",
+        "FINAL_ROOM",
+        "ABOVE_FLARE",
+        "POINT_ERROR",
+        "ROUNDING",
+    ),
     judge=touchdown_findings,
     phrase=lambda item: located("touchdown", item, shortened(item.brief)),
+    unjudged="touchdown",
     explained=True,
 )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.mission.ground_ways import USUAL_PITCH, airborne_route
-from flight.mission.items import Command, Mission, MissionItem
+from flight.mission.items import Command, Frame, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
 from tests.flight.autopilots.arduplane.flown_grounds import circuit, make_ground_setup
 from world.airfield import LandingStrip, Launch
@@ -90,6 +90,18 @@ def test_the_route_in_the_air_begins_where_the_take_off_ended_and_ends_before_th
     assert route.items.tolist() == [1, 2, 3, 4]
     assert np.array_equal(route.waypoints[1:], setup.route.waypoints[1:4])
     assert not any("not flown to the ground" in note for note in route.notes)
+
+
+def test_a_rally_point_of_another_continent_keeps_nobody_on_the_ground() -> None:
+    """Notes beside the verdict name it; what is launched does not depend on it."""
+    setup = circuit(RAIL, STRIP)
+    far = MissionItem(1, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL), (0.0,) * 4, -36.5, 84.2, 100.0)
+    moved = make_ground_setup(setup.scenario, replace(setup.mission, rally=(far,)))
+    before, after = setup.ground_ways.take_off, moved.ground_ways.take_off
+    assert before is not None
+    assert after is not None
+    assert after.home.tolist() == before.home.tolist()
+    assert any("km from the map's origin" in note for note in moved.route.notes)
 
 
 def test_a_take_off_item_with_a_place_of_its_own_goes_on_from_there() -> None:

@@ -11,7 +11,7 @@ from flight.autopilots.catalog import restore_autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from tests.flight.autopilots.arduplane.flown_grounds import circuit, fly
-from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
+from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved, with_hole
 from world.airfield import Launch
 
 
@@ -32,9 +32,18 @@ def test_a_flight_whose_motor_never_started_says_so_and_not_that_it_landed_badly
     flown = fly(circuit(Launch("catapult", 1.5, 10.0, 6.0, 0.14), STRIP, TKOFF_THR_MINACC=15.0))
     one = found(flown.setup, flown.track, "launch", flown.flight.ended)
     assert one.ok is False
-    assert "the motor does not start" in one.reason
+    assert "less than TKOFF_THR_MINACC 15: the motor never starts" in one.reason
     assert "short of 60 m" in one.reason
     assert found(flown.setup, flown.track, "touchdown", flown.flight.ended).ok is None
+
+
+def test_a_climb_over_unknown_ground_is_not_judged() -> None:
+    flown = flown_circuit()
+    setup = with_hole(flown.setup, 150.0, 0.0)
+    one = found(setup, flown.track, "launch")
+    assert one.ok is None
+    assert "the ground below the climb is not known" in one.reason
+    assert judge_flight(setup, flown.track, "completed").headline == "flyable; launch not judged"
 
 
 def test_a_climb_through_a_zone_fails_and_one_beside_it_does_not() -> None:

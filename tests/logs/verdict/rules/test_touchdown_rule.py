@@ -8,7 +8,7 @@ import pytest
 
 from logs.verdict.judge_flight import judge_flight
 from tests.flight.autopilots.arduplane.flown_grounds import circuit, fly, fly_kept
-from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found
+from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, with_hole
 from world.airfield import LandingStrip
 
 
@@ -66,8 +66,32 @@ def test_a_final_through_a_zone_fails() -> None:
     assert "the final enters town" in one.reason
 
 
-def test_a_strip_that_points_elsewhere_is_no_matter_the_course_is_the_leg_s() -> None:
+@pytest.mark.parametrize(("course", "ok"), [(270.0, True), (90.0, True), (0.0, False), (180.0, False)])
+def test_a_strip_lies_along_its_stated_course_and_may_be_landed_on_either_way(course: float, ok: bool) -> None:
+    """The circuit lands to the west, and slides tens of metres: across a strip of 40 m that is beside it."""
     flown = flown_circuit()
-    strip = LandingStrip(500.0, 600.0, course=math.radians(10.0), length=600.0)
-    setup = flown.setup.in_scenario(replace(flown.setup.scenario, landing=strip))
-    assert found(setup, flown.track, "touchdown").ok is True
+    strip = LandingStrip(500.0, 600.0, course=math.radians(course), length=600.0)
+    one = found(flown.setup.in_scenario(replace(flown.setup.scenario, landing=strip)), flown.track, "touchdown")
+    assert one.ok is ok, one.reason
+    if course == 90.0:
+        known = {fact.what: fact.value for fact in one.facts}
+        assert known["strip left"] == pytest.approx(300.0 - (500.0 - flown.track.position[-1, 0]), abs=0.1)
+
+
+@pytest.mark.parametrize(("east", "north", "fault"), [(-500.0, 600.0, "before the strip's"), (500.0, 560.0, "beside")])
+def test_a_mission_that_lands_beside_the_strip_fails(east: float, north: float, fault: str) -> None:
+    """What the scenario says can be landed on is where it says, wherever the landing item is."""
+    flown = flown_circuit()
+    strip = LandingStrip(east, north, length=600.0)
+    one = found(flown.setup.in_scenario(replace(flown.setup.scenario, landing=strip)), flown.track, "touchdown")
+    assert one.ok is False
+    assert fault in one.brief
+
+
+def test_a_final_over_unknown_ground_is_not_judged() -> None:
+    flown = flown_circuit()
+    setup = with_hole(flown.setup, 900.0, 600.0)
+    one = found(setup, flown.track, "touchdown")
+    assert one.ok is None
+    assert "the ground below the final is not known" in one.reason
+    assert judge_flight(setup, flown.track, "completed").headline == "flyable; touchdown not judged"

@@ -1,5 +1,6 @@
-"""How gently a launch may push, how much height it may lose, how near the ground it may climb."""
+"""How gently a launch may push, how much runway and height it may take, how near the ground it may climb."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,8 +8,10 @@ import pytest
 
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.places import Place
+from tests.flight.autopilots.arduplane.flown_grounds import circuit, make_ground_setup
 from tests.logs.verdict.judging import of
-from tests.logs.verdict.rules.flown_circuits import RAIL, flown_circuit, found, moved
+from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
+from world.airfield import Launch
 
 
 @pytest.mark.parametrize(("speed", "ok"), [(13.42, True), (13.41, False)])
@@ -26,6 +29,20 @@ def test_a_metre_of_height_may_be_lost(lost: float, ok: bool) -> None:
     row = 30
     sunk = moved(flown.track, slice(row, row + 1), up=first - lost - float(flown.track.position[row, 2]))
     assert found(flown.setup, sunk, "launch").ok is ok
+
+
+@pytest.mark.parametrize(("length", "ok"), [(110.2, True), (109.8, False)])
+def test_ten_metres_of_a_runway_are_left_where_the_aircraft_leaves_it(length: float, ok: bool) -> None:
+    """It stands 0.2 m high as far as 100 m from home, and climbs from there on."""
+    flown = flown_circuit()
+    position = np.array(flown.track.position)
+    row = int(np.argmax(position[:, 0] > 100.0))
+    position[: row + 1, 2] = 0.2
+    runway = Launch("runway", math.radians(90.0), length=length + float(position[row, 0]) - 100.0)
+    one = found(circuit(runway, STRIP), replace(flown.track, position=position), "launch")
+    assert one.ok is ok, one.reason
+    if not ok:
+        assert one.brief == f"leaves the ground {position[row, 0]:.0f} m from home"
 
 
 @pytest.mark.parametrize(("up", "ok"), [(2.02, True), (1.98, False)])
@@ -52,3 +69,19 @@ def test_the_legs_near_the_ground_need_twenty_metres(leg: int, up: float, ok: bo
     low = moved(track, slice(row, row + 1), up=up - float(track.position[row, 2]))
     verdict = judge_flight(flown.setup, low, "completed")
     assert of(verdict, "clearance", Place("leg", leg)).ok is ok
+
+
+@pytest.mark.parametrize(("away", "ok"), [(1990.0, True), (2010.0, False)])
+def test_within_two_kilometres_of_home_a_leg_is_near_the_ground(away: float, ok: bool) -> None:
+    """Of a circuit whose way east is half as long again: 25 m above ground, where the scenario asks for 60 m."""
+    flown = flown_circuit()
+    mission, position = flown.setup.mission, np.array(flown.track.position)
+    assert mission.home is not None
+    west = mission.home.lon_deg
+    items = tuple(replace(one, lon_deg=west + 1.5 * (one.lon_deg - west)) for one in mission.items)
+    position[:, 0] *= 1.5
+    row = int(np.argmax(position[:, 0] > away))
+    position[row : row + 2, 2] = 25.0
+    setup = make_ground_setup(flown.setup.scenario, replace(mission, items=items), TKOFF_THR_MINACC=15.0)
+    verdict = judge_flight(setup, replace(flown.track, position=position), "completed")
+    assert of(verdict, "clearance", Place("leg", 0)).ok is ok

@@ -1,11 +1,13 @@
-"""How far from its landing point an aircraft may touch down and stop, by the strip's length and width."""
+"""How far from the strip's middle an aircraft may touch down and stop, and what of its final leaves that open."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.logs.verdict.rules.flown_circuits import STRIP, flown_circuit, found, moved
+from logs.verdict.findings import GROUND_WAY, Finding
+from tests.flight.autopilots.arduplane.flown_grounds import circuit
+from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
 
 
 def on_strip(**strip: float) -> bool | None:
@@ -43,3 +45,61 @@ def test_two_centimetres_over_where_it_stands_it_has_touched_down(over: float, s
     low = moved(track, slice(row, row + 1), up=standing + over - float(track.position[row, 2]))
     facts = {fact.what: fact.value for fact in found(flown.setup, low, "touchdown").facts}
     assert (facts["along"] < known("along") - 1.0) is same
+
+
+def final_row(before: float) -> int:
+    """The row of the landing so far before its point, m; it lands to the west, at 500 m east."""
+    track = flown_circuit().track
+    east, north = track.position[:, 0], track.position[:, 1]
+    return int(np.argmax((track.time > 60.0) & (north > 500.0) & (east < 500.0 + before)))
+
+
+def with_low_final(before: float, up: float) -> Finding:
+    """Of the landing with one row at a height, over ground at 0 m."""
+    flown, row = flown_circuit(), final_row(before)
+    low = moved(flown.track, slice(row, row + 1), up=up - float(flown.track.position[row, 2]))
+    return found(flown.setup, low, "touchdown")
+
+
+@pytest.mark.parametrize(("up", "ok"), [(3.01, True), (2.99, None)])
+def test_a_final_within_three_metres_of_the_ground_is_left_open(up: float, ok: bool | None) -> None:
+    one = with_low_final(400.0, up)
+    assert one.ok is ok, one.reason
+    if ok is None:
+        assert (one.check, one.brief) == (GROUND_WAY, "the final passes the ground by 3.0 m")
+
+
+@pytest.mark.parametrize(("more", "ok"), [(2.0, None), (-2.0, True)])
+def test_from_fifteen_metres_over_the_point_on_it_may_flare(more: float, ok: bool | None) -> None:
+    """The glide's distance to where it is 15 m over the point, by its slope and where its flare begins."""
+    setup = flown_circuit().setup
+    approach = setup.ground_ways.approach
+    assert approach is not None
+    glide = setup.autopilot.landing_glide(approach.begin, approach.run, approach.tail_wind, 0.0)
+    before = glide.flare_distance + (15.0 - glide.flare_height) / glide.slope
+    assert with_low_final(before + more, 2.0).ok is ok
+
+
+@pytest.mark.parametrize(("point", "ok"), [(9.98, True), (10.02, None), (-9.98, True), (-10.02, False)])
+def test_a_landing_point_is_within_ten_metres_of_the_ground(point: float, ok: bool | None) -> None:
+    """Of one that is higher the elevation file or home may be wrong; into a lower one the aircraft flies."""
+    setup = circuit(RAIL, STRIP, point=point, TKOFF_THR_MINACC=15.0)
+    one = found(setup, flown_circuit().track, "touchdown")
+    assert one.ok is ok, one.reason
+    assert (one.check == GROUND_WAY) is (ok is None)
+    if ok is not True:
+        assert one.brief == f"the landing point of item 5 is 10 m {'above' if point > 0.0 else 'below'} the ground"
+
+
+@pytest.mark.parametrize(("sink", "ok"), [(4.99, True), (5.01, None)])
+def test_a_sink_beyond_all_that_was_seen_is_left_open(sink: float, ok: bool | None) -> None:
+    flown = flown_circuit()
+    track = flown.track
+    down = int(np.argmax((track.time > 60.0) & (track.clearance <= track.clearance[-1] + 0.02)))
+    velocity = np.array(track.velocity)
+    velocity[down - 5 : down + 1, 2] = -sink
+    one = found(flown.setup, replace(track, velocity=velocity), "touchdown")
+    assert one.ok is ok, one.reason
+    if ok is None:
+        assert one.check == GROUND_WAY
+        assert one.brief == "sinks at 5.0 m/s towards the ground at its touch-down"
