@@ -159,9 +159,9 @@ class ReturnsAnswer:
     no_return_s: float | None
     engine_out: GlidesEntry
     suggestions: list[ReturnSuggestion]
-    files: list[str]
-    """Pictures that were written."""
     """Of --suggest."""
+    files: list[str]
+    """What --out wrote: pictures, map and log."""
     notes: list[str]
 
 

@@ -162,7 +162,8 @@ def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
         for band in footprint.bands()
         for role in [BAND_ROLES[band.up_to]]
     ]
-    return [*found, shape("flat ground by the elevation file", "landable", footprint.landings())]
+    flat = footprint.landings()
+    return [*found, *([shape("flat ground by the elevation file", "landable", flat)] if flat else [])]
 
 
 def _geographic(setup: FlightSetup, ring: Floats) -> Floats:

@@ -163,3 +163,9 @@ def test_returns_have_the_colours_of_what_they_come_to(tmp_path: Path) -> None:
     longitudes = [float(point.split(",")[0]) for point in ring.split()]
     assert min(longitudes) < 8.0 < max(longitudes)
     assert near.find(f".//{KML}extrude") is None
+    # Where nothing is flat there is no shape of it.
+    footprint = drawn.glides.footprint
+    assert footprint is not None
+    steep = dataclasses.replace(footprint, flat=np.zeros_like(footprint.flat))
+    glides = dataclasses.replace(drawn.glides, footprint=steep)
+    assert len(glide_shapes(setup, dataclasses.replace(drawn, glides=glides))) == len(shapes) - 1
