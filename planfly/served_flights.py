@@ -54,7 +54,7 @@ from planfly.reference_flights import judge_with_reference_flights
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import end_with_parent
-from world.scenario import Scenario, at_time, load_scenario, with_flight
+from world.scenario import Scenario, at_time, in_the_air, load_scenario, with_flight
 
 Floats = NDArray[np.float64]
 
@@ -207,7 +207,8 @@ class ServedFlights:
         else:
             items = (_circled(begin, request.place),)
         mission = replace(request.mission, items=(begin, *items), source=MODE_NAMES[request.mode])
-        setup = make_setup(served.scenario, self._airframe, mission, served.seed)
+        # Whoever is in the air goes on there, and lands nowhere.
+        setup = make_setup(in_the_air(served.scenario), self._airframe, mission, served.seed)
         return PreparedFlight(setup, LocalMap.around(setup))
 
     def open_log(self, setup: FlightSetup, mode: int) -> "ServedLog":

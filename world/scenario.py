@@ -469,6 +469,19 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 
 
+def in_the_air(scenario: Scenario) -> Scenario:
+    """A scenario whose flights begin and end in the air, whatever launch and strip it has.
+
+    >>> field = in_the_air(load_scenario("jacksboro-field"))
+    >>> field.launch, field.landing, "landing" in field.to_json()
+    (None, None, False)
+    """
+    if scenario.launch is None and scenario.landing is None:
+        return scenario
+    spec = scenario.spec.model_copy(update={"launch": None, "landing": None})
+    return replace(scenario, spec=spec, launch=None, landing=None)
+
+
 def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, notes: Sequence[str] = ()) -> Scenario:
     """A scenario with more zones, those that are near; source: names them in messages.  notes: on their file.
 

@@ -111,6 +111,23 @@ def test_an_upload_with_a_fence_that_is_none_cannot_be_flown(options: ServeOptio
     assert "fence item 0: radius 0 m: must be above 0" in judged.texts[0].text
 
 
+def test_a_diverted_flight_lands_nowhere_whatever_strip_there_is(options: ServeOptions, tmp_path: Path) -> None:
+    """What goes on in the air is flown, and judged, as what ends there."""
+    strip = '[home]\nplace = "start"\n[landing]\neast_m = 2500\nnorth_m = 0\n[flight]\nautopilot = "ardupilot"\n'
+    (tmp_path / "field.toml").write_text(FIELD + strip, encoding="utf-8")
+    way = mission(options, (0.0, 0.0, 100.0), (1000.0, 0.0, 100.0), (1900.0, 0.0, 55.0))
+    lat, lon = (float(value) for value in to_geo(open_served(options).scenario.origin, 2500.0, 0.0))
+    land = MissionItem(4, int(Command.NAV_LAND), int(Frame.GLOBAL), (0.0,) * 4, lat, lon, 0.0)
+    whole = replace(way, items=(*way.items, land))
+    flights = ServedFlights(options)
+    prepared, _ = flights.prepare(JudgeMission(whole, 1))
+    assert prepared is not None
+    assert prepared.setup.ground_ways.approach is not None
+    diverted = flights.divert(DivertFlight(AUTO, whole), np.array([0.0, -300.0, 100.0])).setup
+    assert not diverted.ground_ways
+    assert any("not flown to the ground" in note for note in diverted.notes)
+
+
 def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOptions) -> None:
     flights = ServedFlights(options)
     prepared, _ = flights.prepare(JudgeMission(mission(options, (0.0, 0.0, 150.0), (1500.0, 0.0, 150.0)), 1))

@@ -50,11 +50,14 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     along, aside = approach.place(np.stack([real["east_m"], real["north_m"]], axis=1))
     over = real["amsl_m"] - approach.point[2]
     final = (along < -glide.flare_distance - 10.0) & (along > -approach.run + 100.0)
+    way, off = approach.place(np.asarray(track.position, dtype=np.float64))
     if flight != "d":  # where the last descent was too steep to be flown straight
-        slope = np.polyfit(-along[final], over[final], 1)[0]
-        assert math.degrees(abs(math.atan(slope) - math.atan(glide.slope))) < 0.2
+        own = (way < -glide.flare_distance - 10.0) & (way > -approach.run + 100.0) & (np.abs(off) < 20.0)
+        own &= track.time > 60.0
+        for run, up in ((along[final], over[final]), (way[own], track.position[own, 2])):
+            slope = -np.polyfit(run, up, 1)[0]
+            assert math.degrees(abs(math.atan(slope) - math.atan(glide.slope))) < 0.2
     # The flare begins where the motor is cut.
-    way = approach.place(np.asarray(track.position, dtype=np.float64))[0]
     # As fast as it may be closed, for a fifth of a second.
     closing = track.commands[12:, 3] < track.commands[:-12, 3] - 0.19
     k = int(np.argmax((track.time[:-12] > 60.0) & (way[:-12] > -200.0) & closing))
