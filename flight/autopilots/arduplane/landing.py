@@ -7,7 +7,6 @@ before the point as it flies over the ground while the sink falls to TECS_LAND_S
 (libraries/AP_Landing/AP_Landing_Slope.cpp) in ArduPlane 4.6.
 """
 
-
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.autopilot import LandingGlide
 
