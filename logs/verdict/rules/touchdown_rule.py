@@ -178,7 +178,8 @@ def _final_room(requirements: RouteRequirements, position: Floats, terrain: Terr
     up = float(approach.point[2])
     glide = requirements.setup.autopilot.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
     flares = glide.flare_distance + max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope
-    until = int(np.searchsorted(approach.place(position)[0], -max(EARLY_TOUCH, flares)))
+    near = approach.place(position)[0] > -max(EARLY_TOUCH, flares)
+    until = int(np.argmax(near)) if near.any() else len(position)
     if until < 2:
         return math.inf
     low, _ = path_clearance(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(position[:until]))
