@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 
 Gear = Literal["belly", "wheels"]
 _METRES = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
+_KILOGRAMS = {"KG": 1.0, "LBS": 0.45359237}
 # A model without wheels stands on its lowest points: on those that are at least so deep, as a share of the deepest.
 _SKIDS = 0.75
 
@@ -141,10 +142,27 @@ def _stated(model: bytes) -> list[Contact]:
 
 
 def _centre(model: bytes) -> Floats:
-    """The empty aircraft's centre of gravity where the model counts places from, (3,) m aft, to the right, up."""
-    places = ElementTree.fromstring(model).findall("mass_balance/location")
-    found = [_place(one) for one in places if one.get("name") == "CG"]
-    return found[0] if found and found[0] is not None else np.zeros(3)
+    """The loaded aircraft's centre of gravity where the model counts places from, (3,) m aft, to the right, up.
+
+    Of the empty aircraft, its point masses and what its tanks begin with, as JSBSim adds them up.
+    """
+    root = ElementTree.fromstring(model)
+    empty = [one for one in root.findall("mass_balance/location") if one.get("name") == "CG"]
+    loads = [(root.find("mass_balance/emptywt"), _place(empty[0]) if empty else None)]
+    loads += [(one.find("weight"), _place(one.find("location"))) for one in root.findall("mass_balance/pointmass")]
+    loads += [(one.find("contents"), _place(one.find("location"))) for one in root.findall("propulsion/tank")]
+    carried = [(_mass(weight), place) for weight, place in loads if place is not None]
+    total = sum(mass for mass, _ in carried)
+    if not total > 0.0:
+        return carried[0][1] if carried else np.zeros(3)
+    return np.sum([mass * place for mass, place in carried], axis=0) / total
+
+
+def _mass(weight: ElementTree.Element | None) -> float:
+    """A weight of a model, kg."""
+    if weight is None:
+        return 0.0
+    return _KILOGRAMS.get(weight.get("unit", "LBS"), 1.0) * float(weight.text or "0")
 
 
 def _place(location: ElementTree.Element | None) -> Floats | None:
