@@ -155,7 +155,7 @@ def _centre(model: bytes) -> Floats:
     total = sum(mass for mass, _ in carried)
     if not total > 0.0:
         return carried[0][1] if carried else np.zeros(3)
-    return np.sum([mass * place for mass, place in carried], axis=0) / total
+    return np.asarray(sum(mass * place for mass, place in carried) / total)
 
 
 def _mass(weight: ElementTree.Element | None) -> float:

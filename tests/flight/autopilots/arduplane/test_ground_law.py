@@ -52,8 +52,9 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     final = (along < -glide.flare_distance - 10.0) & (along > -approach.run + 100.0)
     way, off = approach.place(np.asarray(track.position, dtype=np.float64))
     if flight != "d":  # where the last descent was too steep to be flown straight
-        own = (way < -glide.flare_distance - 10.0) & (way > -approach.run + 100.0) & (np.abs(off) < 20.0)
-        own &= track.time > 60.0
+        # As far before the point as ArduPlane's is kept.
+        own = (way < -glide.flare_distance - 10.0) & (way > along[final][0]) & (np.abs(off) < 20.0)
+        own &= track.time > track.time[-1] - 60.0
         for run, up in ((along[final], over[final]), (way[own], track.position[own, 2])):
             slope = -np.polyfit(run, up, 1)[0]
             assert math.degrees(abs(math.atan(slope) - math.atan(glide.slope))) < 0.2
