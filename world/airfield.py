@@ -34,6 +34,9 @@ _INCLINE: dict[LaunchMethod, float] = {
     "hand": math.radians(10.0),
     "runway": 0.0,
 }
+# Steepest ground (m per m) along and across a strip; and this much of it at least is looked at on either, m.
+STEEPEST_STRIP = 0.10
+_LEAST_LOOKED_AT = 60.0
 # A catapult leaves so much of the slowest level flight, as catapults are set; an arm throws at this speed, m/s.
 _CATAPULT_SHARE, _THROW = 1.2, 10.0
 
@@ -124,6 +127,19 @@ class LandingStrip:
         return wind.from_course if math.hypot(*wind.at(amsl)) > 0.0 else None
 
 
+def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[float, float]:
+    """How the ground of a strip rises along a landing course (rad), and across it to the right: m per m, between ends.
+
+    NaN where the ground is not known to the ends.
+    """
+    found = []
+    for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_LEAST_LOOKED_AT, strip.width))):
+        away = 0.5 * length * np.array([-1.0, 1.0])
+        ends = ground.height(strip.east + away * math.sin(heading), strip.north + away * math.cos(heading))
+        found.append(float(ends[1] - ends[0]) / length)
+    return found[0], found[1]
+
+
 @dataclass(frozen=True, slots=True)
 class AskedReturns:
     """What is asked of returns, and what a planned mission sets for them.
@@ -131,11 +147,13 @@ class AskedReturns:
     require: "rtl" among them where every return to launch has to be safe, "glide" where an engine may stop anywhere.
     rtl_altitude: over home, m; None where the scenario sets none.
     rally: (n, 3) east, north, m AMSL.
+    rtl_autoland: ArduPlane's RTL_AUTOLAND; None where the scenario sets none.
     """
 
     require: tuple[ReturnDemand, ...]
     rtl_altitude: float | None
     rally: Floats
+    rtl_autoland: int | None = None
 
     def __post_init__(self) -> None:
         """Lock the array."""
@@ -202,7 +220,7 @@ def make_returns(
         key = f"returns.rally[{k}]"
         points.append(map_position(one, key, source, origin, ground))
         check_above_ground(key, points[-1], source, ground)
-    return AskedReturns(tuple(table.require or ()), table.rtl_altitude_m, np.array(points))
+    return AskedReturns(tuple(table.require or ()), table.rtl_altitude_m, np.array(points), table.rtl_autoland)
 
 
 def _on_ground(key: str, place: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats) -> Floats:

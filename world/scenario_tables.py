@@ -541,17 +541,19 @@ class ReturnsTable(ScenarioTable):
 
     require: "rtl" where every return to launch has to be safe, "glide" where an engine may stop anywhere.
     rtl_altitude_m: over home, that a return climbs or descends to.
+    rtl_autoland: ArduPlane's: 1 for home and on to the landing, 2 for straight to the landing, 3 for a circle at home.
     rally: points that are nearer than home.
     """
 
     require: list[ReturnDemand] | None = None
     rtl_altitude_m: Annotated[float, within(1.0, 9000.0)] | None = None
+    rtl_autoland: Literal[1, 2, 3] | None = None
     rally: Annotated[list[RallyTable], Field(min_length=1, max_length=100)] | None = None
 
     @model_validator(mode="after")
     def _says_something(self) -> "ReturnsTable":
-        if self.require is None and self.rtl_altitude_m is None and self.rally is None:
-            raise ValueError("require: missing; give require, rtl_altitude_m or rally")
+        if all(one is None for one in (self.require, self.rtl_altitude_m, self.rtl_autoland, self.rally)):
+            raise ValueError("require: missing; give require, rtl_altitude_m, rtl_autoland or rally")
         if self.require is not None and len(set(self.require)) < len(self.require):
             raise ValueError(f"require: {', '.join(self.require)}: each is expected once")
         return self

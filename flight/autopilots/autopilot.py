@@ -360,10 +360,10 @@ class Autopilot(ABC):
         """
         return cruise
 
-    def as_asked(self, rtl_altitude: float | None, *, lands: bool) -> "Autopilot":
+    def as_asked(self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool) -> "Autopilot":
         """The autopilot with what a scenario sets of its returns; as it is where it has no parameters for it.
 
-        rtl_altitude: over home, m; None where the scenario leaves it as it is.
+        rtl_altitude: over home, m.  rtl_autoland: ArduPlane's; None where the scenario leaves them as they are.
         lands: whether the scenario's missions end with a landing sequence.
         """
         return self

@@ -44,7 +44,8 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
         allowed = f"{known} is expected{did_you_mean(name, sorted(_LAWS))}"
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
     made, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
-    return made.as_asked(None if returns is None else returns.rtl_altitude, lands=scenario.landing is not None)
+    set_by = (None, None) if returns is None else (returns.rtl_altitude, returns.rtl_autoland)
+    return made.as_asked(*set_by, lands=scenario.landing is not None)
 
 
 def program_autopilot(program: Path) -> type[ProgramAutopilot]:

@@ -34,7 +34,7 @@ from planner.search.pose_chains import (
     measure,
     risen,
 )
-from world.airfield import LandingStrip, Launch
+from world.airfield import STEEPEST_STRIP, LandingStrip, Launch, strip_slopes
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
 from world.terrain import Terrain
@@ -70,8 +70,6 @@ _LINE_UP, _LEAST_LINE_UP = 4.0, 500.0
 # The glide: so near (m) before the point the ground may be met; above ground before, by this share of its height over
 # the point, up to so much (m).
 _EARLY, _GLIDE_SHARE, _GLIDE_ROOM = 60.0, 0.4, 10.0
-# Steepest ground (m per m) along and across a strip.
-STEEPEST_STRIP = 0.10
 # A go-around: least height over home and above ground, m, steps and the highest that is tried, m.
 _GO_AROUND, _GO_AROUND_ROOM, _HEIGHT_STEP, _HIGHEST = 50.0, 30.0, 10.0, 1000.0
 # Share of the wind by which the ground speed is higher that a turn's length is taken for.
@@ -402,11 +400,7 @@ def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent
 
 def _rough(terrain: Terrain, strip: LandingStrip, course: float) -> str:
     """What is wrong with the ground of a strip, in words; "" for nothing."""
-    for name, turned, length in (("along", 0.0, strip.length), ("across", 0.5 * math.pi, max(60.0, strip.width))):
-        away = 0.5 * length * np.array([-1.0, 1.0])
-        heading = course + turned
-        low = terrain.height(strip.east + away * math.sin(heading), strip.north + away * math.cos(heading))
-        slope = float(low[1] - low[0]) / length
+    for name, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
             return "the ground of the strip is not known to its ends"
         if abs(slope) > STEEPEST_STRIP:

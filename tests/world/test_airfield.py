@@ -26,6 +26,7 @@ FIELD: dict[str, Any] = {
     "returns": {
         "require": ["rtl"],
         "rtl_altitude_m": 180.0,
+        "rtl_autoland": 3,
         "rally": [
             {"east_m": 0.0, "north_m": 0.0, "height_m": 100.0},
             {"east_m": 900.0, "north_m": 1.0, "amsl_m": 700.0},
@@ -57,7 +58,7 @@ def test_the_tables_become_places_courses_and_heights() -> None:
     )  # fmt: skip
     returns = scenario.returns
     assert returns is not None
-    assert (returns.require, returns.rtl_altitude) == (("rtl",), 180.0)
+    assert (returns.require, returns.rtl_altitude, returns.rtl_autoland) == (("rtl",), 180.0, 3)
     assert returns.rally == pytest.approx(np.array([[0.0, 0.0, hill(0.0, 0.0) + 100.0], [900.0, 1.0, 700.0]]), abs=0.5)
     for array in (scenario.home, returns.rally):
         with pytest.raises(ValueError, match="read-only"):
@@ -78,7 +79,7 @@ def test_what_is_not_stated_is_left_to_the_method() -> None:
     assert scenario.landing == LandingStrip(0.0, 0.0, None, 200.0, 40.0, None, None)
     assert scenario.returns is not None
     assert scenario.returns.rally.shape == (0, 3)
-    assert scenario.returns.rtl_altitude is None
+    assert (scenario.returns.rtl_altitude, scenario.returns.rtl_autoland) == (None, None)
     inclines = [field(launch={"method": one}).launch for one in ("catapult", "runway")]
     assert [one and one.incline for one in inclines] == [math.radians(12.0), 0.0]
 
@@ -141,7 +142,10 @@ CASES = {
     "a narrow strip": (LAND + "width_m = 4", "landing.width_m: 4: allowed 5..500"),
     "a short final": (LAND + "approach_m = 9", "approach_m: 9: allowed 200..5000"),
     "a flat glide": (LAND + "slope_deg = 0.5", "slope_deg: 0.5: allowed 1..20"),
-    "returns that ask nothing": ("[returns]", "returns: require: missing; give require, rtl_altitude_m or rally"),
+    "returns that ask nothing": (
+        "[returns]", "returns: require: missing; give require, rtl_altitude_m, rtl_autoland or rally",
+    ),
+    "a return that does not arm": ("[returns]\nrtl_autoland = 0", "returns.rtl_autoland: 0: Input should be 1, 2 or 3"),
     "a return underground": ("[returns]\nrtl_altitude_m = -1", "returns.rtl_altitude_m: -1: allowed 1..9000"),
     "rally without a height": (
         "[returns]\nrally = [{east_m = 0, north_m = 0}]",

@@ -152,15 +152,17 @@ class ArduPlane(Autopilot):
         """By TECS_LAND_ARSPD, or AIRSPEED_CRUISE and AIRSPEED_MIN, and LAND_WIND_COMP."""
         return landing_airspeed(self.parameters, tail_wind) * self.airspeed_factor(amsl)
 
-    def as_asked(self, rtl_altitude: float | None, *, lands: bool) -> Autopilot:
-        """With RTL_ALTITUDE, and RTL_AUTOLAND 1 where nobody's file states it: 0 refuses to arm with DO_LAND_START.
+    def as_asked(self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool) -> Autopilot:
+        """With RTL_ALTITUDE and RTL_AUTOLAND, and the latter 1 where nobody states it: 0 does not arm with a landing.
 
-        >>> made = ArduPlane(default_parameters()).as_asked(180.0, lands=True)
+        >>> made = ArduPlane(default_parameters()).as_asked(180.0, None, lands=True)
         >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland
         (180.0, 1.0)
         """
         values = {} if rtl_altitude is None else {"RTL_ALTITUDE": rtl_altitude}
-        if lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in self.parameters.by_origin("file"):
+        if rtl_autoland is not None:
+            values["RTL_AUTOLAND"] = float(rtl_autoland)
+        elif lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in self.parameters.by_origin("file"):
             values["RTL_AUTOLAND"] = 1.0
         return ArduPlane(self.parameters.changed(**values)) if values else self
 

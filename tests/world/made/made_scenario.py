@@ -53,7 +53,8 @@ def same_scenario(a: Scenario, b: Scenario) -> bool:
     if a.home is not None and b.home is not None:
         arrays.append((a.home, b.home))
     if a.returns is not None and b.returns is not None:
-        same = same and a.returns.require == b.returns.require and a.returns.rtl_altitude == b.returns.rtl_altitude
+        asked = [(one.require, one.rtl_altitude, one.rtl_autoland) for one in (a.returns, b.returns)]
+        same = same and asked[0] == asked[1]
         arrays.append((a.returns.rally, b.returns.rally))
     if a.terrain is not None and b.terrain is not None:
         arrays += [(a.terrain.heights, b.terrain.heights), (a.terrain.to_pixel.rows(), b.terrain.to_pixel.rows())]
