@@ -1,8 +1,8 @@
 """What of a mission's ground ends and returns will not do as it stands: a note for people each.
 
 Whether an aircraft hits something is for the verdict.  These are what a pilot finds out on the field: wind from behind,
-a home that is somewhere else, a rally point in the ground or out of reach, a return below the hills about home, and a
-landing sequence that keeps an autopilot from arming.
+a home that is somewhere else, a rally point in the ground or out of reach, a return below the hills about home, a
+landing sequence that keeps an autopilot from arming, and the ground that a mission lands on without a stated strip.
 """
 
 import math
@@ -15,6 +15,7 @@ from flight.mission.items import Command, Mission
 from flight.mission.placing import return_places
 from flight.mission.return_path import ReturnPlace, ReturnRules
 from flight.mission.route import Route
+from world.airfield import STEEPEST_STRIP, LandingStrip, strip_slopes
 from world.errors import MissionError
 from world.frames import to_map
 from world.geometry import leg_courses
@@ -52,6 +53,7 @@ def field_notes(
         *_rally(places[1:], route, scenario, rules),
         *_low_return(places[:1], scenario, rules),
         *_not_armed(mission, parameters),
+        *_landed_on(mission, route, scenario),
     )
 
 
@@ -125,3 +127,29 @@ def _not_armed(mission: Mission, parameters: Mapping[str, float]) -> Iterator[st
     marks = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
     if marks and parameters.get("RTL_AUTOLAND") == 0.0:
         yield f"item {marks[0]}: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"
+
+
+def _landed_on(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
+    """What is known of the ground where a mission lands whose scenario states no strip."""
+    last = int(route.items[-1])
+    lands = any(item.seq == last and item.command == Command.NAV_LAND for item in mission.items)
+    if scenario.landing is not None or not lands:
+        return
+    course, (east, north) = float(leg_courses(route.waypoints)[-1]), route.waypoints[-1, :2].tolist()
+    wind = ""
+    if not math.isnan(route.landing_ground):
+        tail = scenario.wind.along(course, route.landing_ground)[0]
+        wind = f", with {tail:.1f} m/s of wind from behind" if tail > CALM else wind
+        wind = f", against {-tail:.1f} m/s of wind" if tail < -CALM else wind
+    ground = "the ground there is not known"
+    strip = LandingStrip(east, north)
+    slopes = (math.nan, math.nan)
+    if scenario.terrain is not None:
+        slopes = strip_slopes(scenario.terrain, strip, course)
+    if not any(math.isnan(one) for one in slopes):
+        along, across = (f"{'rises' if one >= 0.0 else 'falls'} by {abs(one):.1%}" for one in slopes)
+        ground = f"over {strip.length:.0f} m about its point the ground {along} along it, and {across} to the right"
+        if max(abs(one) for one in slopes) > STEEPEST_STRIP:
+            ground += f" ({STEEPEST_STRIP:.0%} is the most that a plan lands on)"
+    unknown = "no [landing] states its strip: touch-down and way to rest are not judged"
+    yield f"item {last}: lands on {math.degrees(course) % 360.0:.0f}°{wind}; {ground}; {unknown}"

@@ -37,11 +37,45 @@ def notes(
     setup = setup_of(*lines, home=home)
     changes |= {} if ground is None else {"terrain": ground}
     scenario: Scenario = replace(setup.scenario, **changes)
-    return list(field_notes(setup.mission, setup.route, scenario, rules, parameters or {}))
+    found = field_notes(setup.mission, setup.route, scenario, rules, parameters or {})
+    return [one for one in found if ": lands on " not in one]
+
+
+def landed_on(ground: Terrain | None, wind: Wind, landing: LandingStrip | None = None) -> list[str]:
+    """The notes on where `WAY` lands."""
+    setup = setup_of(*WAY, home="36.5 -84.2 100")
+    scenario = replace(setup.scenario, terrain=ground, wind=wind, landing=landing)
+    found = field_notes(setup.mission, setup.route, scenario, USUAL_RULES, {})
+    return [one for one in found if ": lands on " in one]
+
+
+def sloped(east: float, north: float) -> Terrain:
+    """Ground that rises by so much to the east and to the north, m per m, from 100 m at the landing point."""
+    axis = np.arange(-6000.0, 6001.0, 50.0)
+    heights = 100.0 + east * (axis[None, :] - 2500.0) + north * (axis[:, None] - 2000.0)
+    return gridded(heights, axis, axis, source="slope", sha256="", datum="mean sea level")
 
 
 def test_a_mission_in_the_air_has_none() -> None:
     assert notes(*WAY) == []
+
+
+def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
+    """Landed to the east: what rises to the north falls to the right."""
+    (said,) = landed_on(sloped(0.03, 0.02), Wind(4.0, math.radians(90.0)))
+    assert said == (
+        "item 4: lands on 90°, against 4.0 m/s of wind; over 200 m about its point the ground rises by 3.0% along it, "
+        "and falls by 2.0% to the right; no [landing] states its strip: touch-down and way to rest are not judged"
+    )
+    (said,) = landed_on(None, Wind(4.0, math.radians(270.0)))
+    assert "with 4.0 m/s of wind from behind; the ground there is not known; no [landing]" in said
+    assert landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0), LandingStrip(2500.0, 2000.0)) == []
+
+
+@pytest.mark.parametrize(("east", "north", "told"), [(0.099, 0.0, False), (0.101, 0.0, True), (0.0, -0.101, True)])
+def test_ground_that_no_plan_would_land_on_is_told(east: float, north: float, told: bool) -> None:
+    (said,) = landed_on(sloped(east, north), Wind(0.0, 0.0))
+    assert ("(10% is the most that a plan lands on)" in said) is told
 
 
 @pytest.mark.parametrize(("from_deg", "tail"), [(89.0, 0.0), (181.0, 4.0), (180.0, 4.0), (359.0, 0.0)])
@@ -67,7 +101,7 @@ def test_home_far_from_the_launch(north: float, told: bool) -> None:
     assert notes(*WAY, home=_home(0.0, north)) == []
     setup = setup_of(*WAY, home=_home(0.0, north))
     scenario = replace(setup.scenario, home=np.array([0.0, 0.0, 100.0]))
-    said = field_notes(setup.mission, setup.route, scenario, ReturnRules(), {})
+    said = [one for one in field_notes(setup.mission, setup.route, scenario, ReturnRules(), {}) if "home" in one]
     assert bool(said) is told
     assert all(one.startswith("the mission's home is 51 m from the scenario's") for one in said)
 
@@ -127,4 +161,5 @@ def test_a_landing_sequence_that_does_not_arm(value: float | None, told: bool) -
 def test_a_mission_without_home_has_no_return_to_speak_of() -> None:
     setup = setup_of(*WAY)
     nowhere = Mission(None, setup.mission.items)
-    assert field_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {}) == ()
+    found = field_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {})
+    assert [one for one in found if ": lands on " not in one] == []
