@@ -220,6 +220,19 @@ def airborne_route(route: Route, ways: GroundWays, begun: Floats | None) -> Rout
     return moved if ways.approach is None or ways.approach.leg < 1 else part_of_route(moved, 0, ways.approach.leg)
 
 
+def shown_waypoints(route: Route, ways: GroundWays) -> Floats:
+    """A route's waypoints (w, 3) m as pictures and tables show them: with the ends that are flown on the ground there.
+
+    The route itself begins at the height where a take-off ends, and its leg to a landing point is level.
+    """
+    points = np.array(route.waypoints)
+    if ways.take_off is not None:
+        points[ways.take_off.waypoint, 2] = ways.take_off.home[2]
+    if ways.approach is not None:
+        points[ways.approach.leg + 1, 2] = ways.approach.point[2]
+    return points
+
+
 def flown_notes(route: Route, ways: GroundWays) -> tuple[str, ...]:
     """A route's notes without that of a landing which is flown."""
     if ways.approach is None:

@@ -5,18 +5,23 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
-from flight.mission.ground_ways import GroundWays, find_ground_ways, flown_notes
+from flight.mission.ground_ways import GroundWays, find_ground_ways, flown_notes, shown_waypoints
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
 from world.scenario import Scenario
 from world.scenario_tables import Navigation
+
+Floats = NDArray[np.float64]
 
 # ----------------------------------------------------------------------
 # Where a flight is from that was not flown by planfly: an imported log, and what that log can carry.
@@ -259,6 +264,11 @@ class FlightSetup:
     def slowest_launched(self) -> float:
         """Slowest level flight at the route's start, m/s: a launch that states no speed goes by it."""
         return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
+
+    @property
+    def shown_waypoints(self) -> Floats:
+        """The route's waypoints (w, 3) m as pictures and tables show them: flown ends on the ground."""
+        return shown_waypoints(self.route, self.ground_ways)
 
     @property
     def started(self) -> str:

@@ -71,7 +71,7 @@ def draw_scene(view: SceneView) -> Figure:
     narrow = not np.array_equal(bounds, all_of_it)
     terrain = setup.scenario.terrain
     grid = ground_grid(terrain, bounds, _MAX_CELLS)
-    route = setup.route.waypoints
+    route = setup.shown_waypoints
     projection = _projection(route, bounds, exaggeration(setup, bounds, grid), narrow)
     with clean_style():
         figure, axes = _frame(setup, projection, bounds, grid)

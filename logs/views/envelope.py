@@ -75,7 +75,7 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
         flown = flown_moments(track)
         slopes.append(Layer("dots", "flown, moment by moment", "moment", flown.airspeed, flown.angle))
         banks.append(Layer("dots", "flown, moment by moment", "moment", flown.airspeed, flown.bank))
-    legs, asked = np.degrees(leg_slopes(setup.route.waypoints)), np.asarray(setup.route.airspeed)
+    legs, asked = np.degrees(leg_slopes(setup.shown_waypoints)), np.asarray(setup.route.airspeed)
     slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", asked, legs))
     low, high = float(setup.envelope.airspeed[0]), float(setup.envelope.airspeed[-1])
     reach = (low - 0.5, high + 0.5)

@@ -84,7 +84,7 @@ def _paths(subject: Subject) -> dict[str, Any]:
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
-        "route_waypoints": subject.setup.route.waypoints,
+        "route_waypoints": subject.setup.shown_waypoints,
         "track": subject.track,
         "verdict": subject.verdict,
     }

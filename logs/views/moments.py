@@ -66,7 +66,7 @@ def leg_names(setup: FlightSetup) -> list[str]:
 
 def waypoint_names(setup: FlightSetup) -> list[str]:
     """What each waypoint is called, with its mission item and height."""
-    heights = setup.route.waypoints[:, 2].tolist()
+    heights = setup.shown_waypoints[:, 2].tolist()
     return [
         f"{place_text(Place('waypoint', k, item=_known(item)))}\n{heights[k]:.0f} m AMSL"
         for k, item in enumerate(setup.route.items.tolist())

@@ -112,7 +112,7 @@ def scene_data(view: SceneView) -> dict[str, object]:
             for k, name in enumerate(threats.names)
         ],
         **_zone_walls(setup),
-        "plan": np.round(setup.route.waypoints, 1).tolist(),
+        "plan": np.round(setup.shown_waypoints, 1).tolist(),
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
     }
 

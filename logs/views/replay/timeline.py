@@ -142,7 +142,8 @@ def _start(log: FlightLog) -> TimelineEntry:
 
 def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     route = log.setup.route
-    courses, runs, slopes = leg_courses(route.waypoints), leg_runs(route.waypoints), leg_slopes(route.waypoints)
+    points = log.setup.shown_waypoints
+    courses, runs, slopes = leg_courses(points), leg_runs(points), leg_slopes(points)
     entries = []
     for group in _by_circle(parts, route):
         part = group[0]

@@ -54,7 +54,7 @@ LEG_COLUMNS = (
 
 def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -> list[LegRow]:
     """List the legs of the route: planned shape, and what was flown on each."""
-    waypoints = setup.route.waypoints
+    waypoints = setup.shown_waypoints
     runs, courses, slopes = leg_runs(waypoints), np.degrees(leg_courses(waypoints)), np.degrees(leg_slopes(waypoints))
     turns = np.degrees(signed_turns(waypoints))
     above = ground_clearance(setup, track) if track is not None else None

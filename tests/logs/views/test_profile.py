@@ -1,18 +1,24 @@
 """The profile's lines are the ground's, the plan's and the flight's heights."""
 
+import math
+
 import numpy as np
 import pytest
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Verdict
+from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.places import Place
 from logs.views.charts import Chart, Layer
+from logs.views.figures import figure_views, subject_of
 from logs.views.profile import profile_chart
+from tests.flight.autopilots.arduplane.flown_grounds import circuit
 from tests.logs.views.figure_data import ALL, ROUTE, drawn_profile, make_scenario, make_track, make_verdict
 from tests.logs.views.report.report_data import EVIL
 from tests.logs.views.report.report_data import make_setup as report_setup
 from tests.logs.views.report.report_data import make_track as report_track
+from world.airfield import LandingStrip, Launch
 
 
 def test_profile_shows_ground_and_heights_along_the_route() -> None:
@@ -32,6 +38,17 @@ def test_profile_shows_ground_and_heights_along_the_route() -> None:
     ]
     # At (100, 0).
     assert np.interp(1.4, terrain.x, terrain.y) == pytest.approx(250.0 * np.exp(-(0.25**2) / 2), abs=0.3)
+
+
+def test_the_flown_ends_of_a_flight_stand_on_the_ground() -> None:
+    """Take-off to 60 m over level ground at 0 m; the landing's leg itself is level at 54 m."""
+    setup = circuit(Launch("catapult", math.radians(90.0), 20.0), LandingStrip(500.0, 600.0))
+    chart = figure_views(subject_of(setup, None, judge_geometry(setup)))["profile"]
+    assert isinstance(chart, Chart)
+    planned = next(layer for layer in chart.panels[0].layers if layer.name == "planned")
+    # 1500 m ahead, 600 m aside, 400 m back, and 600 m to the landing point.
+    heights = np.interp([0.0, 1.5, 2.1, 2.5, 2.8, 3.1], planned.x, planned.y)
+    np.testing.assert_allclose(heights, [0.0, 80.0, 70.0, 54.0, 27.0, 0.0], atol=0.1)
 
 
 def test_the_greatest_height_follows_the_ground_and_a_zone_takes_its_band() -> None:
