@@ -38,7 +38,7 @@ def draw_map(chart: MapChart) -> Figure:
         around = draw_ground(figure, axes, chart.terrain, _COLUMN, _TOP)
         draw_layers(axes, chart.panel)
         write_labels(axes, chart.panel)
-        draw_compass(figure, chart.winds, _COLUMN)
+        draw_compass(figure, chart.winds, _COLUMN, legend)
         draw_legend(figure, handles + around, _LEFT, (legend - 0.02) / figure.get_figheight())
     return figure
 
@@ -128,15 +128,18 @@ def _colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column:
     bar.ax.tick_params(labelsize=7.5)
 
 
-def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float) -> None:
-    """Show north, and where each wind blows to, in the column (its left edge in inches) beside the map."""
+def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, legend: float = 0.0) -> None:
+    """Show north, and where each wind blows to, in the column (its left edge in inches) beside the map.
+
+    legend: inches below the map, which the notes on the winds stay above: it may reach below them.
+    """
     total = float(figure.get_figheight())
     side = 1.0
     notes = [
         (_wind_text(named), theme.colour(named.role) if len(winds) > 1 else theme.colour("ink")) for named in winds
     ]
     lines = sum(text.count("\n") + 1 for text, _ in notes)
-    base = max(1.35, 0.2 + _LINE * (lines + len(notes) - 1))
+    base = max(1.35, max(0.2, legend + 0.04) + _LINE * (lines + len(notes) - 1))
     dial = figure.add_axes((column / WIDTH - 0.01, base / total, side / WIDTH, side / total))
     dial.set(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25), aspect="equal")
     dial.axis("off")

@@ -140,7 +140,11 @@ def test_a_legend_of_many_long_names_is_whole() -> None:
     areas = [Layer("area", f"home in reach from {k}50 m above the ground", "landable", *corners) for k in range(16)]
     figure = draw_map(replace(chart, panel=replace(chart.panel, layers=(*chart.panel.layers, *areas))))
     figure.canvas.draw()
-    assert figure.legends[0].get_window_extent().y0 >= 0.0
+    legend = figure.legends[0].get_window_extent()
+    assert legend.y0 >= 0.0
+    # The note on the wind stands above it.
+    note = next(text for text in figure.texts if "wind" in text.get_text())
+    assert note.get_window_extent().y0 >= legend.y1
 
 
 # ----------------------------------------------------------------------
