@@ -5,6 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from flight.simulation.setup import FlightSetup, VerticalDatum
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
@@ -30,7 +32,7 @@ from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.crash_safe_log import INTERRUPTED
 from planfly.first_start import with_warm_up
-from planfly.kernel_units.unit_kernels import FLYING
+from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.open_mission import OpenedMission, is_log
 from planfly.pipeline import fly_and_judge
 from planfly.return_flights import fly_return
@@ -150,7 +152,7 @@ class ReturnsFound:
 _AS_FLOWN = "a flight's returns are flown as it was flown; only `terrain` replaces its ground"
 
 
-@with_warm_up(*FLYING)
+@with_warm_up(*FLYING, *GLIDING)
 def returns(
     what: FlightLog | FlownMission | Plan | str | Path,
     *,
@@ -187,7 +189,7 @@ def returns(
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a home.
 
     >>> import planfly
-    >>> found = planfly.returns(planfly.plan("jacksboro", seed=1), every=20)
+    >>> found = planfly.returns(planfly.plan("jacksboro-air", seed=1), every=20)
     >>> found.safe, found.returns.ranges[0].worst.target.name, found.glides.each[0].reach
     (False, 'home', 'home')
     """
@@ -282,9 +284,12 @@ def _judged(setup: FlightSetup, track: Track, asked: _Asked, ended: str) -> Retu
 
 def _suggested(world: ReturnWorld, starts: ReturnStarts, found: ReturnsFound, every: float) -> tuple[Suggested, ...]:
     """What helps of what would make them safe."""
+    # What sinks to the ground in a take-off or a landing, nothing of this would help.
+    judged = [one.time for one in found.returns.each]
+    aloft = starts.at(np.flatnonzero(np.isin(starts.time, judged)))
     with stage("looking for what would make them safe"):
-        remedies = suggest_parameters(world, starts)
-        rally = suggest_rally(world, starts)
+        remedies = suggest_parameters(world, aloft)
+        rally = suggest_rally(world, aloft)
     remedies += [] if rally is None else [rally]
     with stage(f"flying the returns of {len(remedies)} suggestions", "flying suggested returns"):
         proved = [Suggested(one, judge_returns(one.on(world), starts, every, fly_return)) for one in remedies]

@@ -122,6 +122,7 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         rtl_autoland=returns.autoland,
         not_judged=list(returns.open),
         ranges=[return_entry(found, one) for one in returns.ranges],
+        left_out=returns.left_out,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),
         engine_out=glides_entry(found),

@@ -154,6 +154,8 @@ class ReturnsAnswer:
     not_judged: list[str]
     """What leaves the returns open: terrain, law, autoland, return path or landing; empty where nothing does."""
     ranges: list[ReturnEntry]
+    left_out: int
+    """How many more there would be on the ground, or too low in a take-off or a landing to return."""
     no_return: str
     """By energy: never, later (than no_return_s), at once; or why it is not known: battery, used or arrives."""
     no_return_s: float | None

@@ -190,7 +190,11 @@ NOT_ASKED = Glides((), (), math.nan)
 
 
 def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
-    """Judge what can be reached without an engine from each start."""
+    """Judge what can be reached without an engine from each start; one low in a take-off or landing is left out.
+
+    From there the aircraft comes down straight ahead.
+    """
+    starts = starts.at(np.flatnonzero(~starts.low))
     parameters = world.parameters
     sites, airspeed = _sites(world), float(parameters.airspeed_min)
     fuel = world.setup.envelope.volts <= 0.0

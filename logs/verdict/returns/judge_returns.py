@@ -74,8 +74,13 @@ UNSURE = 10.0
 # How far apart the two are counts this near (m) to a limit; further away it decides nothing.
 _DECIDES = 50.0
 # A return that begins lower than the least height above ground, as after a take-off, is held to the height that it has
-# there, less what its turn takes, m.
+# there, less what its turn takes, m; in a flown take-off or landing to this share of it, for it may be sinking.
 TURN = 2.0
+_LOW_SHARE = 0.5
+# Lower over the ground than this, m, no return is judged in a take-off or a landing: nothing turns there.
+TOUCHING = 10.0
+# Higher up one is left out that hits the ground or comes low within this run, m, for it loses the rest of that share.
+_SINKS_WITHIN = 500.0
 # A start banked by more than this (rad) is none that a flight in JSBSim could begin at: it is flown in to, straight.
 _BANKED = math.radians(10.0)
 
@@ -165,6 +170,8 @@ class Returns:
     open: what is not judged of them.
     autoland: RTL_AUTOLAND; None where it is another autopilot's mission.
     landings: the mission's landing sequences.
+    left_out: how many more there would be while the aircraft is on the ground, or so low in a take-off or a landing
+        that it sinks to the ground before it can return.
     """
 
     each: tuple[ReturnFlown, ...]
@@ -179,6 +186,7 @@ class Returns:
     open: tuple[Open, ...] = ()
     autoland: int | None = None
     landings: tuple[LandingStart, ...] = ()
+    left_out: int = 0
 
     @property
     def safe(self) -> bool:
@@ -403,6 +411,7 @@ def judge_returns(
     """
     each: list[ReturnFlown] = []
     again: list[float] = []
+    left_out = 0
     for way in world.ways:
         if "terrain" in world.open or ("landing" in world.open and way == "straight to land"):
             continue
@@ -416,7 +425,10 @@ def judge_returns(
         if fly_again is not None and way == "circle":
             ones, apart = _set_right(world, starts, ones, flown, fly_again, most)
             again += apart
-        each += ones
+        begins = heights_above_ground(world, starts)
+        kept = [one for k, one in enumerate(ones) if not (starts.low[k] and sinks_down(one, float(begins[k])))]
+        left_out += starts.grounded + len(ones) - len(kept)
+        each += kept
     return Returns(
         each=tuple(each),
         every=every,
@@ -430,7 +442,20 @@ def judge_returns(
         open=world.open,
         autoland=None if world.other_law else int(world.parameters.rtl_autoland),
         landings=world.landings,
+        left_out=left_out,
     )
+
+
+def sinks_down(one: ReturnFlown, height: float) -> bool:
+    """Whether a return from low in a take-off or a landing sinks to the ground there, which is no fault of its way.
+
+    height: that it begins at, over the ground, m.  Lower than `TOUCHING` each that hits the ground or comes low near
+    where it begins; higher up one that loses half of its height for it.  One that flies into rising ground, or hits a
+    hill later, counts.
+    """
+    run = math.dist(one.start[:2], one.clearance_at[:2])
+    sinks = height < TOUCHING or one.start[2] - one.clearance_at[2] >= (1.0 - _LOW_SHARE) * height
+    return one.kind in ("ground", "low", "unsure") and sinks and run <= _SINKS_WITHIN
 
 
 _NO_WAY: Floats = np.zeros((0, 3))
@@ -462,7 +487,8 @@ def fly_home(
 def floors(world: ReturnWorld, starts: ReturnStarts) -> Floats:
     """Height above ground (n,) that is asked of the return from each start, m."""
     begins = heights_above_ground(world, starts)
-    return np.where(begins < world.limit, begins - TURN, world.limit)
+    own = np.where(begins < world.limit, begins - TURN, world.limit)
+    return np.where(starts.low, np.minimum(_LOW_SHARE * begins, world.limit), own)
 
 
 def heights_above_ground(world: ReturnWorld, starts: ReturnStarts) -> Floats:

@@ -14,9 +14,12 @@ from world.geometry import leg_courses
 from world.kernels import Records
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 # Velocities of a track that holds none are taken over this long, s.
 _OVER = 1.0
+# m.  So far a return sinks from a final with its motor off before it climbs: it counts as low that much above a limit.
+SINKING = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,12 +29,17 @@ class ReturnStarts:
     time: (n,) s.  rows: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.
     used: (n,) energy used until then, Wh; NaN where it is not known.
     flown: whether they are of a flown track, and not of the planned path.
+    low: (n,) whether they are in a flown take-off or landing, lower over the ground than the required clearance and
+        `SINKING` more.
+    grounded: how many others there would be while the aircraft is too slow to fly: on its launch, or landed.
     """
 
     time: Floats
     rows: Records
     used: Floats
     flown: bool
+    low: Flags
+    grounded: int = 0
 
     def __len__(self) -> int:
         """How many there are."""
@@ -39,11 +47,12 @@ class ReturnStarts:
 
     def at(self, chosen: NDArray[np.intp]) -> "ReturnStarts":
         """Some of them."""
-        return ReturnStarts(self.time[chosen], self.rows[chosen], self.used[chosen], self.flown)
+        chosen_of = (self.time[chosen], self.rows[chosen], self.used[chosen])
+        return ReturnStarts(*chosen_of, self.flown, self.low[chosen], self.grounded)
 
 
 def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts:
-    """Places of a track every so many seconds, up to where it returns to launch itself.
+    """Places of a track every so many seconds, up to where it returns to launch itself, while it flies.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -56,15 +65,40 @@ def flown_starts(setup: FlightSetup, track: Track, every: float) -> ReturnStarts
         whole &= track.leg < setup.route.return_from
     known = np.flatnonzero(whole)
     if not known.size:
-        return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), True)
+        return _no_starts(flown=True)
     time = track.time[known]
     wanted = np.arange(time[0], time[-1] + 1e-9, every)
     # The nearest row; a pause in a log has none.
-    rows = known[np.unique(np.searchsorted(time, wanted - 1e-9).clip(0, len(known) - 1))]
+    every_row = known[np.unique(np.searchsorted(time, wanted - 1e-9).clip(0, len(known) - 1))]
+    near, slow = _by_the_ground(setup, track, every_row)
+    rows, low = every_row[~slow], near[~slow]
     velocity = _velocities(track, rows)
     roll = track.attitude[rows, ROLL].astype(np.float64)
     energy = track.energy[rows].astype(np.float64)
-    return ReturnStarts(track.time[rows], _records(track.position[rows], velocity, np.nan_to_num(roll)), energy, True)
+    records = _records(track.position[rows], velocity, np.nan_to_num(roll))
+    return ReturnStarts(track.time[rows], records, energy, True, low, int(slow.sum()))
+
+
+def _no_starts(*, flown: bool) -> ReturnStarts:
+    return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), flown, np.zeros(0, dtype=np.bool_))
+
+
+def _by_the_ground(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
+    """Of rows (n,): which are low over the ground in a flown take-off or landing, and which too slow to fly there."""
+    ways, terrain = setup.ground_ways, setup.scenario.terrain
+    on_way = np.zeros(len(rows), dtype=np.bool_)
+    position = np.asarray(track.position[rows], dtype=np.float64)
+    if terrain is None or not ways:
+        return on_way, on_way.copy()
+    if ways.take_off is not None:
+        above = track.position[:, 2] > ways.take_off.top
+        on_way |= rows < (int(np.argmax(above)) if above.any() else len(track))
+    if ways.approach is not None:
+        on_way |= track.leg[rows] >= ways.approach.leg
+    above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+    low = on_way & (above_ground < setup.limits.min_clearance + SINKING)
+    slowest = setup.envelope.level_speeds(float(setup.route.waypoints[0, 2]))[0]
+    return low, low & (track.airspeed[rows] < slowest)
 
 
 def _velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
@@ -91,7 +125,7 @@ def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last)
     moves = moves[moves["leg"] <= last]
     if not len(moves):
-        return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), False)
+        return _no_starts(flown=False)
     times = np.arange(0.0, float(moves["time"][-1] + moves["lasts"][-1]), every)
     at = np.searchsorted(moves["time"], times, side="right") - 1
     move = moves[at]
@@ -115,7 +149,8 @@ def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
     rise = (move["climb"] + 2.0 * move["bend"] * share) / np.maximum(1e-9, move["lasts"])
     velocity = np.stack([speed * east, speed * north, rise], axis=1)
     bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
-    return ReturnStarts(times, _records(position, velocity, bank), np.full(len(times), np.nan), False)
+    unknown, none_low = np.full(len(times), np.nan), np.zeros(len(times), dtype=np.bool_)
+    return ReturnStarts(times, _records(position, velocity, bank), unknown, False, none_low)
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:

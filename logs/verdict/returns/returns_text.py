@@ -100,7 +100,8 @@ def headline(returns: Returns) -> str:
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no place to return from"
     landing = "; the landing is not judged" if returns.lands else ""
-    return (f"not judged in full ({reasons}): " if reasons else "") + _judged(returns) + landing
+    low = f"; {returns.left_out} on or near the ground in take-off and landing left out" if returns.left_out else ""
+    return (f"not judged in full ({reasons}): " if reasons else "") + _judged(returns) + low + landing
 
 
 def _judged(returns: Returns) -> str:
@@ -108,7 +109,9 @@ def _judged(returns: Returns) -> str:
     if wrong:
         safe = returns.count("safe")
         return f"of {total} returns {wrong}; {safe} {'is' if safe == 1 else 'are'} safe"
-    lowest = min(returns.each, key=lambda one: one.clearance)
+    # Those that begin lower than that, as after a take-off, say nothing of the way home.
+    aloft = [one for one in returns.each if not one.floor < returns.limit] or returns.each
+    lowest = min(aloft, key=lambda one: one.clearance)
     left = min((one.left for one in returns.each if not math.isnan(one.left)), default=math.nan)
     energy = "" if math.isnan(left) else f", and {left:.0f} Wh are left at the least"
     until = " up to their landing" if returns.lands else ""

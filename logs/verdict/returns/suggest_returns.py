@@ -89,8 +89,9 @@ def _needs(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> 
     for centre, radius in zip(world.around.spheres, world.around.radii, strict=True):
         if radius > 0.0:
             outside = np.minimum(outside, np.linalg.norm(place - centre, axis=1) - radius)
+    least = floors(world, starts)
     return _Needs(
-        np.minimum(world.limit + margin, np.maximum(floors(world, starts), clear - TURN)),
+        np.where(starts.low, least, np.minimum(world.limit + margin, np.maximum(least, clear - TURN))),
         np.minimum(margin, np.maximum(0.0, outside - TURN)),
     )
 

@@ -1,0 +1,79 @@
+"""Returns from a take-off and a landing that were flown: what of them is left out, and what counts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flight.mission.return_path import ReturnTarget
+from logs.verdict.returns.judge_glides import judge_glides
+from logs.verdict.returns.judge_returns import Kind, ReturnFlown, judge_returns, return_world, sinks_down
+from logs.verdict.returns.return_starts import SINKING, flown_starts
+from logs.verdict.returns.returns_text import headline
+from tests.logs.verdict.rules.flown_circuits import flown_circuit
+from world.scenario import from_spec
+
+
+def a_return(kind: Kind, sunk: float, run: float) -> ReturnFlown:
+    """One that comes to its least clearance so much lower than it begins, and so far from there, m."""
+    start, at = (100.0, 0.0, 340.0), (100.0, run, 340.0 - sunk)
+    target = ReturnTarget((0.0, 0.0, 400.0), "home", "", 0.0)
+    return ReturnFlown(0.0, start, target, kind, 0.0, at, 99.0, -1, -1, 1.0, 9.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "sunk", "run", "height", "left_out"),
+    [
+        # Half of its height within 500 m.
+        ("ground", 20.0, 300.0, 40.0, True),
+        ("ground", 19.9, 300.0, 40.0, False),
+        ("low", 20.0, 300.0, 40.0, True),
+        ("ground", 20.0, 500.0, 40.0, True),
+        ("ground", 20.0, 500.1, 40.0, False),
+        # Lower than 10 m whatever it loses: the ground of a field may rise.
+        ("ground", 0.0, 300.0, 9.9, True),
+        ("ground", 0.0, 300.0, 10.0, False),
+        # A sphere is none of the ground's business.
+        ("threat", 20.0, 300.0, 5.0, False),
+        ("safe", 20.0, 300.0, 5.0, False),
+    ],
+)
+def test_what_sinks_to_the_ground_beside_what_flies_into_it(
+    kind: Kind, sunk: float, run: float, height: float, left_out: bool
+) -> None:
+    assert sinks_down(a_return(kind, sunk, run), height) is left_out
+
+
+def test_nothing_of_a_good_flight_from_the_ground_to_the_ground_hits_it() -> None:
+    flown = flown_circuit()
+    world, track = return_world(flown.setup), flown.track
+    starts = flown_starts(flown.setup, track, 1.0)
+    found = judge_returns(world, starts, 1.0)
+    assert found.count("ground") == 0
+    # It takes off in a second or two, and slides and stands for a quarter of a minute.
+    assert starts.grounded >= 5
+    assert found.left_out >= starts.grounded
+    assert len(found.each) + found.left_out == pytest.approx(track.time[-1] - track.time[0], abs=2.0)
+    assert f"; {found.left_out} on or near the ground in take-off and landing left out" in headline(found)
+    # Low are the climb to the take-off's height and the final, none between them.
+    low = starts.time[starts.low]
+    # The ground is level, at 0 m.
+    assert (starts.rows["up"][starts.low] < flown.setup.limits.min_clearance + SINKING).all()
+    between = (starts.time > 20.0) & (track.leg[np.searchsorted(track.time, starts.time)] < flown.approach.leg)
+    assert not starts.low[between].any()
+    assert low[0] < 5.0
+    # Without its engine it comes down straight ahead from there.
+    assert {one.time for one in judge_glides(world, starts).each} == set(starts.time[~starts.low].tolist())
+
+
+def test_a_return_from_the_climb_into_a_hill_counts() -> None:
+    """The aircraft takes off to the east; a hill of 120 m stands 400 m north of where it turns back."""
+    flown = flown_circuit()
+    hill = {"east_m": 150.0, "north_m": 250.0, "height_m": 150.0, "sigma_m": 90.0}
+    spec = flown.setup.scenario.to_json()
+    walled = from_spec(spec | {"terrain": {"kind": "peaks", "peak": [hill]}}, "walled")
+    setup = flown.setup.in_scenario(replace(flown.setup.scenario, terrain=walled.terrain))
+    starts = flown_starts(setup, flown.track, 1.0)
+    found = judge_returns(return_world(setup), starts, 1.0)
+    low = set(starts.time[starts.low].tolist())
+    assert [one for one in found.each if one.time in low and one.kind == "ground"]
