@@ -21,7 +21,7 @@ from planfly.api.planning import Wind, changed_scenario, opened_scenario
 from planfly.arguments import check_arguments
 from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_kind, flight_text
 from planfly.first_start import with_warm_up
-from planfly.kernel_units.unit_kernels import BOTH
+from planfly.kernel_units.unit_kernels import BOTH, GLIDING
 from planfly.pipeline import autopilot_log, fly_and_judge, make_plan, make_setup, planned_for
 from planfly.refine import refine as refine_rounds
 from planfly.returns_beside import returns_beside
@@ -108,7 +108,7 @@ class _Task:
     every: int
 
 
-@with_warm_up(*BOTH)
+@with_warm_up(*BOTH, *GLIDING)
 def run(
     scenario: Scenario | str | Path = "jacksboro",
     *,

@@ -12,7 +12,7 @@ from logs.recording.recorder import Recorder
 from planfly.airframe import Airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.pipeline import fly_and_judge, make_setup
-from planfly.returns_beside import returns_line
+from planfly.returns_beside import returns_beside, returns_line
 from planner.search.kernel_calls import PARTS, call_kernels
 from world.compile_events import tell_before_compiling
 from world.scenario import Scenario, from_spec
@@ -79,9 +79,16 @@ def _fly() -> None:
         recorder.finish(flown.ended, flown.verdict)
 
 
+def _glide() -> None:
+    scenario, airframe = _world()
+    setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
+    returns_beside(setup, None).drawn()
+
+
 UNITS: dict[str, Callable[[], None]] = {
     **{part: functools.partial(_plan, part) for part in PARTS},
     "flight": _fly,
+    "glides": _glide,
 }
 
 

@@ -19,6 +19,7 @@ _PROBLEM = (
 _CERTIFY = "planner.evaluation.certify_kernels."
 _SIDES = "planner.seeding.side_routes."
 _LAYOUT = "logs.recording.mcap_writer."
+_GLIDES = "logs.verdict.returns."
 
 UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "scores": (
@@ -86,11 +87,22 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "world.wind._mean_wind_speeds",
         "world.wind.mean_wind_speed",
     ),
+    "glides": (
+        *_WORLD,
+        "aircraft.envelope.ground_speed",
+        "flight.autopilots.arduplane.swift_return._fly_return",
+        _GLIDES + "glide_map._fill_slopes",
+        _GLIDES + "glide_map._search",
+        _GLIDES + "glide_reach._look_ahead",
+        "world.highest_ground._fill_cells",
+    ),
 }
 
-# What a default plan and a flight call, the longest first: whoever shares units out begins with those.
+# What a default plan, a flight and its report's glides call, the longest first: whoever shares units out begins with
+# those.
 PLANNING = ("scores", "shortening", "routes", "certificates", "paper")
 FLYING = ("flight",)
+GLIDING = ("glides",)
 BOTH = ("scores", "flight", "shortening", "routes", "certificates", "paper")
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from planfly.campaigns.worker_pool import code_hash
 from planfly.first_start import compile_units
 from planfly.kernel_units.ready_kernels import MISSION
-from planfly.kernel_units.unit_kernels import BOTH
+from planfly.kernel_units.unit_kernels import BOTH, GLIDING
 from planfly.process_setup import prepare_process, with_large_stack
 from world.kernels import cache_folder
 
@@ -95,7 +95,7 @@ def main() -> int:
         folder = Path(name)
         (folder / "field.toml").write_text(FIELD, encoding="utf-8")
         (folder / "field.waypoints").write_text(MISSION, encoding="utf-8")
-        compile_units(list(BOTH), cache_folder(), lambda _: None)
+        compile_units([*BOTH, *GLIDING], cache_folder(), lambda _: None)
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = [sys.executable, "-m", "tests.kernels"]
         started = [subprocess.Popen([*command, str(k)], cwd=folder, env=environment) for k in range(len(PROCESSES))]
