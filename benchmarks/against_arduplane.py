@@ -88,7 +88,7 @@ def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airfra
     """
     for draw in range(50):
         rng = np.random.default_rng([seed, draw])
-        spec: dict[str, Any] = load_scenario("jacksboro").to_json()
+        spec: dict[str, Any] = load_scenario("jacksboro-air").to_json()
         side = 1.0 if rng.random() < 0.5 else -1.0
         for end, sign in (("start", side), ("destination", -side)):
             spec[end] = {

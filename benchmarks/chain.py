@@ -33,7 +33,7 @@ ROUNDS = 5
 
 def run() -> dict[str, Any]:
     """Measure, print a table, and return it."""
-    scenario = load_scenario("jacksboro")
+    scenario = load_scenario("jacksboro-air")
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, 1)
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
@@ -75,7 +75,7 @@ def run() -> dict[str, Any]:
         "flight time / time to fly it": seconds / flight,
         "flight time / whole run": seconds / times["whole `planfly run`, new process"],
     }
-    print(f"jacksboro, seed 1: {seconds:.0f} s of flight, {len(flown.track)} rows; CPU, median of {ROUNDS}")
+    print(f"jacksboro-air, seed 1: {seconds:.0f} s of flight, {len(flown.track)} rows; CPU, median of {ROUNDS}")
     for label, value in times.items():
         print(f"  {label:<48}{value:9.3f} s")
     for label, value in ratios.items():

@@ -69,7 +69,7 @@ def main() -> None:
     parser.add_argument("--fresh", type=int, default=100, help="places that the search has not seen")
     parser.add_argument("--whole", type=int, default=20, help="of these, flown in JSBSim")
     args = parser.parse_args()
-    flown = planfly.fly(planfly.plan("jacksboro", seed=1), wind=(5, 250))
+    flown = planfly.fly(planfly.plan("jacksboro-air", seed=1), wind=(5, 250))
     world, starts = return_world(flown.setup), flown_starts(flown.setup, flown.track, args.every)
     returns, alone = timed(
         f"{len(starts)} returns, the least sure in JSBSim", lambda: judge_returns(world, starts, args.every, fly_return)

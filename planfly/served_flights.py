@@ -58,7 +58,7 @@ from world.scenario import Scenario, at_time, in_the_air, load_scenario, with_fl
 
 Floats = NDArray[np.float64]
 
-DEFAULT_SCENARIO = "jacksboro"
+DEFAULT_SCENARIO = "jacksboro-air"
 # How long LOITER and GUIDED circle in one log, s: a circle's laps are laid out, and judged, one by one.
 HELD = 900.0
 # Most texts about one verdict; the log has the rest.

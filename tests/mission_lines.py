@@ -67,7 +67,7 @@ def setup_of(*lines: str, home: str = "36.5 -84.2 300", **tables: Any) -> Flight
 
 
 def a_plan(points: list[tuple[float, float, float]]) -> Plan:
-    scenario = with_wind(load_scenario("jacksboro"), 0.0, 0.0, None)
+    scenario = with_wind(load_scenario("jacksboro-air"), 0.0, 0.0, None)
     certificate = Certificate(0.1, 100.0, 0.1, 50.0, 500.0, 100.0, ())
     zeros = np.zeros(4)
     return Plan(scenario, np.array(points), zeros.astype(int), zeros, certificate, 1, "umda", 10, np.zeros((1, 3)))

@@ -34,7 +34,7 @@ def mission_13_km(folder: Path) -> CampaignBase:
     lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(_CORNERS, 1)]
     path = folder / "legs.waypoints"
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    wind = load_scenario("jacksboro").wind
+    wind = load_scenario("jacksboro-air").wind
 
     def in_its_wind(scenario: Scenario) -> Scenario:
         return with_wind(scenario, wind.speed, wind.from_course, wind.turbulence)
@@ -73,9 +73,9 @@ def over_simulate(base: CampaignBase, flights: int = 20) -> float:
 
 
 def proof(folder: Path, share: float) -> tuple[int, float]:
-    """Flights and seconds of ``planfly campaign jacksboro --prove SHARE``, planning and report included."""
+    """Flights and seconds of ``planfly campaign jacksboro-air --prove SHARE``, planning and report included."""
     started = time.perf_counter()
-    command = [sys.executable, "-m", "planfly", "campaign", "jacksboro", "--prove", str(share), "--seed", "1"]
+    command = [sys.executable, "-m", "planfly", "campaign", "jacksboro-air", "--prove", str(share), "--seed", "1"]
     done = subprocess.run(
         [*command, "--workers", "2", "--out", str(folder / "proof")], check=True, capture_output=True, text=True
     )

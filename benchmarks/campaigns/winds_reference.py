@@ -1,7 +1,7 @@
 """`planfly winds` on the demo against flights at fixed winds, up to 1,000 of them at each.
 
 ``python -m benchmarks.campaigns.winds_reference [--directions K ...] [--flights N] [--even] [--seed N]`` flies the
-demo in wind half a metre a second below and above each boundary that ``planfly winds jacksboro`` found, in other
+demo in wind half a metre a second below and above each boundary that ``planfly winds jacksboro-air`` found, in other
 weather and with other aircraft than that had, and adds the counts to ``tests/authorities/winds_reference.json``: some
 minutes a point.  Where a direction has but one point, and there fewer fly than have to, it gets another a metre a
 second below.
@@ -50,7 +50,7 @@ _SEED = 77
 
 def demo(seed: int) -> CampaignBase:
     """The demo's plan of seed 1, with a spread but for the wind's mean; seed: of the draws."""
-    base = open_campaign("jacksboro", default_dispersions().without(ASKED), seed=1)
+    base = open_campaign("jacksboro-air", default_dispersions().without(ASKED), seed=1)
     return replace(base, seed=seed)
 
 
@@ -80,7 +80,7 @@ def _counted(base: CampaignBase, wind: GivenWind, most: int, ends: Callable[[Tal
 
 
 def found_winds() -> WindsFound:
-    """The boundaries as `planfly winds jacksboro --seed 1` finds them."""
+    """The boundaries as `planfly winds jacksboro-air --seed 1` finds them."""
     base = demo(1)
     with tempfile.TemporaryDirectory() as name, open_winds_store(base, GOAL, Path(name), resume=False) as store:
         return find_winds(base, GOAL, Workers(2), store)

@@ -52,7 +52,7 @@ def serve(
 
     mission: a file to begin with; None waits for an upload.
     scenario, terrain, fence, at, params, guidance, autopilot_law, nav: as of `planfly.fly`; without a mission the
-    scenario is "jacksboro" unless another is named.
+    scenario is "jacksboro-air" unless another is named.
     to: where ground stations listen, IP:PORT, one or several.  bind: where the vehicle listens.
     allow: IP addresses beyond this machine that may talk to it.  sign_key: a file with a MAVLink signing key.
     speed: times real time, 0.1 to 100.  log: the folder of the flight logs.

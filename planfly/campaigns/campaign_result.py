@@ -39,8 +39,8 @@ def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str
 def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> str:
     """``planfly winds``, as `campaign_line`.
 
-    >>> winds_line("jacksboro", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
-    'planfly winds jacksboro --prove 0.9 --directions 8 --seed 1'
+    >>> winds_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
+    'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'
     """
     flights = None if goal.flights == USUAL_WIND_FLIGHTS else goal.flights
     asked = {"prove": goal.target, "directions": goal.directions, "most": goal.most, "flights": flights}

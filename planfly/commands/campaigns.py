@@ -25,7 +25,7 @@ def campaign_options(line: LineParser) -> None:
     parser = line.command(
         "campaign",
         "fly a mission many times in varied weather and with varied aircraft: how likely is it to fly",
-        "planfly campaign jacksboro --prove 0.99",
+        "planfly campaign jacksboro-air --prove 0.99",
         extra="campaigns",
     )
     parser.alias("index", "--refly")
@@ -53,7 +53,7 @@ def winds_options(line: LineParser) -> None:
     parser = line.command(
         "winds",
         "find the largest wind from each direction in which a mission flies",
-        "planfly winds jacksboro --prove 0.99 --directions 16",
+        "planfly winds jacksboro-air --prove 0.99 --directions 16",
         extra="campaigns",
     )
     _shared_options(parser)

@@ -176,7 +176,7 @@ def scenario_words(prefix: str, **_about: object) -> list[str]:
     """Names of the scenarios that come with planfly, and scenario files.
 
     >>> scenario_words("jack")
-    ['jacksboro', 'jacksboro-field']
+    ['jacksboro', 'jacksboro-air', 'jacksboro-field']
     """
     names = sorted(file.stem for file in (_ROOT / "world" / "scenarios").glob("*.toml"))
     return [*(name for name in names if name.startswith(prefix)), *files("toml")(prefix)]

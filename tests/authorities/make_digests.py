@@ -1,8 +1,8 @@
 """Makes ``digests.json`` from the folders of runs: ``python -m tests.authorities.make_digests FOLDER COMMIT``.
 
-FOLDER holds what these commands left there, each with ``--out FOLDER/NAME``: ``planfly run jacksboro --seed 1`` to 3
-(jacksboro-1 to -3), ``planfly run steep --seed 1`` (steep), ``planfly run tight --seed 1`` (tight) and ``planfly paper
---problems 7,60 --runs 3`` (paper).
+FOLDER holds what these commands left there, each with ``--out FOLDER/NAME``: ``planfly run jacksboro-air --seed 1`` to
+3 (jacksboro-air-1 to -3), ``planfly run steep --seed 1`` (steep), ``planfly run tight --seed 1`` (tight) and ``planfly
+paper --problems 7,60 --runs 3`` (paper).  Bytes of plan.json hold the scenario's name, which was ``jacksboro`` before.
 
 What `tests.test_same_results` holds every later version to.  The tables of the paper are still those of b610875, the
 last commit before modules were moved into their rooms; plans, and with them missions and tracks, are the default
@@ -21,7 +21,7 @@ from flight.simulation.track import Track
 from logs.recording.reader import read_log
 
 FILE = Path(__file__).with_name("digests.json")
-RUNS = {"jacksboro-1": 1, "jacksboro-2": 2, "jacksboro-3": 3, "steep": 1, "tight": 1}
+RUNS = {"jacksboro-air-1": 1, "jacksboro-air-2": 2, "jacksboro-air-3": 3, "steep": 1, "tight": 1}
 PLAN_FILES = ("plan.json", "mission.waypoints", "mission.plan")
 PAPER_FILES = ("runs.csv", "table.csv", "runs.json")
 # What a verdict says of each finding: numbers and words.

@@ -149,7 +149,7 @@ def test_a_mission_that_a_person_brought_is_flown_or_judged_along_one_path(count
     assert flown == {key: n for key, n in (ONCE | FLIGHT | BESIDE).items() if key != "plan_mission"}
     judged = ONCE | ROUTED | {"judge_geometry": 1, "route_requirements": 1}
     assert count("check", str(MISSION), "--terrain", "jacksboro", code=0) == judged
-    assert count("check", str(MISSION), "--scenario", "jacksboro", code=4) == judged
+    assert count("check", str(MISSION), "--scenario", "jacksboro-air", code=4) == judged
 
 
 def test_a_log_judged_over_another_terrain_keeps_its_path(count: Count, flight: Path, tmp_path: Path) -> None:

@@ -119,7 +119,7 @@ def test_flat_and_peaks() -> None:
 
 
 def test_clearance_over_measured_ground() -> None:
-    terrain = load_scenario("jacksboro").terrain
+    terrain = load_scenario("jacksboro-air").terrain
     assert terrain is not None
     random = np.random.default_rng(5)
     for _ in range(40):

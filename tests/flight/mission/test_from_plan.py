@@ -54,7 +54,7 @@ def test_a_corner_has_its_fly_by_offset_as_acceptance() -> None:
     exported = plan_mission(a_plan(corner), 25.0, math.radians(30.0))
     assert [item.params[1] for item in exported.items] == [25.0, 10.0, 28.0, 10.0]
     assert exported.home is not None
-    terrain = load_scenario("jacksboro").terrain
+    terrain = load_scenario("jacksboro-air").terrain
     assert terrain is not None
     assert exported.home.alt == pytest.approx(float(terrain.height(0.0, 0.0)), abs=0.001)
 
@@ -86,7 +86,7 @@ def test_a_corner_has_the_acceptance_that_its_autopilot_strays_least_with() -> N
     corner = [(0.0, 0.0, 700.0), (0.0, 1000.0, 700.0), (866.0, 1500.0, 700.0)]
     exported = plan_mission(a_plan(corner), 25.0, math.radians(30.0), tracking=error)
     assert [item.params[1] for item in exported.items] == [25.0, 15.0, 121.0, 15.0]
-    windy = replace(a_plan(corner), scenario=with_wind(load_scenario("jacksboro"), 8.0, math.radians(240.0), None))
+    windy = replace(a_plan(corner), scenario=with_wind(load_scenario("jacksboro-air"), 8.0, math.radians(240.0), None))
     # On the second leg, at 60 degrees, the wind is from behind: 33.8 m/s.
     blown = plan_mission(windy, 25.0, math.radians(30.0), tracking=error)
     assert blown.items[2].params[1] == pytest.approx(15.0 + 104.7 + 2.0 * 8.85, abs=1.0)

@@ -18,7 +18,7 @@ LAPS = 5 if SOAK else 1
 
 @pytest.mark.skipif(not SOAK, reason="a ratio of times, which other tests disturb: in make soak and make bench")
 def test_recording_costs_a_fraction_of_the_flight(tmp_path: Path) -> None:
-    scenario = load_scenario("jacksboro")
+    scenario = load_scenario("jacksboro-air")
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, 1)
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)

@@ -75,7 +75,7 @@ def test_a_name_of_no_kind_has_no_media_type() -> None:
 def test_a_dem_comes_from_the_log_and_not_from_its_file(
     tmp_path: Path, track: Track, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scenario = load_scenario("jacksboro")
+    scenario = load_scenario("jacksboro-air")
     assert scenario.terrain is not None
     setup = dataclasses.replace(make_setup(with_plan=False), scenario=scenario)
     path = record(tmp_path / "a.mcap", setup, track)

@@ -57,7 +57,7 @@ def test_a_campaigns_line_is_read_as_the_same_options(words: str) -> None:
 )
 def test_a_searchs_line_is_read_as_the_same_options(words: str) -> None:
     parse = build_parser().parse_args
-    asked = parse(["winds", "jacksboro", *shlex.split(words)])
+    asked = parse(["winds", "jacksboro-air", *shlex.split(words)])
     goal = WindsGoal(asked.prove, asked.confidence, asked.directions, asked.most, asked.flights or 5000)
     again = parse(shlex.split(winds_line(asked.target, goal, repeated_options(asked)))[1:])
     assert (again.prove, again.confidence, again.directions, again.most) == (
@@ -77,7 +77,7 @@ def repeated_options(args: argparse.Namespace) -> dict[str, object]:
 
 def test_every_option_that_decides_what_is_flown_is_repeated() -> None:
     """What a command takes beside them decides how, where to or how many, or is the goal's."""
-    asked = build_parser().parse_args(["campaign", "jacksboro"])
+    asked = build_parser().parse_args(["campaign", "jacksboro-air"])
     others = {"command", "target", "prove", "at_least", "flights", "confidence", "workers", "scheduler", "resume"}
     others |= {"refly", "out", "overwrite", "json", "quiet"}
     assert set(vars(asked)) - others == set(repeated_options(asked))

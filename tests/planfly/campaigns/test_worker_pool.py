@@ -92,7 +92,7 @@ from planfly.campaigns.campaign_base import open_campaign
 from planfly.campaigns.dispersions import default_dispersions
 if __name__ == "__main__":
     call = (lambda *given: in_own_process(open_campaign, *given)) if sys.argv[1] == "apart" else open_campaign
-    call("jacksboro", default_dispersions())
+    call("jacksboro-air", default_dispersions())
     with open("/proc/self/status") as file:
         print(next(int(line.split()[1]) // 1024 for line in file if line.startswith("VmHWM")))
 """

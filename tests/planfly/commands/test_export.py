@@ -46,8 +46,8 @@ def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.Ca
     printed = capsys.readouterr()
     assert "a fence has no height" in printed.err
     # A map is named by the scenario, not by where its file lies.
-    assert ElementTree.parse(targets[4]).getroot().findtext(f"{KML}Document/{KML}name") == "jacksboro"
-    assert gpxpy.parse(targets[5].read_text()).name == "jacksboro"
+    assert ElementTree.parse(targets[4]).getroot().findtext(f"{KML}Document/{KML}name") == "jacksboro-air"
+    assert gpxpy.parse(targets[5].read_text()).name == "jacksboro-air"
     assert printed.out.count("\n") == len(targets)
     waypoints, plan, fence, rally = (read_mission(target) for target in targets[:4])
     assert waypoints.items == plan.items

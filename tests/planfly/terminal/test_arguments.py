@@ -102,7 +102,7 @@ def test_commands_options_and_names(tmp_path: Path) -> None:
     names = proposed("planfly plan ", tmp_path)
     assert {"jacksboro", "tight", "mine.toml"} <= set(names)
     assert "notes.txt" not in names
-    assert proposed("planfly run jack", tmp_path) == ["jacksboro", "jacksboro-field"]
+    assert proposed("planfly run jack", tmp_path) == ["jacksboro", "jacksboro-air", "jacksboro-field"]
     assert proposed("planfly fly m.plan --aircraft aero", tmp_path) == ["aerosonde"]
     assert proposed("planfly help air", tmp_path) == ["aircraft"]
 
@@ -145,4 +145,4 @@ def test_bash_completes_by_the_script(tmp_path: Path) -> None:
         '_python_argcomplete planfly jack run\necho "${COMPREPLY[@]}"\n'
     )
     done = subprocess.run(["bash", "-c", asked], capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert done.stdout.split() == ["jacksboro", "jacksboro-field"], done.stderr
+    assert done.stdout.split() == ["jacksboro", "jacksboro-air", "jacksboro-field"], done.stderr

@@ -129,7 +129,7 @@ def test_bad_values_get_one_line(words: tuple[str, ...], capsys: pytest.CaptureF
 
 def test_what_is_taken() -> None:
     args = build_parser().parse_args(
-        ["campaign", "jacksboro", "--prove", "0.5", "--flights", "10000000", "--refly", "0"]
+        ["campaign", "jacksboro-air", "--prove", "0.5", "--flights", "10000000", "--refly", "0"]
     )
     assert (args.prove, args.flights, args.refly) == (0.5, 10_000_000, 0)
     args = build_parser().parse_args(["winds", "x", "--directions", "72", "--most", "40"])

@@ -14,7 +14,7 @@ from planner.search.plan_path import plan_path
 from tests.sampled_paths import sample_path
 from world.scenario import Scenario, load_scenario
 
-EMBEDDED = ("jacksboro", "steep", "tight")
+EMBEDDED = ("jacksboro-air", "steep", "tight")
 
 
 @pytest.fixture(scope="module", params=EMBEDDED)

@@ -57,7 +57,7 @@ PAPERS = {"umda", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))
 def test_those_that_count_violations_are_the_papers_and_know_no_autopilot(name: str) -> None:
-    limits = load_airframe(load_scenario("jacksboro")).limits
+    limits = load_airframe(load_scenario("jacksboro-air")).limits
     assert limits.tracking is not None
     within = limits_for(find_algorithm(name, "a.toml"), limits)
     assert (within.tracking is None) == (name in PAPERS)

@@ -25,7 +25,7 @@ for name in sys.argv[1:]:
     scenario = load_scenario(name)
     print(hashlib.sha256(plan_json(make_plan(scenario, load_airframe(scenario), 7)).encode()).hexdigest())
 """
-NAMES = ("hard-07", "jacksboro", "paper-07") if SOAK else ("hard-07",)
+NAMES = ("hard-07", "jacksboro-air", "paper-07") if SOAK else ("hard-07",)
 
 
 def hashes(**changes: str) -> str:

@@ -16,13 +16,13 @@ from world.scenario import Scenario, load_scenario
 
 @pytest.mark.parametrize("seed", [2, 3, 2**40])
 def test_jacksboro_is_safe_for_other_seeds(seed: int, make_limits: Callable[[Scenario], Limits]) -> None:
-    scenario = load_scenario("jacksboro")
+    scenario = load_scenario("jacksboro-air")
     assert plan_path(scenario, make_limits(scenario), seed=seed).safe
 
 
 def test_jacksboro_is_a_problem() -> None:
     """At least 12 km and 12 threats of all three kinds; ground and a missile stand in the straight line's way."""
-    scenario = load_scenario("jacksboro")
+    scenario = load_scenario("jacksboro-air")
     threats = scenario.threats
     assert math.dist(scenario.start[:2], scenario.destination[:2]) >= 12_000
     assert len(threats) >= 12

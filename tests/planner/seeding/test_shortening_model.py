@@ -54,7 +54,7 @@ def test_limits_of_slopes_and_what_is_wanted_are_the_problems_own() -> None:
 
 def test_turns_take_of_the_legs_what_a_corner_of_that_turn_takes() -> None:
     """Over the tangent of half the turn it is about the arc's radius: v^2 / g tan(bank), without wind or autopilot."""
-    task = make_task("jacksboro")
+    task = make_task("jacksboro-air")
     data = task.problem.search
     path = resample(np.array([data.start, data.destination]), 8)
     path[3, 0] += 400.0
@@ -88,10 +88,10 @@ def zigzag(data: ProblemArrays, share: float, waypoints: int = 9) -> np.ndarray:
     return path
 
 
-@pytest.mark.parametrize("name", ["hard-60", "jacksboro"])
+@pytest.mark.parametrize("name", ["hard-60", "jacksboro-air"])
 def test_the_gradient_is_that_of_the_augmented_length(name: str) -> None:
     data = make_task(name).problem.search
-    assert data.legs_hold_turns == (name == "jacksboro")
+    assert data.legs_hold_turns == (name == "jacksboro-air")
     path, limits = zigzag(data, 1.0 if name == "hard-60" else 0.3), precompute_limits(data)
     active = active_constraints(data, path, 8, 0.5)
     # As if turns took far more of their legs: then these are too short.

@@ -85,7 +85,7 @@ def fly_kept(flight: str) -> Flown:
     place = one["landing"]
     strip = LandingStrip(place["east_m"], place["north_m"], math.radians(place["course_deg"]), length=300.0)
     wind = Wind(one["wind_mps"], math.radians(250.0))
-    scenario = replace(load_scenario("jacksboro"), wind=wind, launch=RAIL, landing=strip)
+    scenario = replace(load_scenario("jacksboro-air"), wind=wind, launch=RAIL, landing=strip)
     lat, lon = (float(value) for value in to_geo(scenario.origin, *HOME[:2]))
     items = []
     for k, (command, item_lat, item_lon, amsl) in enumerate(one["items"], 1):

@@ -58,7 +58,7 @@ def rally(flight: str) -> list[tuple[float, float, float]]:
 @functools.cache
 def jacksboro() -> Scenario:
     """The scenario in the flights' wind."""
-    return replace(load_scenario("jacksboro"), wind=WIND)
+    return replace(load_scenario("jacksboro-air"), wind=WIND)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ def test_a_scenario_names_it_and_its_version(aerosonde: Aircraft) -> None:
 def test_a_plan_states_the_version_that_it_is_for() -> None:
     stated = with_flight(load_scenario("tight"), autopilot="px4").to_json()["flight"]
     assert (stated["autopilot"], stated["px4_version"]) == ("px4", "1.17")
-    assert "px4_version" not in load_scenario("jacksboro").to_json()["flight"]
+    assert "px4_version" not in load_scenario("jacksboro-air").to_json()["flight"]
 
 
 def test_parameters_alone_are_of_the_autopilot_that_the_scenario_names(aerosonde: Aircraft, tmp_path: Path) -> None:

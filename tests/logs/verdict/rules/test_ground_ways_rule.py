@@ -401,7 +401,7 @@ def on_real_ground(home: tuple[float, float, float], *lines: str) -> Verdict:
 
 @cache
 def real_ground() -> Terrain:
-    ground = load_scenario("jacksboro").terrain
+    ground = load_scenario("jacksboro-air").terrain
     assert ground is not None
     return ground
 
