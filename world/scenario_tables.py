@@ -532,14 +532,15 @@ class RallyTable(PointTable):
 
 
 # What a scenario may ask of the way home from everywhere: that RTL is safe; that a glide without the engine leads
-# somewhere.
-ReturnDemand = Literal["rtl", "glide"]
+# somewhere; that a landing may be aborted.
+ReturnDemand = Literal["rtl", "glide", "go_around"]
 
 
 class ReturnsTable(ScenarioTable):
     """[returns]: what a verdict asks of the way home from everywhere, and what a planned mission sets for it.
 
-    require: "rtl" where every return to launch has to be safe, "glide" where an engine may stop anywhere.
+    require: "rtl" where every return to launch has to be safe, "glide" where an engine may stop anywhere, "go_around"
+        where a landing may be aborted anywhere on its glide.
     rtl_altitude_m: over home, that a return climbs or descends to.
     rtl_autoland: ArduPlane's: 1 for home and on to the landing, 2 for straight to the landing, 3 for a circle at home.
     rally: points that are nearer than home.

@@ -202,6 +202,7 @@ class Autopilot(ABC):
     reads_as_px4: whether it reads nothing but the value of a mission's change of speed, goes back to its own airspeed
         for any that is not positive, and reads gates.
     flies_ground: whether it flies take-offs and landings, see `from_ground`.
+    flies_both_ends: whether it does so only in a mission that has both.
     height_candidates, side_candidates: parameters that may decide a flight which fails by its height or its track.
     """
 
@@ -214,6 +215,7 @@ class Autopilot(ABC):
     refuses: ClassVar[bool] = False
     reads_as_px4: ClassVar[bool] = False
     flies_ground: ClassVar[bool] = False
+    flies_both_ends: ClassVar[bool] = False
     height_candidates: ClassVar[tuple[Candidate, ...]] = ()
     side_candidates: ClassVar[tuple[Candidate, ...]] = ()
     parameters: Parameters | None = None

@@ -30,7 +30,7 @@ class ProgramAutopilot(Autopilot):
     """
 
     log_suffix: ClassVar[str]
-    # Whatever its law does: a program is put into the air on a rail.
+    # Whatever its law does: unless its own class says otherwise, a program is put into the air on a rail.
     flies_ground: ClassVar[bool] = False
 
     @classmethod

@@ -34,6 +34,7 @@ WAYPOINT = record_dtype(
     ("stop", np.int64),  # which of the route's stops it belongs to: a jump back leads to another of the same item
     ("gate", np.bool_),  # whether it is a CONDITION_GATE, which is passed and not flown to
     ("ends", np.bool_),  # whether the mission ends there and goes no further: not to land, not home
+    ("straight", np.bool_),  # whether the leg to it leads from wherever the aircraft is, along no line
     "slope_base",  # m, as of `flight.mission.return_path.ReturnCircle`
 )
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.

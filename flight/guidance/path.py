@@ -277,8 +277,10 @@ def waypoint_records(route: Route, mission: Mission | None = None) -> Records:
     gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
     waypoints["gate"] = np.isin(route.items, gates)
     waypoints["ends"][-1] = mission is not None and goes_no_further(route, mission)
+    if route.straight_to >= 0:
+        waypoints["straight"][route.straight_to] = True
     if route.return_to is not None:
-        back = waypoints[route.return_from + 1 :]
+        back = waypoints[route.return_from + 1 : route.return_until]
         back["returns"] = True
         names = ("centre_east", "centre_north", "up", "circle", "slope_base")
         for name, value in zip(names, route.return_to, strict=True):

@@ -173,12 +173,13 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
     ahead = route.waypoints[first + 1, :2] - here
     course = launch.course if launch.course is not None else math.atan2(ahead[0], ahead[1])
     home = np.array([*here, float(ground)])
-    top, pitch = float(route.waypoints[first, 2]), _climb_pitch(item)
+    top, pitch = float(route.waypoints[first, 2]), climb_pitch(item)
     speed, pushed = launch.release_speed(slowest), launch.acceleration(slowest)
     return TakeOff(launch, item.seq, home, course, top, base.up, pitch, first, speed, pushed), ""
 
 
-def _climb_pitch(item: MissionItem) -> float:
+def climb_pitch(item: MissionItem) -> float:
+    """Least pitch of the climb that a take-off item asks for, rad."""
     pitch = item.params[0]
     return math.radians(pitch) if pitch > 0.0 else USUAL_PITCH
 

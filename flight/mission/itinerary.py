@@ -29,6 +29,8 @@ _MAX_STEPS = 200_000
 # A loiter without end is flown for this long, s, and the mission ends there.
 UNLIMITED = 60.0
 
+# Noted of items behind a mission's end.
+NEVER_REACHED = "never reached"
 # Noted of a landing item, but where its landing is flown.
 LANDING_NOTE = "not flown to the ground; the flight ends above it at the last height"
 
@@ -168,7 +170,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
         walk.notes.by_value.add("CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item)
     for item in mission.items:
         if item.seq not in reached and not (walk.ended and item.command == Command.DO_JUMP):
-            walk.notes.add("never reached", item.seq)
+            walk.notes.add(NEVER_REACHED, item.seq)
     if not walk.stops:
         raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)
     return Itinerary(

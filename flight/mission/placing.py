@@ -1,7 +1,9 @@
 """The places of a mission on the map: east and north of its stops, and their heights above mean sea level."""
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +41,20 @@ LOWEST, HIGHEST = -500.0, 9000.0
 _HOME_ERROR = 30.0
 
 
+class PlacedLanding(NamedTuple):
+    """A landing sequence of a mission that a return to launch may go on to.
+
+    start: where it begins.  stops: in flying order, the landing the last.
+    ground: height of the place to land at, m, NaN where it is not known.
+    notes: what of it is not flown as written.
+    """
+
+    start: LandingStart
+    stops: tuple[PlacedStop, ...]
+    ground: float
+    notes: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class PlacedMission:
     """A mission's places on the map about ``origin``, heights above mean sea level.
@@ -49,6 +65,7 @@ class PlacedMission:
     landing_ground: height of the place to land at, m, NaN where it is not known or nothing lands.
     return_places: home, at the height that heights over home count from, and then the rally points; empty where the
         mission does not end with a return.
+    landings: the landing sequences that such a return may go on to.
     """
 
     mission: Mission
@@ -59,6 +76,7 @@ class PlacedMission:
     takeoff_ground: float
     landing_ground: float
     return_places: tuple[ReturnPlace, ...] = ()
+    landings: tuple[PlacedLanding, ...] = ()
 
 
 def place_stops(
@@ -93,8 +111,9 @@ def place_stops(
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
     landing_ground = heights.touchdown(itinerary)
     places = _return_places(mission, itinerary.home, origin, heights) if itinerary.returns else ()
+    landings = _landings(mission, origin, heights) if itinerary.returns else ()
     return PlacedMission(
-        mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground, places
+        mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground, places, landings
     )
 
 
@@ -138,25 +157,83 @@ def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None)
     if mission.home is None:
         return ()
     heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
+    return tuple(start for _, start in _marked_starts(mission, origin, heights))
 
-    def placed(item: MissionItem) -> tuple[float, float, float]:
-        stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
-        east, north = on_map(mission.source, (stop,), origin)[0].tolist()
-        return east, north, heights.amsl(stop, east, north, heights.home_amsl())
 
-    found = []
+def _marked_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> Iterator[tuple[int, LandingStart]]:
+    """Each DO_LAND_START that something to fly to follows, by its place in the list, and where its sequence begins."""
     for k, mark in enumerate(mission.items):
-        flown_to = PLACES | LANDINGS
-        first = next((one for one in mission.items[k + 1 :] if one.command in flown_to and one.has_position), None)
+        first = next((one for one in mission.items[k + 1 :] if _is_flown_to(one)), None)
         if mark.command != Command.DO_LAND_START or first is None:
             continue
-        place, loiter = placed(first), loiter_of(first)
-        counted = placed(mark) if mark.has_position else place
-        radius = (loiter or Loiter(0.0)).radius
-        found.append(
-            LandingStart(first.seq, place, counted, loiter is not None, radius, lands=first.command in LANDINGS)
-        )
+        place = _placed_start(first, origin, heights)
+        onward = _sequence(mission.items[k + 1 :], origin, heights)[1:]
+        counted = _place_of(mark, origin, heights) if mark.has_position else place.place
+        yield k, place._replace(mark=counted, onward=onward)
+
+
+def _landings(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> tuple[PlacedLanding, ...]:
+    """The landing sequences of a mission; those that begin with the landing, or cannot be placed, are none."""
+    found = []
+    for k, start in _marked_starts(mission, origin, heights):
+        if start.lands:
+            continue
+        try:
+            itinerary = make_itinerary(replace(mission, items=mission.items[k:]))
+            stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs=False)
+        except MissionError:
+            continue
+        if itinerary.landing is not None and len(stops) > 1:
+            found.append(PlacedLanding(start, tuple(stops), heights.touchdown(itinerary), itinerary.notes))
     return tuple(found)
+
+
+def landing_sequence(
+    mission: Mission, origin: GeoOrigin, terrain: Terrain | None, first: int
+) -> tuple[LandingStart, ...]:
+    """The places of a landing sequence on the map, from an item's on to the landing, without that.
+
+    None of a mission without a home.  first: number of the item.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> over, none = int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4
+    >>> line_up = [MissionItem(k, Command.NAV_WAYPOINT, over, none, 36.5, 8.0 + 0.01 * k, 60.0) for k in (3, 4)]
+    >>> land = MissionItem(5, Command.NAV_LAND, over, none, 36.5, 8.0, 0.0)
+    >>> mission = Mission(Home(36.5, 8.0, 300.0), (*line_up, land))
+    >>> [one.item for one in landing_sequence(mission, GeoOrigin(36.5, 8.0), None, 3)]
+    [3, 4]
+    """
+    if mission.home is None:
+        return ()
+    heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
+    return _sequence([item for item in mission.items if item.seq >= first], origin, heights)
+
+
+def _sequence(items: Sequence[MissionItem], origin: GeoOrigin, heights: "_Heights") -> tuple[LandingStart, ...]:
+    """The places among items up to the first landing."""
+    found = []
+    for item in items:
+        if item.command in LANDINGS:
+            break
+        if _is_flown_to(item):
+            found.append(_placed_start(item, origin, heights))
+    return tuple(found)
+
+
+def _is_flown_to(item: MissionItem) -> bool:
+    return item.command in PLACES | LANDINGS and item.has_position
+
+
+def _place_of(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> tuple[float, float, float]:
+    stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
+    east, north = on_map(heights.source, (stop,), origin)[0].tolist()
+    return east, north, heights.amsl(stop, east, north, heights.home_amsl())
+
+
+def _placed_start(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
+    place, loiter = _place_of(item, origin, heights), loiter_of(item)
+    radius = (loiter or Loiter(0.0)).radius
+    return LandingStart(item.seq, place, place, loiter is not None, radius, lands=item.command in LANDINGS)
 
 
 def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:

@@ -12,7 +12,7 @@ ArduPlane/altitude.cpp), in its names where sentences name one.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from flight.mission.itinerary import UNLIMITED, ItineraryStop
 from flight.mission.loiter_circles import CORNER, Node, RoutePoint, circle_corners, is_joined, on_rim, tangent_course
@@ -60,6 +60,7 @@ class LandingStart(NamedTuple):
     mark: east, north, up that its distance is counted to: of DO_LAND_START, where that states a place.
     circles: whether it is a loiter.  radius: of the loiter, m, negative to the left, 0 where none is stated.
     lands: whether it is the landing itself.
+    onward: the places after it, up to the landing, without their own.
     """
 
     item: int
@@ -68,6 +69,7 @@ class LandingStart(NamedTuple):
     circles: bool = False
     radius: float = 0.0
     lands: bool = False
+    onward: tuple["LandingStart", ...] = ()
 
 
 def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingStart | None:
@@ -84,6 +86,8 @@ def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingSta
 
 # A turn whose tangent is shorter than this (m) is none.
 _NO_TURN = 1.0
+# A return goes on from its circle within so much of its height, m.
+_JOINS = 10.0
 # A turn by more than this (rad) to one side is one of less to the other.
 _TOO_FAR = 1.5 * math.pi
 
@@ -106,6 +110,8 @@ class ReturnRules:
     rally_height: over a rally point's own height, m, at which it comes there.
     landing_counts: whether a mission's landing is a place that it returns to, which is noted and not flown.
     instead: what of its own rules is flown otherwise, a note for people; "" for nothing.
+    lands: whether it goes on to a landing sequence of the mission: "circle" for by its circle at home or a rally point,
+        "straight" for at once; "" where it stays in its circle.
     holds_height: whether it holds its height until it is over its target and comes down in circles there, and climbs,
         if it has to, in circles where it is, as PX4 does.
 
@@ -126,6 +132,7 @@ class ReturnRules:
     rally_height: float = 0.0
     landing_counts: bool = False
     instead: str = ""
+    lands: Literal["", "circle", "straight"] = ""
 
 
 # A slope drawn to so far (m) below its target, and flown no higher than where it begins, is none until the very end.
@@ -207,8 +214,10 @@ def choose_target(rules: ReturnRules, here: Place, home: ReturnPlace, rally: Seq
     )
 
 
-def described_return(target: ReturnTarget, rules: ReturnRules, up: float) -> str:
-    """What a return does, a note for people.  up: height (m AMSL) at which it begins.
+def described_return(target: ReturnTarget, rules: ReturnRules, up: float, onward: str = "") -> str:
+    """What a return does, a note for people.
+
+    up: height (m AMSL) at which it begins.  onward: what it goes on to from its circle, "" where it stays.
 
     >>> described_return(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
     'NAV_RETURN_TO_LAUNCH: to home, 3.2 km away, sinking 655 m on a straight slope to 435 m AMSL; circles for 60 s; ...'
@@ -235,19 +244,26 @@ def described_return(target: ReturnTarget, rules: ReturnRules, up: float) -> str
                 f"; banks no more than {bank:.0f} degrees all the way, as it never climbs the"
                 f" {rules.climb_first:.0f} m of RTL_CLIMB_MIN"
             )
+    ends = f"from its circle on to {onward}" if onward else f"circles for {UNLIMITED:.0f} s; the mission ends there"
     return (
         f"NAV_RETURN_TO_LAUNCH: to {target.name}, {_km(target.distance)} away{reason}, {way}"
-        f" {target.position[2]:.0f} m AMSL{first}; circles for {UNLIMITED:.0f} s; the mission ends there"
+        f" {target.position[2]:.0f} m AMSL{first}; {ends}"
     )
 
 
 def lay_return(
-    before: Sequence[RoutePoint], stop: ItineraryStop, target: ReturnTarget, rules: ReturnRules, ability: ReturnAbility
+    before: Sequence[RoutePoint],
+    stop: ItineraryStop,
+    target: ReturnTarget,
+    rules: ReturnRules,
+    ability: ReturnAbility,
+    onward: Place | None = None,
 ) -> list[RoutePoint]:
     """Waypoints of a return: its turn, its straight way, and the circle at its end.
 
     before: the route so far; the return begins at its last point, on the course of its last leg.
     stop: the return's.
+    onward: where it goes on to from its circle, as soon as it has its height there; None where it stays.
 
     The turn goes the short way.  Heights of a descent are on the straight slope from where the turn begins to the
     target, by the place along that line, no steeper than the aircraft can; a climb or a small fall begins at once.
@@ -259,7 +275,7 @@ def lay_return(
     radius = math.copysign(max(abs(rules.radius), ability.circle), rules.radius)
     circle = Node(stop, *target.position, radius)
     dive = min(ability.dive, rules.sink / ability.airspeed)
-    plan = _Plan(circle, target.slope_base, rules.least_slope, ability, dive, here)
+    plan = _Plan(circle, target.slope_base, rules.least_slope, ability, dive, here, onward)
     if _distance(here, target.position) <= abs(radius) + _NO_TURN:
         # So near that it is on the circle as soon as it is across it.
         plan.circle_from(*_rim_ahead(here, course, circle))
@@ -276,11 +292,18 @@ class _Plan:
     """
 
     def __init__(
-        self, circle: Node, slope_base: float, least_slope: float, ability: ReturnAbility, dive: float, here: Place
+        self,
+        circle: Node,
+        slope_base: float,
+        least_slope: float,
+        ability: ReturnAbility,
+        dive: float,
+        here: Place,
+        onward: Place | None,
     ) -> None:
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
-        self._least_slope, self._ability, self._dive = least_slope, ability, dive
+        self._least_slope, self._ability, self._dive, self._onward = least_slope, ability, dive, onward
         self._at = self._slope_from = here
 
     @property
@@ -353,9 +376,28 @@ class _Plan:
         radius = abs(self._circle.turn)
         missing = self._rise
         spiral = abs(missing) / (self._ability.climb if missing > 0.0 else self._dive) / radius
+        if self._onward is not None:
+            self._go_on(course, spiral if abs(missing) > _JOINS else 0.0, self._onward)
+            return
         sweep = spiral + max(2.0 * math.pi, UNLIMITED * self._ability.airspeed / radius)
+        self._add_circle(course, sweep)
+
+    def _add_circle(self, course: float, sweep: float) -> None:
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
+
+    def _go_on(self, course: float, spiral: float, onward: Place) -> None:
+        """Fly around the circle until its height is reached, and turn the short way to a place from there."""
+        if spiral > 0.0:
+            self._add_circle(course, spiral)
+            course += math.copysign(spiral, self._circle.turn)
+        self._circle = Node(self._stop, onward[0], onward[1], self._at[2])
+        radius = self._ability.turn_radius(course, _course(self._at, onward), self._at[2])
+        arc = self._arc(course, radius)
+        if arc is not None and radius * math.tan(0.5 * min(arc[1], CORNER)) > _NO_TURN:
+            node, part, end = arc
+            self._add_arc(node, course, part, on_circle=True)
+            self._add(*on_rim(node, end), 0.0, on_circle=True)
 
     def _arc(self, course: float, radius: float) -> tuple[Node, float, float] | None:
         """The arc from here to the tangent of the target's circle: its circle, its angle, and the course it ends on.

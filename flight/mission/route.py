@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, PLACES, Command, Mission, Notes, command_name
-from flight.mission.itinerary import Itinerary, ItineraryStop, loiter_of
+from flight.mission.itinerary import NEVER_REACHED, Itinerary, ItineraryStop, loiter_of
 from flight.mission.loiter_circles import (
     PLAIN_SLOPE,
     USUAL_LOITERS,
@@ -22,7 +23,7 @@ from flight.mission.loiter_circles import (
     Unjoined,
     lay_circles,
 )
-from flight.mission.placing import HIGHEST, LOWEST, SAME_PLACE, PlacedMission, place_stops
+from flight.mission.placing import HIGHEST, LOWEST, SAME_PLACE, PlacedLanding, PlacedMission, place_stops
 from flight.mission.return_path import (
     USUAL_RULES,
     ReturnAbility,
@@ -31,6 +32,7 @@ from flight.mission.return_path import (
     choose_target,
     described_return,
     lay_return,
+    nearest_landing,
 )
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo, to_map
@@ -58,8 +60,10 @@ class Route:
     takeoff_ground, landing_ground: m, the ground that the mission takes off from and the place that it lands at, which
         the flight begins and ends above; NaN where there is none or it is not known.
     return_from: index of the waypoint at which a return to launch begins, -1 for none; what follows stands for the way
-        that an autopilot finds by itself.
-    return_to: the circle that the return ends in; None for no return.
+        that an autopilot finds by itself, up to `return_until`.
+    return_to: the circle that the return ends in, or goes on from to a landing sequence; None for no return.
+    straight_to: index of the waypoint at which a landing sequence begins that a return goes on to, -1 for none: whoever
+        flies heads for it from where it is, along no line.
     stops: (w,) number of the stop that the waypoint belongs to, never less than the one before: a jump back leads to
         another stop of the same item.  Where it is not given, waypoints of one item in a row are one.
     unjoined: stops that whoever flies goes to, and that the waypoints lack, for no tangent joins them to a circle.
@@ -78,6 +82,7 @@ class Route:
     landing_ground: float = math.nan
     return_from: int = -1
     return_to: ReturnCircle | None = None
+    straight_to: int = -1
     stops: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     unjoined: tuple[Unjoined, ...] = ()
 
@@ -97,6 +102,14 @@ class Route:
     def legs(self) -> int:
         """How many legs there are."""
         return len(self.waypoints) - 1
+
+    @property
+    def return_until(self) -> int:
+        """Index of the waypoint at which a return has come to the mission's landing sequence; one beyond the last."""
+        if self.return_from < 0:
+            return len(self.waypoints)
+        own = self.items[self.return_from + 1 :] == self.items[self.return_from + 1]
+        return self.return_from + 1 + int(np.argmin(own)) if not own.all() else len(self.waypoints)
 
 
 def goes_no_further(route: Route, mission: Mission) -> bool:
@@ -135,6 +148,7 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
         landing_ground=route.landing_ground if last == route.legs else math.nan,
         return_from=max(0, route.return_from - first) if 0 <= route.return_from < last else -1,
         return_to=route.return_to if route.return_from < last else None,
+        straight_to=route.straight_to - first if first < route.straight_to <= last else -1,
     )
 
 
@@ -231,6 +245,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         stops=np.concatenate([np.arange(head), route.stops + head, route.stops[-1:] + head + np.arange(1, tail + 1)]),
         started=started,
         return_from=route.return_from + (head if route.return_from >= 0 else 0),
+        straight_to=route.straight_to + (head if route.straight_to >= 0 else 0),
     )
 
 
@@ -323,16 +338,19 @@ def lay_route(
     places = _with_gates(placed, notes) if reads_as_px4 else list(placed.stops)
     kept = [_with_airspeed(place, default_airspeed, reads_as_px4) for place in places]
     returning = kept.pop() if placed.itinerary.returns else None
-    points, unjoined = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
+    straight = None if returning is None else _straight_to_land(placed, kept, rules, notes)
+    if straight is not None:
+        kept += [_with_airspeed(place, default_airspeed, reads_as_px4) for place in straight.stops]
+    lay = partial(_lay_circles, mission.source, limits, loiters, notes)
+    points, unjoined = lay(kept)
     _note_circles(placed.itinerary, kept, loiters, notes)
-    back: dict[str, Any] = {}
-    if returning is not None:
-        back = _lay_return(placed, returning.stop, points, rules, limits, notes)
+    landing, back = straight, dict[str, Any]()
+    if returning is not None and straight is None:
+        back, landing = _lay_return(placed, returning.stop, points, rules, limits, notes)
+        if landing is not None:
+            points += lay([_with_airspeed(place, default_airspeed, reads_as_px4) for place in landing.stops])[0]
     if len(points) < 2:
-        raise MissionError(
-            f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected",
-            file=mission.source,
-        )
+        raise _too_few(mission.source, len(points))
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
@@ -346,18 +364,58 @@ def lay_route(
         fly_over=np.where(arcs > 0.0, False, fly_over | arc_misses(waypoints, airspeed, acceptance, limits)),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_started(placed.itinerary, stops[0], placed.origin, waypoints),
-        notes=(placed.itinerary.notes_by_value if reads_as_px4 else placed.itinerary.notes)
-        + placed.notes
-        + notes.lines(),
+        notes=_notes_of(placed.itinerary, landing, reads_as_px4) + placed.notes + notes.lines(),
         arcs=arcs,
         stops=np.cumsum([False, *(a is not b for a, b in pairwise(stops))]),
+        straight_to=-1 if landing is None else [stop.item for stop in stops].index(landing.stops[0].stop.item),
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
-        landing_ground=placed.landing_ground,
+        landing_ground=placed.landing_ground if landing is None else landing.ground,
         # Who flies on tangents leaves these out; who flies at the circle's middle does not.
         unjoined=unjoined if loiters.at_middle else (),
         **back,
     )
+
+
+def _too_few(source: str, places: int) -> MissionError:
+    message = f"{source}: {places} place to fly to: at least two different ones are expected"
+    return MissionError(message, file=source)
+
+
+def _notes_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[str, ...]:
+    """Notes of an itinerary, and of the landing sequence that its return goes on to, whose items are reached so."""
+    notes = itinerary.notes_by_value if reads_as_px4 else itinerary.notes
+    return notes if landing is None else (*(note for note in notes if NEVER_REACHED not in note), *landing.notes)
+
+
+def _lay_circles(
+    source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[PlacedStop]
+) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
+    return lay_circles(source, stops, notes, _own_radius(limits), _spiral_slopes(limits), loiters)
+
+
+def _straight_to_land(
+    placed: PlacedMission, kept: list[PlacedStop], rules: ReturnRules, notes: Notes
+) -> PlacedLanding | None:
+    """The landing sequence that a return flies to at once; None where it does not.  kept: the stops before it."""
+    if rules.lands != "straight" or not placed.landings or not kept:
+        return None
+    east, north, up = kept[-1].position.tolist()
+    landing = _nearest(placed, (east, north, up))
+    away, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
+    text = f"at once to the landing sequence at item {landing.start.item}, {away / 1000.0:.1f} km away"
+    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_of_several(placed)}", seq)
+    return landing
+
+
+def _nearest(placed: PlacedMission, here: tuple[float, float, float]) -> PlacedLanding:
+    """The landing sequence that a return goes to from a place, m."""
+    start = nearest_landing(here, [one.start for one in placed.landings])
+    return next(one for one in placed.landings if one.start == start)
+
+
+def _of_several(placed: PlacedMission) -> str:
+    return f" (the nearest of {len(placed.landings)}, height counted)" if len(placed.landings) > 1 else ""
 
 
 def _note_circles(itinerary: Itinerary, kept: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
@@ -378,8 +436,10 @@ def _lay_return(
     rules: ReturnRules,
     limits: Limits | None,
     notes: Notes,
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], PlacedLanding | None]:
     """Add a return's waypoints to those so far; gives the fields of the `Route` that are a return's.
+
+    Also the landing sequence that it goes on to, None where it stays in its circle.
 
     Raises MissionError for a height beyond those that are flown.
     """
@@ -402,15 +462,18 @@ def _lay_return(
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
     )
-    notes.add(described_return(target, rules, here[2]), stop.item)
+    landing = _nearest(placed, target.position) if rules.lands == "circle" and placed.landings else None
+    onward = "" if landing is None else f"the landing sequence at item {landing.start.item}{_of_several(placed)}"
+    notes.add(described_return(target, rules, here[2], onward), stop.item)
     if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
         notes.add(f"the mission's landing counts as a place to return to: not flown to; to {target.name}", stop.item)
     if rules.instead:
         notes.add(rules.instead, stop.item)
     first = len(points) - 1
-    points += lay_return(points, stop, target, rules, ability)
+    place = None if landing is None else landing.start.place
+    points += lay_return(points, stop, target, rules, ability, place)
     circle = ReturnCircle(*target.position, rules.radius or ability.circle, target.slope_base)
-    return {"return_from": first, "return_to": circle}
+    return {"return_from": first, "return_to": circle}, landing
 
 
 def _with_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:

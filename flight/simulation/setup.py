@@ -258,7 +258,12 @@ class FlightSetup:
         if not self.autopilot.flies_ground:
             title = self.autopilot.title
             return GroundWays(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
-        return find_ground_ways(self.scenario, self.mission, self.route, self.slowest_launched)
+        ways = find_ground_ways(self.scenario, self.mission, self.route, self.slowest_launched)
+        if self.autopilot.flies_both_ends and ways and (ways.take_off is None or ways.approach is None):
+            lacks = "take-off" if ways.take_off is None else "landing"
+            text = f"without a {lacks} that is flown from the ground, the program is put into the air on a rail"
+            return GroundWays(notes=(*ways.notes, text))
+        return ways
 
     @property
     def slowest_launched(self) -> float:

@@ -136,6 +136,7 @@ class RouteTable(SetupModel):
         tuple[Finite, Finite, Finite, Finite, Finite] | None,
         Field(alias="return_to_east_north_amsl_radius_slope_base_m"),
     ] = None
+    straight_to: Annotated[int, Field(ge=-1, alias="straight_to_waypoint")] = -1
     unjoined: Annotated[tuple[Unjoined, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
 
     def route(self, file: str) -> Route:
@@ -155,6 +156,8 @@ class RouteTable(SetupModel):
                 raise self.fault(file, field, f"{length} values: {expected} are expected")
         if self.return_from >= len(waypoints) - 1 or (self.return_from < 0) != (self.return_to is None):
             raise self.fault(file, "return_from", f"{self.return_from}: a waypoint before the last, with its target")
+        if self.straight_to >= len(waypoints):
+            raise self.fault(file, "straight_to", f"{self.straight_to}: a waypoint, or -1")
         heights = {field: getattr(self, field) for field in ("takeoff_ground", "landing_ground")}
         known = {field: math.nan if height is None else height for field, height in heights.items()}
         circle = None if self.return_to is None else ReturnCircle(*self.return_to)

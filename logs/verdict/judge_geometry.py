@@ -76,7 +76,8 @@ def with_suggestions(
     The way of a return to launch is the autopilot's: no change of its legs can be made.
     """
     out, first = [], requirements.setup.route.return_from
-    back = {requirements.leg(i) for i in range(first, requirements.legs)} if first >= 0 else set()
+    last = min(requirements.legs, requirements.setup.route.return_until)
+    back = {requirements.leg(i) for i in range(first, last)} if first >= 0 else set()
     for item in findings:
         suggest = RULES[item.rule].suggest
         asked = item.ok is False or (item.ok is None and item.check == UNKNOWN_AIRCRAFT)

@@ -69,7 +69,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "aircraft.tracking.density_factor",
         "flight.autopilots.arduplane.law.arduplane_tick",
         "flight.autopilots.arduplane.navigator.turn_distance",
-        "flight.autopilots.arduplane.swift_return._fly_return",
+        "flight.autopilots.arduplane.swift_return.fly_stages",
         "flight.autopilots.planfly.law.planfly_tick",
         "flight.guidance.equivalent_airspeed.true_by_equivalent",
         "flight.guidance.path.profile",

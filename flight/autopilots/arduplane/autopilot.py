@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
@@ -185,9 +185,11 @@ class ArduPlane(Autopilot):
     def return_rules(self) -> ReturnRules:
         """By RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_SINK_MAX and GLIDE_SLOPE_MIN.
 
-        >>> made = ArduPlane(default_parameters().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16))
+        >>> made = ArduPlane(default_parameters().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
         >>> made.return_rules.height, made.return_rules.climb_first, made.return_rules.rally_limit
         (nan, inf, 5000.0)
+        >>> made.return_rules.lands
+        'straight'
         """
         made = self.parameters
         return ReturnRules(
@@ -200,6 +202,8 @@ class ArduPlane(Autopilot):
             rally_limit=made.rally_limit,
             includes_home=made.rally_includes_home > 0.0,
             slope_to_stated_height=True,
+            lands=_LANDS.get(int(made.rtl_autoland), ""),
+            instead=_RETURN_PATH if int(made.rtl_autoland) == 4 else "",
         )
 
     @property
@@ -334,6 +338,10 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
 _TURNOVER_SHARE = 0.75
 # Faster over the ground than this ArduPlane knows its course, m/s.
 _MOVES = 5.0
+
+# What a return goes on to, by RTL_AUTOLAND; with 3 the landing sequence is for go-arounds alone.
+_LANDS: dict[int, Literal["", "circle", "straight"]] = {1: "circle", 2: "straight"}
+_RETURN_PATH = "RTL_AUTOLAND 4 goes by the mission's return path or landing sequence: not flown, it stays in its circle"
 
 # `Plane::verify_loiter_heading` lines up with the place of the next item; a return has none, which is 0 N 0 E.
 _BEFORE_RETURN = "ArduPlane leaves its circle heading for 0° N 0° E, and returns from there: flown heading for home"

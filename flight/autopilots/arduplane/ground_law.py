@@ -144,7 +144,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
     ground.time = work.timing.tick * work.timing.dt
     waypoints = path.waypoint[: settings.waypoints]
     pieces = path.piece[: settings.pieces]
-    _feel(work.state, work.place.clearance, ground)
+    feel(work.state, work.place.clearance, ground)
     if ground.stage == TAKING_OFF:
         _take_off(work, own, waypoints, pieces)
     elif ground.stage == IN_AIR:
@@ -158,12 +158,15 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
         find_on_path(work.estimated, pieces, work.memory)
         _land(work, own)
     fill_tick(work)
-    return _ended(work, ground)
+    return ended(work, ground)
 
 
 @inner
-def _feel(state: Record, clearance: float, ground: Record) -> None:  # pragma: no cover - compiled
-    """Note which points touch the ground, which is level as JSBSim has it.  clearance: of the centre of gravity, m."""
+def feel(state: Record, clearance: float, ground: Record) -> None:  # pragma: no cover - compiled
+    """Note which points touch the ground, which is level as JSBSim has it.
+
+    state: of `flight.dynamics.state.STATE`.  clearance: of the centre of gravity, m.  ground: of `GROUND_STATE`.
+    """
     ground.touches, ground.tipped = False, False
     lowest = clearance
     nose, tilt = math.sin(state.pitch), math.cos(state.pitch)
@@ -176,8 +179,11 @@ def _feel(state: Record, clearance: float, ground: Record) -> None:  # pragma: n
 
 
 @inner
-def _ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
-    """How the flight ends by now: a key of `ENDS`, or 0 to fly on."""
+def ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
+    """How the flight ends by now: a key of `ENDS`, or 0 to fly on.
+
+    work: of `flight.simulation.tick.WORKSPACE`.  ground: of `GROUND_STATE`, whoever sets its stage.
+    """
     state, speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     empty = work.air.energy >= work.settings.battery
     if ground.stage == IN_AIR:

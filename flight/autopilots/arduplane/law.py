@@ -375,6 +375,18 @@ def _set_throttle(
 
 
 @inner
+def wind_up_throttle(parameters: Record, own: Record) -> None:  # pragma: no cover - compiled
+    """Leave the throttle's integral where it asks for full throttle, as after each turn of a climb-out.
+
+    `AP_TECS::_update_throttle_with_airspeed` sets it so while it takes off or aborts a landing; the throttle stays open
+    for a while after that.
+    """
+    lowest, highest = max(0.0, parameters.throttle_min), parameters.throttle_max
+    amplitude = _THROTTLE_SHARE * (highest - lowest)
+    own.throttle_sum = min(amplitude, max(-amplitude, highest - own.throttle_before + _THROTTLE_SPARE))
+
+
+@inner
 def _set_pitch(
     state: Record, parameters: Record, own: Record, high: float, fast: float, climbing: float, gaining: float,
     under: bool, dt: float,
@@ -480,7 +492,7 @@ def fly_as_ardupilot(
         memory.returning = last and (not b.to_height or abs(estimated.up - b.up) <= FAR)
         stays = b.stays == math.inf and own.stayed > UNLIMITED
         memory.done = last and (own.over or stays)
-    if own.returning:
+    if own.returning and waypoints[waypoints.shape[0] - 1].returns:
         end_return(estimated, waypoints[own.leg + 1], memory, dt)
     memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
     if memory.done and b.to_height:

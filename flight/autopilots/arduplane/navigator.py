@@ -29,6 +29,8 @@ _FAR = 3.0
 REACHED_HEIGHT, _STUCK_CIRCLES = 5.0, 3.0
 # It heads for what follows within this, rad, and so much more for each circle that it has waited.
 _LINED_UP, _WIDENS = math.radians(10.0), math.radians(10.0)
+# A return leaves its circle for the landing sequence within so much of the height there, m.
+JOINS_WITHIN = 10.0
 # Nothing within so many radii of the middle can be headed for from the circle.
 _WITHIN = 1.05
 
@@ -83,14 +85,15 @@ def navigate_legs(
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
     if b.returns:
-        # A return goes on until the flight ends, in one leg.
+        # A return is one leg; it goes on until the flight ends, or to the mission's landing sequence.
         _return(estimated, b, parameters, own, air_density_factor)
+        _join_landing(estimated, waypoints, b, own)
         return
     if b.circle != 0.0:
         _loiter(estimated, waypoints, b, parameters, own, length, speed, air_density_factor, dt)
         return
     own.on_circle = False
-    _follow_line(estimated, b.east, b.north, parameters, own, length, speed, dt)
+    _follow_line(estimated, b.east, b.north, parameters, own, length, speed, dt, b.straight)
     turn = _turn_after(waypoints, b, own)
     if own.leg + 2 < waypoints.shape[0] and _reached(estimated, b, turn, parameters, own, length, air_density_factor):
         _begin_leg(estimated, waypoints, own.leg + 1, own)
@@ -105,10 +108,14 @@ def target_of(b: Record) -> tuple[float, float]:  # pragma: no cover - compiled
 @inner
 def _follow_line(
     estimated: Record, east: float, north: float, parameters: Record, own: Record, length: float, speed: float,
-    dt: float,
+    dt: float, straight: bool,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Demand the side acceleration along the line from where the leg began to its end, m."""
-    angle, aim = l1_angles(estimated, own.from_east, own.from_north, east, north, length)
+    """Demand the side acceleration along the line from where the leg began to its end, m.
+
+    straight: whether the line is that from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
+    """
+    from_e, from_n = (estimated.east, estimated.north) if straight else (own.from_east, own.from_north)
+    angle, aim = l1_angles(estimated, from_e, from_n, east, north, length)
     own.cross_track_sum = l1_integrate(aim, own.cross_track_sum, parameters.navl1_xtrack_i, dt)
     if not math.isnan(aim):
         angle += aim + own.cross_track_sum
@@ -180,7 +187,7 @@ def _loiter(
     away = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
     if not own.loitering and away > _FAR * radius:
         own.on_circle = False
-        _follow_line(estimated, b.centre_east, b.centre_north, parameters, own, length, speed, dt)
+        _follow_line(estimated, b.centre_east, b.centre_north, parameters, own, length, speed, dt, b.straight)
         return
     own.side_acceleration = _around(estimated, b, radius, parameters, own, length, speed)
     _count(estimated, b, own, dt)
@@ -273,6 +280,23 @@ def _return(
         return
     most = GRAVITY * math.tan(parameters.level_roll_limit)
     own.side_acceleration = min(most, max(-most, own.side_acceleration))
+
+
+@inner
+def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record) -> None:  # pragma: no cover - compiled
+    """Leave a return's circle for the landing sequence, where one follows, as soon as it is followed near its height.
+
+    `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The leg begins where the aircraft is.
+    """
+    after = own.leg + 2
+    while after < waypoints.shape[0] and waypoints[after].returns:
+        after += 1
+    if after >= waypoints.shape[0] or not own.on_circle or abs(estimated.up - b.up) >= JOINS_WITHIN:
+        return
+    own.left_for = after - 1
+    own.returning, own.climbed = False, False
+    _begin_leg(estimated, waypoints, after - 1, own)
+    own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
 
 
 @inner

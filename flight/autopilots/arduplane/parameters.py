@@ -144,9 +144,8 @@ CLIMB_BEFORE_TURN = 1 << 4
 _FOLLOW_ALWAYS, _FOLLOW_HOME = 1 << 0, 1 << 4
 # Of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
 _USUAL_LOITER_RADIUS = 60.0
-# Read, and no flight of ours shows it: a return ends in its circle, where the first would have it land, and on a slope,
-# where the second would have it follow the terrain.
-NOT_FLOWN = ("RTL_AUTOLAND", "TERRAIN_FOLLOW")
+# Read, and no flight of ours shows it: a return is on a slope where this would have it follow the terrain.
+NOT_FLOWN = ("TERRAIN_FOLLOW",)
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 

@@ -29,8 +29,9 @@ from flight.autopilots.arduplane.law import (
     demand_height,
     roll_demand,
     update_tecs,
+    wind_up_throttle,
 )
-from flight.autopilots.arduplane.navigator import navigate_legs
+from flight.autopilots.arduplane.navigator import JOINS_WITHIN, navigate_legs, past_line
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, angle_of_attack, excess_power, move_on
 from flight.dynamics.state import STATE
@@ -58,6 +59,15 @@ _CIRCLING = record_dtype(
 
 # Where a return begins: places and velocities in map axes, m and m/s over the ground; bank, rad.
 RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up", "roll")
+
+# A climb that a flight begins with, as a landing's go-around does.
+CLIMB = record_dtype(
+    ("climbs", np.bool_),
+    "top",  # m AMSL, above which it ends
+    "throttle",  # 0..1, which it opens to
+    "slew",  # of the throttle's range, 1/s
+)
+NO_CLIMB: Record = np.zeros(1, CLIMB)[0]
 
 # How a return ended: at its landing sequence, or in its circle for `flight.mission.itinerary.UNLIMITED` s and once all
 # around it at its height; in the ground; off the elevation data; neither in three times the time that its way takes; or
@@ -88,8 +98,6 @@ AT_CIRCLE = 200.0
 # A return that hits the ground is flown on until it is so deep in it (m): by how much it hit is known then, and what a
 # return that barely does so would meet after that.
 DEEPEST = 10.0
-# A landing sequence is joined from a return's circle within so much of the height there, m (`ModeRTL::navigate`).
-_JOINS_WITHIN = 10.0
 # Every so many ticks a place of the way is kept, 1 s.
 KEPT_EVERY = 10
 # The flight path follows the pitch so late, s: the time in which lift turns the velocity of a small aircraft.
@@ -157,7 +165,7 @@ def fly_returns(
 
     starts: (n,) of `RETURN_START`.
     targets: n circles, where each of them goes; None for one that goes straight to its landing sequence.
-    landings: n landing sequences that they go on to, None for those that end in their circle; or none at all.
+    landings: n landing sequences that they go on to, up to the line-up or a loiter, None for none; or none at all.
     keep: whether their ways are kept.
     least: (n,) heights above ground and (n,) distances outside spheres, m, below which a return need not be flown on.
     engine_out: whether the engine has stopped: it flies on for `REACTION` s, and its circle ends it.
@@ -186,15 +194,15 @@ def fly_returns(
         for target, landing in zip(targets, landings or [None] * len(targets), strict=True)
     ]
     if engine_out:
-        stages = [np.concatenate([_straight_on(start), ends]) for start, ends in zip(starts, stages, strict=True)]
+        stages = [np.concatenate([straight_on(start), ends]) for start, ends in zip(starts, stages, strict=True)]
     flown = np.zeros(len(starts), RETURN_FLOWN)
-    times = [_most_seconds(start, ends, aircraft) for start, ends in zip(starts, stages, strict=True)]
+    times = [most_seconds(start, ends, aircraft) for start, ends in zip(starts, stages, strict=True)]
     way = np.zeros((int(max(times, default=0.0)) + 2 if keep else 0, 3))
     ways, law = [], parameters.record()
     floor, apart = (np.full(len(starts), -math.inf),) * 2 if least is None else least
     for k, ends in enumerate(stages):
-        _fly_return(
-            starts[k], ends, law, aircraft.record, aircraft.excess, aircraft.power, around.heights,
+        fly_stages(
+            starts[k], ends, law, law, NO_CLIMB, aircraft.record, aircraft.excess, aircraft.power, around.heights,
             around.to_pixel, around.spheres, around.radii, around.known, times[k],
             float(floor[k]), float(apart[k]), engine_out, way, flown[k],
         )  # fmt: skip
@@ -206,30 +214,48 @@ def fly_returns(
 def _stages(
     target: ReturnCircle | None, landing: LandingStart | None, parameters: ArduPilotParameters, aircraft: PointMass
 ) -> Records:
-    """(1,) or (2,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: what a return flies to, one after the other.
+    """(n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: what a return flies to, one after the other.
 
-    The first place of a landing sequence is a waypoint, or the middle of a loiter that the mission asks for.
+    A place of a landing sequence is a waypoint, or the middle of a loiter that the mission asks for, which is the last.
     """
-    stages: Records = np.zeros((target is not None) + (landing is not None), WAYPOINT)
+    places = until_circle(() if landing is None else (landing, *landing.onward))
+    stages: Records = np.zeros((target is not None) + len(places), WAYPOINT)
     stages["airspeed"] = aircraft.record.airspeed
     if target is not None:
         first = stages[0]
         first.centre_east, first.centre_north, first.up, first.circle, first.slope_base = target
         first.east, first.north, first.returns = target.east, target.north, True
-    if landing is not None:
-        last = stages[-1]
-        last.east, last.north, last.up = last.centre_east, last.centre_north, last.up = landing.place
-        # Nothing says how its next leg turns: as at a mission's end, it is a right angle.
-        last.turn = 0.5 * math.pi
-        last.circle = (landing.radius or parameters.loiter_radius) if landing.circles else 0.0
+    for stage, place in zip(stages[len(stages) - len(places) :], places, strict=True):
+        fill_stage(stage, place, parameters)
+        # A return's first leg to land is flown along no line, as after any change of mode.
+        stage.straight = place is landing
     return stages
+
+
+def until_circle(places: Sequence[LandingStart]) -> Sequence[LandingStart]:
+    """The places of a landing sequence up to the first that is a loiter: when that is left, no point mass knows.
+
+    >>> spots = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), circles=k == 2) for k in (1, 2, 3)]
+    >>> [one.item for one in until_circle(spots)]
+    [1, 2]
+    """
+    circles = [k for k, one in enumerate(places) if one.circles]
+    return places[: circles[0] + 1] if circles else places
+
+
+def fill_stage(stage: Record, landing: LandingStart, parameters: ArduPilotParameters) -> None:
+    """Make a place of a landing sequence what is flown to: a waypoint, or the middle of a loiter."""
+    stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = landing.place
+    # Nothing says how its next leg turns: as at a mission's end, it is a right angle.
+    stage.turn = 0.5 * math.pi
+    stage.circle = (landing.radius or parameters.loiter_radius) if landing.circles else 0.0
 
 
 # How far away the end of a leg is that is not flown to its end, m.
 _ON = 10_000.0
 
 
-def _straight_on(start: Record) -> Records:
+def straight_on(start: Record) -> Records:
     """(1,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: far ahead on a start's course and slope."""
     ahead: Records = np.zeros(1, WAYPOINT)
     over = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
@@ -238,7 +264,7 @@ def _straight_on(start: Record) -> Records:
     return ahead
 
 
-def _most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
+def most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
     """After how long a return is given up, s."""
     slowest = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
     east, north, up, seconds = start["east"], start["north"], start["up"], 0.0
@@ -251,19 +277,22 @@ def _most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
 
 
 @compiled
-def _fly_return(
-    start: Record, stages: Records, parameters: Record, aircraft: Record, excess: Floats, power: Floats,
-    heights: Heights, to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float, floor: float,
-    apart: float, engine_out: bool, way: Floats, out: Record,
+def fly_stages(
+    start: Record, stages: Records, parameters: Record, staged: Record, climb: Record, aircraft: Record, excess: Floats,
+    power: Floats, heights: Heights, to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float,
+    floor: float, apart: float, engine_out: bool, way: Floats, out: Record,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Fly one return for ``most`` s at the longest, and fill in what is told of it."""
+    """Fly from one stage to the next for ``most`` s at the longest, and fill in what is told of it.
+
+    climb: whether the first stage is a climb, and how far.  staged: the parameters of that climb.
+    """
     # A circle is flown until the return is over: no leg comes after it.  A waypoint is left for one like it.
     waypoints = np.zeros(3, WAYPOINT)
     b = waypoints[1]
     estimated, state = np.zeros(1, MOTION)[0], np.zeros(1, STATE)[0]
     own = np.zeros(1, ARDUPILOT_MEMORY)[0]
     _begin(start, estimated, known, out)
-    _fly_to(stages[0], waypoints, estimated, own)
+    _fly_to(stages, 0, waypoints, estimated, own)
     _take_over(start, parameters, aircraft, excess, state, own)
     pitch, angle = state.pitch, state.pitch - state.alpha
     dt = NAVIGATION_TICK
@@ -280,27 +309,25 @@ def _fly_return(
         is_last = stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - b.centre_east, estimated.north - b.centre_north)
         wide = WIDER * abs(b.circle) * factor * factor
-        if is_last and distance < max(AT_CIRCLE, wide) and math.isnan(out.to_circle):
-            out.to_circle, out.circle_up = time, estimated.up
-            if engine_out:
-                # What it does there is to come down in circles.
-                out.ended = CIRCLED
+        if is_last and distance < max(AT_CIRCLE, wide):
+            _arrive(estimated, time, engine_out, out)
         out.seconds = time
         _look(estimated, time, heights, to_pixel, spheres, radii, known, out)
         if out.ended == NEVER and (out.clearance < floor or out.outside < apart):
             out.ended = CUT
         if out.ended != NEVER:
             break
-        waits = engine_out and stage == 0
-        if time >= REACTION if waits else _is_through(estimated, b, own, circling, is_last, wide, dt):
+        if _goes_on(estimated, b, own, circling, climb, engine_out and stage == 0, stage == 0, time, is_last, wide, dt):
             if is_last:
                 out.ended = CIRCLED
                 break
             stage += 1
-            _fly_to(stages[stage], waypoints, estimated, own)
-        state.pitch = pitch
-        unpowered = engine_out and stage > 0
-        _demand(state, estimated, waypoints, parameters, own, aircraft, excess, factor, unpowered, dt)
+            _fly_to(stages, stage, waypoints, estimated, own)
+        state.pitch, unpowered = pitch, engine_out and stage > 0
+        if climb.climbs and stage == 0:
+            _climb(state, estimated, staged, own, climb, b.airspeed, factor, dt)
+        else:
+            _demand(state, estimated, waypoints, parameters, own, aircraft, excess, factor, unpowered, dt)
         banked = roll_demand(own.side_acceleration, state.pitch, state.airspeed / factor, parameters)
         state.roll += roll_share * (banked - state.roll)
         pitch += pitch_share * (own.pitch_demand + parameters.pitch_trim - pitch)
@@ -321,6 +348,53 @@ def _keep(here: Record, way: Floats, out: Record) -> None:  # pragma: no cover -
 
 
 @inner
+def _arrive(here: Record, time: float, engine_out: bool, out: Record) -> None:  # pragma: no cover - compiled
+    """Note when it is first at its circle, and how high."""
+    if math.isnan(out.to_circle):
+        out.to_circle, out.circle_up = time, here.up
+        if engine_out:
+            # What it does there is to come down in circles.
+            out.ended = CIRCLED
+
+
+@inner
+def _goes_on(
+    here: Record, b: Record, own: Record, circling: Record, climb: Record, waits: bool, is_first: bool, time: float,
+    is_last: bool, wide: float, dt: float,
+) -> bool:  # pragma: no cover - compiled  # fmt: skip
+    """Whether the next stage begins.  waits: whether it flies straight on, until the engine is seen to stand."""
+    if waits:
+        late: bool = time >= REACTION
+        return late
+    if climb.climbs and is_first:
+        # It is found to be so high no sooner than it climbs.
+        high: bool = time > 0.0 and here.up > climb.top
+        return high
+    through: bool = _is_through(here, b, own, circling, is_last, wide, dt)
+    return through
+
+
+@inner
+def _climb(
+    state: Record, motion: Record, staged: Record, own: Record, climb: Record, wanted: float, factor: float, dt: float
+) -> None:  # pragma: no cover - compiled
+    """Demand a climb straight ahead: wings level, the pitch of its parameters, and the throttle opened.
+
+    wanted: airspeed, equivalent, m/s.
+    """
+    own.side_acceleration = 0.0
+    own.height_asked, own.height_limited, own.height_demand = motion.up, motion.up, motion.up
+    own.height_rate, own.climb_share, own.sink_share = 0.0, 1.0, 1.0
+    before, balance, speed = own.throttle_demand, own.balance_sum, own.speed_sum
+    own.airspeed_demand = wanted * factor
+    update_tecs(state, motion, staged, own, wanted * factor, factor, dt)
+    wind_up_throttle(staged, own)
+    # The pitch's integrals start from its least here (`AP_TECS::_update_pitch`): what it is raised by is not in them.
+    own.balance_sum, own.speed_sum = balance, speed
+    own.throttle_demand = max(before, min(climb.throttle, before + climb.slew * dt))
+
+
+@inner
 def _is_through(
     here: Record, b: Record, own: Record, circling: Record, is_last: bool, wide: float, dt: float
 ) -> bool:  # pragma: no cover - compiled
@@ -333,7 +407,7 @@ def _is_through(
         return reached
     high = abs(here.up - b.up)
     if not is_last:
-        joins: bool = own.on_circle and high < _JOINS_WITHIN
+        joins: bool = own.on_circle and high < JOINS_WITHIN
         return joins
     off_e, off_n = here.east - b.centre_east, here.north - b.centre_north
     bearing = math.atan2(off_e, off_n)
@@ -359,14 +433,23 @@ def _begin(start: Record, estimated: Record, known: bool, out: Record) -> None: 
 
 
 @inner
-def _fly_to(stage: Record, waypoints: Records, estimated: Record, own: Record) -> None:  # pragma: no cover - compiled
-    """Make a stage the next two waypoints, on a leg from here."""
+def _fly_to(
+    stages: Records, at: int, waypoints: Records, estimated: Record, own: Record
+) -> None:  # pragma: no cover - compiled
+    """Make a stage the next two waypoints, on a leg from here; from the waypoint before where that was reached."""
+    stage, reached = stages[at], own.leg > 0
     for k in range(1, 3):
         b = waypoints[k]
         b.east, b.north, b.turn, b.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
         b.centre_east, b.centre_north, b.up, b.circle = stage.centre_east, stage.centre_north, stage.up, stage.circle
-        b.returns, b.slope_base = stage.returns, stage.slope_base
+        b.returns, b.slope_base, b.straight = stage.returns, stage.slope_base, stage.straight
     own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
+    if reached and not past_line(estimated, stages[at - 1].east, stages[at - 1].north, stage.east, stage.north):
+        own.from_east, own.from_north, own.from_up = stages[at - 1].east, stages[at - 1].north, stages[at - 1].up
+    if stage.circle == 0.0 and at + 1 < stages.shape[0]:
+        after, course = stages[at + 1], math.atan2(stage.east - own.from_east, stage.north - own.from_north)
+        turn = abs(wrap(math.atan2(after.east - stage.east, after.north - stage.north) - course))
+        waypoints[1].turn, waypoints[2].turn = turn, turn
     own.leg, own.on_circle, own.cross_track_sum = 0, False, 0.0
 
 

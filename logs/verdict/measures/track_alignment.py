@@ -100,7 +100,8 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     first = requirements.setup.route.return_from
     if first >= 0:
         # A return ends where its autopilot circles, which is not where its circle is drawn.
-        arrived[first + 1 :] = [max(NEAR, radius) for radius in arrived[first + 1 :]]
+        until = requirements.setup.route.return_until
+        arrived[first + 1 : until] = [max(NEAR, radius) for radius in arrived[first + 1 : until]]
     if requirements.setup.autopilot.loiter_rules.at_middle:
         # A mission that ends on a circle about a middle ends anywhere on it, which is as wide as it is flown.
         ends, item = requirements.setup.route.arcs.size - 1, requirements.setup.route.items[-1]

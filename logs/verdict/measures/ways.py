@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.mission.items import TAKEOFFS, Command, MissionItem
 from flight.simulation.track import Track
 from logs.verdict.measures.path_moves import straight_moves
 from logs.verdict.measures.path_sweeps import path_spheres
@@ -88,3 +89,29 @@ def entered_by_way(requirements: RouteRequirements, way: Way) -> str:
             if visit.depth > ROUNDING and visit.entry_time > 0.0:
                 return place_text(airspace.place(z))
     return ""
+
+
+# ----------------------------------------------------------------------
+# What of a mission such ways begin and end with.
+
+
+def is_laid_out(requirements: RouteRequirements) -> bool:
+    """Whether ways are laid out: over known ground, but for imported flights and plans that stay in the air."""
+    setup = requirements.setup
+    on_ground = setup.plan is None or setup.plan.ways is not None
+    return setup.scenario.terrain is not None and on_ground and setup.source is None
+
+
+def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
+    """The first waypoint that is an item's, and that item where it is a take-off."""
+    route = requirements.setup.route
+    first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
+    found = [one for one in requirements.setup.mission.items if one.seq == int(route.items[first])]
+    return first, found[0] if found and found[0].command in TAKEOFFS else None
+
+
+def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
+    """The waypoint that a mission lands at by a glide, and its item; None for none."""
+    lands = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
+    found = [(k, lands[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in lands]
+    return found[-1] if found else None

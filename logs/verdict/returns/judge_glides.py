@@ -271,7 +271,7 @@ def _own_glides(world: ReturnWorld, starts: ReturnStarts) -> list[OwnGlide]:
         return [OwnGlide(one, "not flown", math.nan, math.nan, _NOWHERE, math.nan) for one in targets]
     radius = ArduPlane(world.parameters).return_rules.radius
     circles = [None if one.straight else ReturnCircle(*one.position, radius, one.slope_base) for one in targets]
-    landings = [one.landing if one.straight else None for one in targets]
+    landings = [one.landing._replace(onward=()) if one.landing and one.straight else None for one in targets]
     flown = fly_returns(
         starts.rows, circles, world.parameters, world.aircraft, world.around, landings=landings, engine_out=True
     ).flown

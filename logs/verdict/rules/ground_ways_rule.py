@@ -1,4 +1,4 @@
-"""The climb-out, approach and go-around rules: what stands in the way up from home, and down to the landing point.
+"""The climb-out and approach rules: what stands in the way up from home, and down to the landing point.
 
 A flight of ours begins and ends in the air, but where its scenario has a launch or a strip: what is flown of that, the
 launch rule and the touchdown rule judge.  Other ways are not flown: they are laid out from the mission's items and
@@ -9,9 +9,7 @@ scenario's `[launch]` states.  What it hits at its
 steepest climb fails; what it would hit at `LEAST_CLIMB` of it is left open.  Where it does not take off, somebody flies
 the aircraft to its first waypoint, perhaps by another way: what is hit on the straight one is left open.
 
-The approach is the glide that the autopilot lays out (`Autopilot.landing_glide`).  A go-around climbs along the landing
-course to a height over home, whatever the height of the field, and flies back to where the landing begins (ArduPlane's
-`AP_Landing::restart_landing_sequence` and `type_slope_verify_abort_landing`, libraries/AP_Landing).
+The approach is the glide that the autopilot lays out (`Autopilot.landing_glide`).
 """
 
 import math
@@ -21,13 +19,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import TAKEOFFS, Command, MissionItem
-from flight.mission.placing import SAME_PLACE, landing_starts, return_places
-from flight.mission.return_path import nearest_landing
+from flight.mission.items import Command
+from flight.mission.placing import SAME_PLACE
 from logs.verdict.findings import GROUND_WAY, Finding, Message, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import Profile, Way, entered_by_way, straight_way, way_clearance
+from logs.verdict.measures.ways import (
+    Profile,
+    Way,
+    entered_by_way,
+    first_item,
+    is_laid_out,
+    landing_item,
+    straight_way,
+    way_clearance,
+)
 from logs.verdict.places import Place
 from logs.verdict.rule import Margin, Rule, located
 from logs.verdict.tolerances import (
@@ -35,7 +41,6 @@ from logs.verdict.tolerances import (
     EARLY_TOUCH,
     FIRST_CLIMB,
     GLIDE_ERROR,
-    GO_AROUND_ROOM,
     LAUNCH_RUN,
     LEAST_CLIMB,
     ON_THE_SPOT,
@@ -45,13 +50,11 @@ from logs.verdict.tolerances import (
 from logs.verdict.wording import shortened
 from world.frames import to_map
 from world.geometry import wrap
-from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-# Degrees between two courses that a launch is tried on; heights over home that a go-around is tried with, m.
+# Degrees between two courses that a launch is tried on.
 _COURSE_STEP = 10
-_HEIGHT_STEP, _HIGHEST = 5.0, 1000.0
 
 
 # ----------------------------------------------------------------------
@@ -81,26 +84,11 @@ class _Met(NamedTuple):
         return message(f"{subject} meets the ground", f", {-self.clearance:.0f} m into it {self.at:.0f} m {where}")
 
 
-def _is_judged(requirements: RouteRequirements) -> bool:
-    """Whether ways are laid out: over known ground, but for imported flights and plans that stay in the air."""
-    setup = requirements.setup
-    on_ground = setup.plan is None or setup.plan.ways is not None
-    return setup.scenario.terrain is not None and on_ground and setup.source is None
-
-
 def _climb(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
     """Steepest climb on a course (rad) at a height (m AMSL), and what of it is certain: m of height per m of way."""
     speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
     steepest, certain = (one.slopes(course, amsl, speed)[0] for one in (limits, limits.surely()))
     return math.tan(steepest), math.tan(certain)
-
-
-def _first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None]:
-    """The first waypoint that is an item's, and that item where it is a take-off."""
-    route = requirements.setup.route
-    first = next((k for k, seq in enumerate(route.items.tolist()) if seq >= 0), 0)
-    found = [one for one in requirements.setup.mission.items if one.seq == int(route.items[first])]
-    return first, found[0] if found and found[0].command in TAKEOFFS else None
 
 
 # ----------------------------------------------------------------------
@@ -115,13 +103,13 @@ def climbout_findings(
     Nothing where that place is over home, or the aircraft takes off straight up.
     """
     home, ground = requirements.setup.mission.home, requirements.setup.scenario.terrain
-    if not _is_judged(requirements) or home is None or ground is None:
+    if not is_laid_out(requirements) or home is None or ground is None:
         return []
     if requirements.ground is not None and requirements.ground.ways.take_off is not None:
         return []
     east, north = to_map(requirements.setup.scenario.origin, home.lat_deg, home.lon_deg)
     begin = (float(east), float(north))
-    first, takeoff = _first_item(requirements)
+    first, takeoff = first_item(requirements)
     here, low = requirements.points[first], float(ground.height(*begin))
     place = requirements.waypoint(first)
     if takeoff is not None:
@@ -284,19 +272,12 @@ def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], 
 # The approach.
 
 
-def _landing(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
-    """The waypoint that a mission lands at by a glide, and its item; None for none."""
-    lands = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
-    found = [(k, lands[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in lands]
-    return found[-1] if found else None
-
-
 def approach_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
     """One finding of a mission that lands: of the glide from the last waypoint to the landing point."""
-    found, ground, setup = _landing(requirements), requirements.setup.scenario.terrain, requirements.setup
-    if found is None or ground is None or not _is_judged(requirements):
+    found, ground, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
+    if found is None or ground is None or not is_laid_out(requirements):
         return []
     if requirements.ground is not None and requirements.ground.ways.approach is not None:
         return []
@@ -347,93 +328,6 @@ def approach_findings(
     reason += f"; {_room(met)} until {EARLY_TOUCH:.0f} m before it"
     reason += "" if setup.ground_ways.approach is not None else "; not flown: the flight ends in the air"
     return [_finding("approach", place, met, True, message(reason))]
-
-
-# ----------------------------------------------------------------------
-# The go-around.
-
-
-class _GoAround(NamedTuple):
-    """A go-around from a landing point.
-
-    point: the landing point on the ground, target: where the landing begins, (3,) m.
-    course: of the landing, rad.  leg: whose airspeed is flown.  home: height that its own counts from, m AMSL.
-    """
-
-    point: Floats
-    target: Floats
-    course: float
-    leg: int
-    home: float
-
-
-def go_around_findings(
-    requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
-) -> list[Finding]:
-    """One finding of a mission that lands and has a home: a warning where its go-around comes near to the ground."""
-    requirements = requirements if requirements.ground is None else requirements.ground.whole
-    found, ground, setup = _landing(requirements), requirements.setup.scenario.terrain, requirements.setup
-    if found is None or ground is None or not _is_judged(requirements) or setup.mission.home is None:
-        return []
-    at, item = found
-    origin, point = setup.scenario.origin, requirements.points[at]
-    home = return_places(setup.mission, origin, ground)[0].up
-    first, takeoff = _first_item(requirements)
-    height = setup.autopilot.go_around_height(
-        item.params[0], 0.0 if takeoff is None else float(requirements.points[first, 2]) - home
-    )
-    under = float(ground.height(float(point[0]), float(point[1])))
-    if height is None or math.isnan(under):
-        return []
-    field = np.array([point[0], point[1], under])
-    start = nearest_landing((float(point[0]), float(point[1]), under), landing_starts(setup.mission, origin, ground))
-    target = requirements.points[at - 1] if start is None or start.lands else np.array(start.place)
-    asked = _GoAround(field, target, float(requirements.courses[at - 1]), at - 1, home)
-    place, room = requirements.waypoint(at), _go_around_room(requirements, ground, asked, height)
-    if math.isnan(room):
-        return []
-    said = f"it climbs to {height:.0f} m over home, which is {home + height - under:.0f} m over the landing point"
-    if room >= GO_AROUND_ROOM:
-        reason = f"{said}; {room:.0f} m above ground or more on the way back"
-        return [make_finding("go_around", place, ok=True, reason=reason, planned=room, unit="m")]
-    does = "meets the ground" if room < 0.0 else f"comes down to {room:.0f} m above ground"
-    first_step = _HEIGHT_STEP * math.ceil(height / _HEIGHT_STEP + 1e-9)
-    steps = np.arange(first_step, _HIGHEST + 1.0, _HEIGHT_STEP).tolist()
-    enough = next((up for up in steps if _go_around_room(requirements, ground, asked, up) >= GO_AROUND_ROOM), None)
-    would = "no height would do" if enough is None else f"{enough:.0f} m would do (the first number of item {item.seq})"
-    reason = f"{said}, and {does} on the way back; {would}"
-    return [make_finding("go_around", place, ok=None, reason=reason, planned=room, unit="m")]
-
-
-def _go_around_room(requirements: RouteRequirements, ground: Terrain, asked: _GoAround, height: float) -> float:
-    """Least height above ground of a go-around that climbs so high over home (m), m; NaN where that is not known.
-
-    Of the climb along the landing course that height counts only where it meets the ground.
-    """
-    low = float(asked.point[2])
-    top = max(low, asked.home + height)
-    climb = LEAST_CLIMB * _climb(requirements, asked.leg, asked.course, low)[1]
-    if not climb > 0.0:
-        return math.nan
-    ahead = straight_way(asked.point, asked.course, [(0.0, low), (max(1.0, (top - low) / climb), top)])
-    end = float(ahead.run[-1])
-    if end > LAUNCH_RUN:
-        met = way_clearance(ground, ahead.between(LAUNCH_RUN, end))[0]
-        if not met >= 0.0:
-            return met
-    turned, to = ahead.points[-1], asked.target
-    course, run = math.atan2(to[0] - turned[0], to[1] - turned[1]), math.dist(to[:2], turned[:2])
-    if run < ON_THE_SPOT:
-        return float(turned[2]) - float(ground.height(float(turned[0]), float(turned[1])))
-    if to[2] <= top:
-        profile = [(0.0, top), (run, float(to[2]))]
-    else:
-        back = LEAST_CLIMB * _climb(requirements, asked.leg, course, top)[1]
-        reached = (float(to[2]) - top) / back if back > 0.0 else math.inf
-        profile = [(0.0, top), (run, top + max(0.0, back) * run)]
-        if reached < run:
-            profile = [(0.0, top), (reached, float(to[2])), (run, float(to[2]))]
-    return way_clearance(ground, straight_way(turned, course, profile))[0]
 
 
 # ----------------------------------------------------------------------
@@ -488,14 +382,4 @@ APPROACH = Rule(
     phrase=lambda item: located("approach", item, shortened(item.brief)),
     unjudged="approach",
     explained=True,
-)
-GO_AROUND = Rule(
-    name="go_around",
-    title="go-around",
-    noun="go-around",
-    asks="Would a go-around from the landing stay clear of the ground?",
-    margin=None,
-    tolerances=("GO_AROUND_ROOM", "LEAST_CLIMB", "LAUNCH_RUN"),
-    judge=go_around_findings,
-    warns=True,
 )

@@ -49,7 +49,9 @@ def return_findings(
         return _finding(requirements, None, "not flown yet") + asked
     if requirements.setup.source is None:
         return []
-    return _flown(requirements, aligned is not None and bool(aligned.passed[-1]) and circled(requirements, aligned))
+    passed = aligned is not None and bool(aligned.passed[-1])
+    lands = requirements.setup.route.return_until <= requirements.legs
+    return _flown(requirements, passed and (lands or (aligned is not None and circled(requirements, aligned))))
 
 
 def flown_return_findings(
@@ -75,12 +77,13 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
     """
     setup = requirements.setup
     asked = setup.scenario.returns
-    if asked is None or not asked.require:
+    demands = [] if asked is None else [_DEMANDS[name] for name in asked.require if name in _DEMANDS]
+    if asked is None or not demands:
         return []
     every = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MOST)))
     try:
         world, begun = return_world(setup), starts(every)
-        found = [_DEMANDS[name](world, begun, every) for name in asked.require]
+        found = [judge(world, begun, every) for judge in demands]
     except MissionError as error:
         # Without a home nothing returns; what could be glided to is not known.
         found = [_Answer(False if "rtl" in asked.require else None, str(error), _METHOD)]
@@ -127,6 +130,7 @@ def _glide(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer:
     return _Answer(glides.somewhere, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
 
+# The go-around has a rule of its own.
 _DEMANDS: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answer]] = {"rtl": _rtl, "glide": _glide}
 
 
@@ -186,8 +190,10 @@ def without_style(
     if first < 0:
         return tuple(findings)
     # The corner where the way back begins is of its making, the waypoint there is the mission's.
-    places = {requirements.waypoint(i) for i in range(first + 1, requirements.legs + 1)}
-    places |= {requirements.leg(i) for i in range(first, requirements.legs)}
+    until = requirements.setup.route.return_until
+    legs = range(first, min(until, requirements.legs))
+    places = {requirements.waypoint(i) for i in range(first + 1, min(until, requirements.legs + 1))}
+    places |= {requirements.leg(i) for i in legs}
     corner = requirements.waypoint(first)
     kept = [
         item
@@ -197,7 +203,7 @@ def without_style(
     if aligned is None or not any(item.rule == "return" and item.place != FLIGHT and item.ok for item in kept):
         return tuple(kept)
     # All of the way is on some leg, and one that is drawn and has nothing of it was none.
-    unflown = {requirements.leg(i) for i in range(first, requirements.legs) if not aligned.flew(i)}
+    unflown = {requirements.leg(i) for i in legs if not aligned.flew(i)}
     return tuple(item for item in kept if item.ok is not None or item.place not in unflown)
 
 

@@ -150,7 +150,11 @@ def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
         leg = part.leg
         if len(group) > 1:
             item, radius = int(route.items[leg]), route.arcs[leg]
-            what = f"return of item {item}" if 0 <= route.return_from <= leg else f"loiter of item {item}"
+            what = (
+                f"return of item {item}"
+                if 0 <= route.return_from <= leg < route.return_until
+                else f"loiter of item {item}"
+            )
             text = f"{what}: legs {leg} to {group[-1].leg} around its circle, radius {radius:.0f} m"
             entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
             continue

@@ -75,7 +75,7 @@ def test_parameters_are_data_with_who_states_them(setup: FlightSetup, track: Tra
     mine = parameters_of("LIM_ROLL_CD 3000\nFOO 1\n", "mine.parm")
     data = json.loads(verdict_json(judge(replace(setup, autopilot=ArduPlane(mine)), track)))["parameters"]
     assert (data["file"], data["unused"]) == ("mine.parm", ["FOO"])
-    assert data["not_flown"] == ["RTL_AUTOLAND", "TERRAIN_FOLLOW"]
+    assert data["not_flown"] == ["TERRAIN_FOLLOW"]
     values = {value["name"]: (value["value"], value["origin"]) for value in data["values"]}
     assert values["ROLL_LIMIT_DEG"] == (30.0, "file")
     assert values["WP_RADIUS"] == (90.0, "default")

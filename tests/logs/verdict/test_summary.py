@@ -94,9 +94,9 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         f"Parameters: 1 of the file, 0 of the aircraft, {known} ArduPlane's defaults;"
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
-    returns = parameters_of("RTL_RADIUS 80\nRTL_AUTOLAND 1\n", "mine.parm")
+    returns = parameters_of("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
     lines = lines_by(returns)
-    assert any(line.endswith("defaults; read, not flown: RTL_AUTOLAND") for line in lines)
+    assert any(line.endswith("defaults; read, not flown: TERRAIN_FOLLOW") for line in lines)
 
 
 # ----------------------------------------------------------------------

@@ -218,3 +218,21 @@ def test_beside_a_loiter_the_turn_is_that_from_or_to_its_middle() -> None:
         own = memory(from_north=-3000.0)
         navigate_legs(flying(0.0, north), way, parameters(), own, 1.0, 0.1)
         assert own.leg == leg
+
+
+@pytest.mark.parametrize(("up", "joins"), [(490.1, True), (489.9, False), (509.9, True), (510.1, False)])
+def test_a_return_goes_on_to_the_landing_sequence_within_10_m_of_its_circles_height(up: float, joins: bool) -> None:
+    """On its circle; the leg to the sequence's first place begins where it is."""
+    way = waypoints((0, 0, 500), (0, 900, 500), (60, 1000, 500), (3000, 2000, 400), (3000, 3000, 400))
+    back = way[1:3]
+    back["returns"], back["circle"], back["centre_east"], back["centre_north"] = True, 120.0, 120.0, 900.0
+    own = memory()
+    navigate_legs(flying(0.0, 900.0, up), way, parameters(), own, 1.0, 0.1)
+    assert (own.leg, bool(own.returning)) == ((2, False) if joins else (0, True))
+    if joins:
+        assert (own.from_east, own.from_north, own.from_up) == (0.0, 900.0, up)
+    # Not yet on it, or with nothing behind it, it goes on returning.
+    for north, route in ((-2000.0, way), (900.0, way[:3])):
+        own = memory()
+        navigate_legs(flying(0.0, north, up), route, parameters(), own, 1.0, 0.1)
+        assert own.leg == 0

@@ -335,58 +335,6 @@ def test_a_vertical_landing_has_no_glide() -> None:
 
 
 # ----------------------------------------------------------------------
-# The go-around.
-
-
-def go_around(heights: Ground, *lines: str) -> tuple[Finding, Verdict]:
-    verdict = judge_geometry(with_arduplane(over(heights, *lines)))
-    return of(verdict, "go_around"), verdict
-
-
-def higher_field(east: Floats, north: Floats) -> Floats:
-    """Level ground at home, 37 m higher from 1.5 km on."""
-    return np.where(north > 1500.0, 137.0, 100.0) + 0.0 * east
-
-
-def test_a_go_around_from_a_field_above_home_is_too_low_and_the_height_that_would_do_is_named() -> None:
-    # 50 m over home are 13 m over the field; 20 m over it are 57 m over home, the next five are 60.
-    warned, verdict = go_around(higher_field, *landing(37.0, p="50 0 0 0"))
-    assert warned.ok is None
-    assert warned.planned == pytest.approx(13.0, abs=0.1)
-    assert "which is 13 m over the landing point" in warned.reason
-    assert warned.reason.endswith("60 m would do (the first number of item 3)")
-    # It decides no verdict, and is said.
-    assert verdict.flyable
-    assert f"Go-around: {warned.reason}" in verdict.lines
-    # 56 m leave 19 m; 58 m leave 21.
-    for height, ok in ((56, None), (58, True)):
-        assert go_around(higher_field, *landing(37.0, p=f"{height} 0 0 0"))[0].ok is ok
-
-
-def test_a_hill_ahead_of_the_landing_leaves_no_height_for_a_go_around() -> None:
-    # The climb to 30 m over home, at the least that is counted on, takes 170 m.
-    found, _ = go_around(wall(POINT + 150.0, 300.0), *landing())
-    assert found.ok is None
-    assert "meets the ground" in found.reason
-    assert found.reason.endswith("no height would do")
-
-
-def test_a_go_around_flies_back_to_where_the_landing_sequence_begins() -> None:
-    # From the south the landing sequence begins 2 km east of the last waypoint, behind a wall.
-    def ridge(east: Floats, north: Floats) -> Floats:
-        return np.where((east == 1000.0), 180.0, 100.0) + 0.0 * north
-
-    start = ("3 189 0 0 0 0 0 0 0", wp(2000, POINT - RUN, 60))
-    direct = landing(p="50 0 0 0")
-    assert go_around(ridge, *direct)[0].ok is True
-    assert go_around(ridge, direct[0], *start, *direct[1:])[0].ok is None
-
-
-def test_only_of_arduplane_a_go_around_is_told() -> None:
-    assert "go_around" not in {item.rule for item in judge_geometry(over(higher_field, *landing(37.0))).findings}
-
-
-# ----------------------------------------------------------------------
 # On real ground, against the same ways sampled metre by metre.
 
 # What is left out beside a limit, m: samples are a metre apart, and places in files are rounded.
