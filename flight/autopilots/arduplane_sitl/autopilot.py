@@ -23,6 +23,8 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
     """
 
     own: ClassVar[np.dtype[np.record] | None] = None
+    flies_ground: ClassVar[bool] = True
+    flies_both_ends: ClassVar[bool] = True
     log_suffix: ClassVar = ".BIN"
     program: AutopilotProgram | None = None
     binary: Path | None = field(default=None, compare=False)

@@ -9,6 +9,7 @@ from pathlib import Path
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.arduplane_sitl.ground_tick import program_ground_tick
 from flight.autopilots.arduplane_sitl.physics import JsonLockstep, PhysicsPort
 from flight.autopilots.arduplane_sitl.preflight import Preflight, version_text
 from flight.autopilots.arduplane_sitl.process import (
@@ -17,7 +18,7 @@ from flight.autopilots.arduplane_sitl.process import (
     autopilot_parameters,
     person_parameters,
 )
-from flight.autopilots.autopilot import AutopilotProgram
+from flight.autopilots.autopilot import AutopilotProgram, Tick
 from flight.autopilots.sitl.flight import SitlFlight
 from flight.autopilots.sitl.link import AutopilotLink, TcpLink
 from flight.autopilots.sitl.process import AutopilotProcess, check_binary
@@ -60,7 +61,11 @@ class AutopilotFlight(SitlFlight):
     @property
     def last_item(self) -> int:
         """Items count from 1: 0 is home."""
-        return len(self._mission.items)
+        return self._mission.last or len(self._mission.items)
+
+    @property
+    def _ground_tick(self) -> Tick:
+        return program_ground_tick
 
     def _get_ready(self) -> None:
         self._converse(self._preflight.prepare(self._mission))

@@ -127,10 +127,11 @@ def person_parameters(setup: FlightSetup) -> dict[str, float]:
 
     Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
     """
-    file = setup.scenario.flight.params
+    file, parameters = setup.scenario.flight.params, setup.autopilot.parameters
+    made = {} if parameters is None else parameters.by_origin("file")
     if file is None:
-        return {}
+        # What the scenario asks for of its returns counts as stated.
+        return made
     old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     stated = {name: entry.value for name, entry in read_parameter_file(Path(file)).items() if name not in old}
-    parameters = setup.autopilot.parameters
-    return stated | ({} if parameters is None else parameters.by_origin("file"))
+    return stated | made

@@ -75,11 +75,12 @@ def place_on_sphere(north: float, east: float, from_lat: float, from_lon: float)
 
 
 # ----------------------------------------------------------------------
-# The rail in the air that an autopilot's flight starts on, before the aircraft flies by itself.
+# The rail that an autopilot's flight starts on, before the aircraft flies by itself: in the air, or a launch's.
 #
 # The autopilot's estimator has to settle with the aircraft at rest, and no aircraft rests in the air.  So it stands on
 # a rail, level, at the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along the rail
-# to the speed of that flight, and let go.
+# to the speed of that flight, and let go.  From the ground the rail is that of the catapult or the throwing hand, as
+# steep and as quick as it is; on a runway the aircraft stands where it begins.
 
 # Along the rail, m/s^2.
 PUSH = 5.0
@@ -88,10 +89,10 @@ _EARTH = 6_371_000.0
 
 @dataclass(frozen=True, slots=True)
 class RailEnd:
-    """The trimmed flight that the rail leads to, from level flight over the ground.
+    """Where the rail ends, and how the aircraft leaves it: in a trimmed flight, level over the ground, or launched.
 
     lat, lon: rad.  amsl: m.  roll, pitch, yaw: rad.  course: of the rail, rad.  ground_speed: m/s.
-    wind_north, wind_east: m/s.
+    wind_north, wind_east: m/s.  incline: of the rail above level, rad.  push: along it, m/s^2.
     """
 
     lat: float
@@ -104,11 +105,13 @@ class RailEnd:
     ground_speed: float
     wind_north: float
     wind_east: float
+    incline: float = 0.0
+    push: float = PUSH
 
     @property
     def push_time(self) -> float:
         """How long the push takes, s."""
-        return self.ground_speed / PUSH
+        return self.ground_speed / (math.cos(self.incline) * self.push)
 
 
 def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
@@ -133,19 +136,21 @@ def motion_on_rail(end: RailEnd, time: float, pushed: float, origin: tuple[float
     origin: latitude and longitude (rad) and height (m) that positions count from.
     """
     pushed = min(max(0.0, pushed), end.push_time)
-    along_north, along_east = math.cos(end.course), math.sin(end.course)
-    push = PUSH if 0.0 < pushed < end.push_time else 0.0
-    speed = PUSH * pushed
-    left = 0.5 * PUSH * (end.push_time**2 - pushed**2)
+    level, steep = math.cos(end.incline), math.sin(end.incline)
+    along_north, along_east = level * math.cos(end.course), level * math.sin(end.course)
+    push = end.push if 0.0 < pushed < end.push_time else 0.0
+    speed = end.push * pushed
+    left = 0.5 * end.push * (end.push_time**2 - pushed**2)
     lat = end.lat - left * along_north / _EARTH
     lon = end.lon - left * along_east / (_EARTH * math.cos(end.lat))
     north, east = offset_on_sphere(lat, lon, origin[0], origin[1])
-    velocity_north, velocity_east = speed * along_north, speed * along_east
-    force = to_body((end.roll, end.pitch, end.yaw), (push * along_north, push * along_east, -GRAVITY))
-    airspeed = math.hypot(velocity_north - end.wind_north, velocity_east - end.wind_east)
+    velocity_north, velocity_east, velocity_down = speed * along_north, speed * along_east, -speed * steep
+    felt = (push * along_north, push * along_east, -push * steep - GRAVITY)
+    force = to_body((end.roll, end.pitch, end.yaw), felt)
+    airspeed = math.hypot(velocity_north - end.wind_north, velocity_east - end.wind_east, velocity_down)
     return BodyMotion(
-        time, 0.0, 0.0, 0.0, *force, north, east, origin[2] - end.amsl,
-        end.roll, end.pitch, end.yaw, velocity_north, velocity_east, 0.0, airspeed,
+        time, 0.0, 0.0, 0.0, *force, north, east, origin[2] - end.amsl + left * steep,
+        end.roll, end.pitch, end.yaw, velocity_north, velocity_east, velocity_down, airspeed,
     )  # fmt: skip
 
 

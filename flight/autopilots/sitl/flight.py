@@ -13,17 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
+from aircraft.contacts import contacts_of
+from flight.autopilots.autopilot import Autopilot, Tick
 from flight.autopilots.program import ProgramFlight
 from flight.autopilots.sitl.conversation import Talk
-from flight.autopilots.sitl.exchange import FRAME_HZ, LOOK_FRAMES, Lockstep, RailEnd, rail_end
+from flight.autopilots.sitl.exchange import FRAME_HZ, LOOK_FRAMES, PUSH, Lockstep, RailEnd, rail_end
 from flight.autopilots.sitl.link import AutopilotLink
 from flight.autopilots.sitl.mission import uploaded_mission
 from flight.autopilots.sitl.process import AutopilotProcess
 from flight.guidance.gains import load_gains
 from flight.guidance.path import profile, project
+from flight.mission.ground_ways import TakeOff
 from flight.mission.itinerary import UNLIMITED
 from flight.simulation.local_map import Ground
 from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import GROUND_PATIENCE
+from flight.simulation.start import Release, find_release, gear_of, release
 from flight.simulation.tick import (
     NEAR,
     NOT_A_NUMBER,
@@ -172,14 +177,27 @@ RUN_IN, RUN_IN_SECONDS = 500.0, 40.0
 _LOST = 40.0
 
 
+def launch_rail(begin: Release, take_off: TakeOff) -> RailEnd:
+    """The rail of a launch, or of none where the aircraft stands on its runway."""
+    north, east, _ = begin.velocity
+    roll, pitch, yaw = begin.attitude
+    lat, lon = (math.radians(value) for value in begin.place[:2])
+    return RailEnd(
+        *(lat, lon, begin.place[2], roll, pitch, yaw, yaw, math.hypot(north, east), begin.wind[0], begin.wind[1]),
+        incline=take_off.launch.incline,
+        push=take_off.acceleration or PUSH,
+    )
+
+
 class SitlFlight(ProgramFlight):
     """One flight of an autopilot's program; a context manager, after which the program and its files are gone.
 
     binary: the program.
 
     The track begins where the aircraft passes the first waypoint, and the turbulence with it, as in our own flights.
-    Before that it flies `RUN_IN` m straight and level in the mean wind, and before that it stands on a rail.  It takes
-    its place from satellites with the error of the setup's navigation.
+    Before that it flies `RUN_IN` m straight and level in the mean wind, and before that it stands on a rail.  From the
+    ground it begins where the launch ends, or where it stands on its runway, and the mission goes up as it is.
+    It takes its place from satellites with the error of the setup's navigation.
 
     Raises FlightError, in one line that names the program, for one that does not start, does not understand us, does
     not know where it is, refuses the mission, or ends.
@@ -191,13 +209,29 @@ class SitlFlight(ProgramFlight):
     _stack: contextlib.ExitStack
 
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, binary: Path) -> None:
-        self._binary = binary
-        super().__init__(setup, aircraft, load_gains(aircraft))
+        self._binary, self._ways, gear = binary, setup.ground_ways, None
+        if self._ways:
+            gear = gear_of(self._ways)
+            self._from_ground = setup.autopilot.from_ground(self._ways, aircraft, contacts_of(aircraft, gear))
+        super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
+        self._release: Release | None = None
         self._rail = self._make_rail(setup)
         self._disturb(setup)
         self._mission = uploaded_mission(setup)
+        if self._ways:
+            self.max_ticks += int(GROUND_PATIENCE / self.dt)
+            self._from_ground.begin(self.memory, self._workspace.own)
         # Compiled here, where no autopilot waits for it.
-        autopilot_tick(self._workspace.block.copy(), self._ground.heights)
+        tick = self._ground_tick if self._ways else autopilot_tick
+        tick(self._workspace.block.copy(), self._ground.heights)
+
+    def _law(self, setup: FlightSetup) -> Autopilot:
+        return self._from_ground if self._ways else setup.autopilot
+
+    @property
+    def _ground_tick(self) -> Tick:
+        """One tick of a flight from the ground to the ground; only of a program that flies one."""
+        raise ValueError(f"{self.setup.autopilot.title} is put into the air on a rail")
 
     @property
     @abstractmethod
@@ -227,11 +261,17 @@ class SitlFlight(ProgramFlight):
         return self._lockstep.time
 
     def prepare(self) -> None:
-        """Have the autopilot settle, take the mission and fly to the first waypoint.  Raises as the class does."""
+        """Have the autopilot settle, take the mission and fly to the first waypoint.  Raises as the class does.
+
+        From the ground it is launched instead, or left to roll.
+        """
         with self._named():
             self._get_ready()
         with self._named(CrashError):
-            self._run_in()
+            if self._release is None:
+                self._run_in()
+            else:
+                self._let_go(self._release)
 
     def _push(self, first: float = 0.0, last: float = 1.0) -> None:
         """Push the aircraft along the rail, from one share of the time that takes to another."""
@@ -254,8 +294,16 @@ class SitlFlight(ProgramFlight):
             raise kind.from_error(error, "" if named else self._binary) from error
 
     def _make_rail(self, setup: FlightSetup) -> RailEnd:
-        """Trim the aircraft where it is let go: before the first waypoint, straight and level, over no ground."""
+        """Trim the aircraft where it is let go: before the first waypoint, straight and level, over no ground.
+
+        From the ground the rail is the launch's.
+        """
         start, points = self._start(setup), setup.route.waypoints
+        if self._ways.take_off is not None:
+            self._trim(setup.mission.source, start)
+            aircraft = self.fdm.aircraft
+            self._release = find_release(setup, self.map, self._ground, aircraft, self._ways.take_off)
+            return launch_rail(self._release, self._ways.take_off)
         step = points[1, :2] - points[0, :2]
         back = points[0, :2] - step / np.hypot(*step) * max(RUN_IN, RUN_IN_SECONDS * start.airspeed)
         lat, lon = (float(value) for value in to_geo(setup.scenario.origin, *back))
@@ -285,12 +333,29 @@ class SitlFlight(ProgramFlight):
         east, north, up = (scale * navigation.second).tolist()
         self._lockstep.error = (north, east, up, 0.0, 0.0, 0.0)
 
+    def _let_go(self, begin: Release) -> None:
+        """Begin where rail or hand let go, with the controls as the program has set them, or at rest on a runway."""
+        self._scale()
+        commands = tuple(float(one) for one in self._workspace.commands)
+        self._work.commands = release(self.fdm, begin, (commands[0], commands[1], commands[2], commands[3]))
+        self._work.air.wind_north, self._work.air.wind_east = begin.wind[:2]
+        self._make_loop(self._ground_tick)
+
+    def _scale(self) -> None:
+        access = self.fdm.loop_access()
+        self._work.state_factors = access.factors[0]
+        self._work.scale_above, self._work.scale_below = (tuple(one) for one in zip(*access.scales, strict=True))
+
+    def _make_loop(self, tick: Tick) -> None:
+        """Have the flight go on by a tick that is recorded, over its ground."""
+        made = partial(tick, self._workspace.block, self._ground.heights)
+        own = partial(self._tick, made, bool(self._work.settings.navigation_sigma))
+        self._loop = self._lockstep.make_loop(own, self._steps, gusts=self._windy, ground=self._ground.known)
+
     def _run_in(self) -> None:
         """Fly to the first waypoint in the mean wind, over no ground; what goes wrong on the way ends it early."""
         work, timing, steps = self._work, self._work.timing, self._steps
-        access = self.fdm.loop_access()
-        work.state_factors = access.factors[0]
-        work.scale_above, work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
+        self._scale()
         tick = partial(autopilot_tick, self._workspace.block, Ground(None).heights)
         loop = self._lockstep.make_loop(tick, steps, gusts=self._windy, ground=False)
         kept = work.wind.w20, work.settings.navigation_sigma
@@ -303,8 +368,7 @@ class SitlFlight(ProgramFlight):
         timing.tick = timing.row = 0
         work.air.energy = 0.0
         self.memory.piece = 0
-        tick = partial(self._tick, partial(autopilot_tick, self._workspace.block, self._ground.heights), bool(kept[1]))
-        self._loop = self._lockstep.make_loop(tick, steps, gusts=self._windy, ground=self._ground.known)
+        self._make_loop(autopilot_tick)
 
     def _tick(self, tick: "partial[int]", mistaken: bool) -> int:
         """A tick, and what the satellites mistake by then."""

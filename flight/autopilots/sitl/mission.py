@@ -3,8 +3,9 @@
 What a flight from air to air cannot hold is made a waypoint where the route has it: a take-off, a landing.  A place
 more, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it takes a waypoint as
 reached a radius early, and returns to launch after the last.  A mission that ends with a return to launch has that at
-its end, and its rally points go with it; one that ends with a loiter without end has that, of which the flight's own
-clock counts a minute.  An autopilot that circles about the last waypoint without end has no place more, either.
+its end, or before the landing sequence that it goes on to, and its rally points go with it; one that ends with a loiter
+without end has that, of which the flight's own clock counts a minute.  An autopilot that circles about the last
+waypoint without end has no place more, either.
 """
 
 import math
@@ -13,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.mission.ground_ways import GroundWays
 from flight.mission.items import Command, Frame, Home, MissionItem, on_grid
 from flight.mission.itinerary import loiter_of
 from flight.mission.route import Route, goes_no_further
@@ -36,35 +38,58 @@ class UploadedMission:
     home: its home; alt is AMSL.
     items: numbered from 1; the last is the place more, or what the autopilot ends its mission with.
     rally: the points that a return may go to, numbered from 0; none without a return.
+    last: number of the item with which the last leg begins; 0 for the last of them.
     """
 
     home: Home
     items: tuple[MissionItem, ...]
     rally: tuple[MissionItem, ...] = ()
+    last: int = 0
 
 
 def uploaded_mission(setup: FlightSetup) -> UploadedMission:
-    """The mission of a setup as the autopilot gets it, all heights above mean sea level but those of rally points."""
+    """The mission of a setup as the autopilot gets it, all heights above mean sea level but those of rally points.
+
+    From the ground to the ground it is the mission itself.
+    """
+    if setup.ground_ways:
+        return _itself(setup, setup.ground_ways)
     route, origin = setup.route, setup.scenario.origin
     kept: list[MissionItem] = []
+    lands = route.return_from >= 0 and route.return_until <= route.legs
     for item in setup.mission.items:
         rows = np.flatnonzero(route.items == item.seq)
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
             kept += [item] if rows.size else []
         elif rows.size:
             kept.append(_place(item, route, rows, origin, kept))
-        elif item.command in _KEPT:
+        elif item.command in _KEPT or (lands and item.command == Command.DO_LAND_START):
             kept.append(item)
     if not any(item.has_position for item in kept):
         kept = _of_route(route, origin)
     elif route.items[-1] == -1 and kept[-1].command != Command.NAV_LOITER_UNLIM:
         kept.append(_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
-    if route.return_from >= 0 or kept[-1].command == Command.NAV_LOITER_UNLIM:
+    if (route.return_from >= 0 and not lands) or kept[-1].command == Command.NAV_LOITER_UNLIM:
         return UploadedMission(_home(setup), _renumbered(kept), setup.mission.rally)
     if setup.autopilot.loiter_rules.ends_in_circle and goes_no_further(route, setup.mission):
         return UploadedMission(_home(setup), _renumbered(kept))
     kept.append(_waypoint(kept[-1].seq + 1, _straight_on(route), 0.0, origin))
-    return UploadedMission(_home(setup), _renumbered(kept))
+    return UploadedMission(_home(setup), _renumbered(kept), setup.mission.rally if lands else ())
+
+
+def _itself(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
+    """The mission as its file has it, from its home; without a height that is the ground's there."""
+    home, mission = setup.mission.home, setup.mission
+    if home is None or ways.take_off is None or ways.approach is None:
+        raise ValueError("a mission from the ground to the ground has a home, a take-off and a landing")
+    if math.isnan(home.alt):
+        home = replace(home, alt=ways.take_off.base)
+    known = []
+    for item in mission.items:
+        p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
+        known.append(replace(item, params=(p1, p2, p3, p4)))
+    last = next(k for k, item in enumerate(known, 1) if item.seq == ways.approach.item)
+    return UploadedMission(home, _renumbered(known), mission.rally, last)
 
 
 def _place(

@@ -24,12 +24,22 @@ METRES = 111318.845
 AUTO = 10
 NEUTRAL, FULL = 1500, 400
 EKF_GOOD = 0b111111
+FLOWN = (
+    *(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_LOITER_UNLIM),
+    *(mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND),
+)
+OVER_HOME = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+# It flares so high over the landing point, m.
+FLARE = 4.0
 # Seconds on the rail before it knows where it is, and in AUTO before what is to go wrong in the air does.
 KNOWS, GOES_WRONG = 2.0, 30.0
 
 
 class Fake:
     """The program: a socket for the physics, one for MAVLink, and what it has been told."""
+
+    # Of the elevator, in level flight.
+    trim = 0.15
 
     def __init__(self, fault: str, args: argparse.Namespace) -> None:
         self.fault = fault
@@ -160,7 +170,25 @@ class Fake:
         """North, east and down of an item from home, m."""
         lat, lon = item.x / 1e7, item.y / 1e7
         scale = math.cos(math.radians(0.5 * (lat + self.home[0])))
-        return (lat - self.home[0]) * METRES, (lon - self.home[1]) * METRES * scale, self.home[2] - item.z
+        down = -item.z if item.frame in OVER_HOME else self.home[2] - item.z
+        return (lat - self.home[0]) * METRES, (lon - self.home[1]) * METRES * scale, down
+
+    def take_off(self, state: dict[str, Any]) -> tuple[float, float, float]:
+        """Wings level, nose up, and the motor from where it has been pushed at all; on above the item's height."""
+        roll, pitch, _ = state["attitude"]
+        p, q, _ = state["imu"]["gyro"]
+        moves = math.hypot(*state["velocity"]) > 5.0
+        if -state["position"][2] > -self.place(self.items[self.current])[2]:
+            self.current += 1
+        return -0.6 * roll - 0.1 * p, 0.15 + 0.8 * (0.17 - pitch) - 0.15 * q, 1.0 if moves else 0.0
+
+    def glide(self, state: dict[str, Any], item: Any) -> tuple[float, float]:
+        """Down that the glide from the place before has here, m, and its sink at this speed, m/s."""
+        (north, east, down), before = self.place(item), self.place(self.items[self.current - 1])
+        run = math.hypot(north - before[0], east - before[1])
+        left = math.hypot(north - state["position"][0], east - state["position"][1])
+        slope = (down - before[2]) / run
+        return down - slope * min(run, left), slope * math.hypot(*state["velocity"][:2])
 
     def steer(self, state: dict[str, Any]) -> tuple[float, float, float]:
         """Fly to the current waypoint: bank for the course to it, pitch for its height, throttle for the speed.
@@ -171,10 +199,19 @@ class Fake:
         v_north, v_east, v_down = state["velocity"]
         roll, pitch, _ = state["attitude"]
         p, q, _ = state["imu"]["gyro"]
-        while self.items[self.current].command not in (mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_LOITER_UNLIM):
+        while self.items[self.current].command not in FLOWN:
             self.current += 1
         item = self.items[self.current]
+        if item.command == mavlink.MAV_CMD_NAV_TAKEOFF:
+            return self.take_off(state)
         to_north, to_east, to_down = self.place(item)
+        lands = item.command == mavlink.MAV_CMD_NAV_LAND
+        if lands and to_down - down < FLARE:
+            # Wings level, the motor off, the nose level.
+            return -0.6 * roll - 0.1 * p, self.trim - 0.8 * pitch - 0.15 * q, 0.0
+        sink = 0.0
+        if lands:
+            to_down, sink = self.glide(state, item)
         distance = math.hypot(to_north - north, to_east - east)
         ahead = (to_north - north) * v_north + (to_east - east) * v_east
         if (distance < 10.0 or (distance < 60.0 and ahead < 0.0)) and self.current + 1 < len(self.items):
@@ -187,11 +224,14 @@ class Fake:
             level = side * math.atan((v_north**2 + v_east**2) / (9.80665 * radius))
         turn = math.remainder(wanted - math.atan2(v_east, v_north), math.tau)
         bank = max(-0.5, min(0.5, level + 1.5 * turn))
-        climb = max(-3.0, min(3.0, 0.3 * (down - to_down)))
+        climb = max(-3.0, min(3.0, (0.9 if lands else 0.3) * (down - to_down))) - sink
         aim = 0.06 + 0.05 * (climb + v_down)
         aileron = 0.6 * (bank - roll) - 0.1 * p
-        elevator = 0.15 + 0.8 * (aim - pitch) - 0.15 * q + 0.1 * roll * roll
-        throttle = 0.77 + 0.05 * (25.0 - state["airspeed"]) + 0.03 * climb
+        if self.items[1].command == mavlink.MAV_CMD_NAV_TAKEOFF:
+            # To a height that is good enough to land from.
+            self.trim += 0.002 * (aim - pitch)
+        elevator = self.trim + 0.8 * (aim - pitch) - 0.15 * q + 0.1 * roll * roll
+        throttle = 0.77 + 0.05 * ((21.0 if lands else 25.0) - state["airspeed"]) + 0.03 * climb
         return max(-1.0, min(1.0, aileron)), max(-1.0, min(1.0, elevator)), max(0.0, min(1.0, throttle))
 
 
