@@ -498,7 +498,8 @@ def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
     where = f"from the destination to the final on {math.degrees(final.course) % 360.0:.0f}°"
     if not nearest.tried:
         return None, f"no way {where} is long enough for its turns and {high - goal:.0f} m of descent"
-    return None, f"none of {nearest.tried} ways {where} is free; the nearest: {nearest.problem}"
+    remedy = "a higher destination (height_m) or another strip may have one"
+    return None, f"none of {nearest.tried} ways {where} is free: {remedy}; the nearest: {nearest.problem}"
 
 
 def _heights_down(site: _Site, spots: list[Spot], share: float, high: float, goal: float) -> Floats:
