@@ -247,9 +247,9 @@ NEAR_FIELD = 2000.0
 ON_COURSE = math.radians(10.0)
 # m.  So near to a contact's height over the ground the aircraft has touched it: rows stand 1/60 s apart.
 TOUCHED = 0.02
-# m.  A touch-down by the law is out by so much along the strip: 5 of ArduPlane's in steady wind were 5 to 13 m off it,
-# three in light turbulence up to 26 m, and one in turbulence and 5 m/s across 52 m, which this leaves out.  The strip
-# has to be as much longer either way.
+# m.  A touch-down by the law is out by so much along the strip: 5 of ArduPlane's in steady wind were 9 to 22 m off it,
+# and one in turbulence and 5 m/s across was 52 m off, which this leaves out.  The strip has to be as much longer
+# either way.
 TOUCH_ERROR = 30.0
 # m.  A final that the law flies lower over the ground than this, before its flare may begin, is left open: five of
 # ArduPlane's came to their flares within 2 m of the law's height.

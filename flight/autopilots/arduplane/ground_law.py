@@ -13,7 +13,8 @@ Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the line beyond the l
 `flight.autopilots.arduplane.landing`.  The approach stage begins when it is lined up, and with it the flare may begin:
 below LAND_FLARE_ALT, or LAND_FLARE_SEC before the ground at this sink on the second half, or beyond the point.  In the
 flare the motor is off, the bank at most LEVEL_ROLL_LIMIT, the pitch at least LAND_PITCH_DEG, and the sink is brought
-to TECS_LAND_SINK.  How ArduPlane's sink really comes to the ground is not known so well: see `docs/measured.md`.
+to TECS_LAND_SINK by the pitch, with what weight TECS_LAND_SPDWGT leaves the airspeed.  How ArduPlane's sink really
+comes to the ground is not known so well: see `docs/measured.md`.
 """
 
 import math
@@ -387,7 +388,7 @@ def _find_stage(
     if (ground.stage == APPROACHING and (low or soon)) or share >= 1.0:
         ground.stage = FLARING
         ground.entry_sink, ground.entry_height = sink, height
-        # With the motor off the speed is held by pitch, from the attitude that it has.
+        # The pitch goes on from the one that it has.
         ground.airspeed = memory.airspeed / true_by_equivalent(estimated.up)
         memory.airspeed_demand, memory.speed_sum = memory.airspeed, 0.0
         memory.balance_sum = memory.pitch_demand * memory.airspeed * GRAVITY
@@ -432,7 +433,6 @@ def _stage_landing(
     staged.tecs_pitch_min = 0.0
     if ground.stage == FLARING:
         staged.roll_limit = min(parameters.roll_limit, parameters.level_roll_limit)
-        staged.tecs_speed_weight = 2.0
         down = min(1.0, max(0.0, 1.0 - (estimated.up - ground.up) / max(0.1, ground.entry_height)))
         bottom = (1.0 - down) * bottom + down * max(bottom, parameters.landing_pitch)
         if parameters.landing_pitch_max != 0.0:

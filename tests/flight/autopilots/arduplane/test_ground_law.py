@@ -1,6 +1,7 @@
 """Take-offs and landings by ArduPlane's law, beside those that ArduPlane itself flew, and those that fail."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,7 +68,7 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     assert track.position[k, 2] - approach.point[2] == pytest.approx(glide.flare_height, abs=2.0)
     mine = approach.place(np.asarray(track.position[touch(flown)], dtype=np.float64))
     down = int(np.argmax(real["amsl_m"] - real["ground_m"] < 0.35))
-    assert float(mine[0]) == pytest.approx(along[down], abs=15.0)
+    assert float(mine[0]) == pytest.approx(along[down], abs=25.0)
     assert float(mine[1]) == pytest.approx(aside[down], abs=1.0)
     rest = approach.place(np.asarray(track.position[-1], dtype=np.float64))
     assert float(rest[0]) == pytest.approx(along[-1], abs=20.0)
@@ -126,6 +127,17 @@ def test_a_landing_point_below_the_ground_is_no_reason_to_fly_into_it_far_from_i
     """A point 20 m under the ground: the glide meets it some 200 m before, which is no landing."""
     flown = fly(circuit(RAIL, STRIP, point=-20.0))
     assert flown.flight.ended == ENDS[GROUND]
+
+
+def test_gusts_do_not_lead_the_nose_in_the_flare() -> None:
+    """The pitch goes by the sink: by an airspeed in light turbulence it came down at 3.5 m/s here, and not below 3."""
+    setup = circuit(None, STRIP, wind=(5.0, 270.0))
+    wind = replace(setup.scenario.wind, turbulence="light")
+    flown = fly(replace(setup, scenario=replace(setup.scenario, wind=wind), seed=3))
+    track = flown.track
+    flare = int(np.argmax((track.time > 60.0) & (track.position[:, 0] < 600.0) & (track.commands[:, 3] == 0.0)))
+    assert flown.flight.ended == "completed"
+    assert -track.velocity[flare:, 2].min() < 3.0
 
 
 def test_a_throttle_without_a_limit_is_closed_at_once_in_the_flare() -> None:
