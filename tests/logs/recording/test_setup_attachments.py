@@ -132,7 +132,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     assert len(names[FlightSetup]) == 14
     assert len(names[Limits]) == 9
     assert len(names[Mission]) == 8
-    assert len(names[Route]) == 15
+    assert len(names[Route]) == 16
     assert len(names[Envelope]) == 20
     assert len(dataclasses.fields(MissionItem)) == 8
 
