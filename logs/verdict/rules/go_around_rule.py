@@ -9,7 +9,7 @@ from a field that lies higher than home it may turn into a hill at once.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from flight.autopilots.arduplane.swift_return import HIT
 from flight.autopilots.autopilot import LandingGlide
 from flight.mission.ground_ways import climb_pitch
 from flight.mission.items import MissionItem
-from flight.mission.placing import landing_sequence, landing_starts, return_places
+from flight.mission.placing import home_place, landing_sequence, landing_starts
 from flight.mission.return_path import LandingStart, nearest_landing
 from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
@@ -133,12 +133,13 @@ def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: Mi
     setup, leg = requirements.setup, at - 1
     begin, end = requirements.points[leg], requirements.points[at]
     run, course = float(requirements.runs[leg]), float(requirements.courses[leg])
-    home = return_places(setup.mission, setup.scenario.origin, ground)[0].up
+    place = home_place(setup.mission, setup.scenario.origin, ground)
+    home = math.nan if place is None else place.up
     first, takeoff = first_item(requirements)
     climbed = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home
     height = setup.autopilot.go_around_height(item.params[0], climbed)
     low, under = setup.route.landing_ground, float(ground.height(float(end[0]), float(end[1])))
-    if height is None or math.isnan(low) or math.isnan(under) or run < ON_THE_SPOT or begin[2] <= low:
+    if height is None or math.isnan(home + low + under) or run < ON_THE_SPOT or begin[2] <= low:
         return None
     wind = setup.scenario.wind.along(course, low)[0]
     point = np.array([end[0], end[1], low])
@@ -175,7 +176,10 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
     place, height = requirements.waypoint(landing.at), landing.height
     said = f"it climbs to {height:.0f} m over home"
     said += f", which is {landing.home + height - landing.ground:.0f} m over the landing point"
-    world, needed = return_world(requirements.setup), _needed(ground, landing)
+    # No rally point is flown to, wherever they are.
+    setup = requirements.setup
+    world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
+    needed = _needed(ground, landing)
     flown = _fly(requirements, ground, world, landing, height, _places(landing)) if landing.sequence else []
     known = [one for one in flown if not math.isnan(one.room)]
     worst = max(known, key=lambda one: one.badness, default=None)

@@ -9,6 +9,7 @@ import pytest
 from flight.mission.ground_ways import USUAL_PITCH, airborne_route
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
+from logs.verdict.judge_geometry import judge_geometry
 from tests.flight.autopilots.arduplane.flown_grounds import circuit, make_ground_setup
 from world.airfield import LandingStrip, Launch
 
@@ -111,6 +112,7 @@ def test_a_rally_point_of_another_continent_keeps_nobody_on_the_ground() -> None
     assert after is not None
     assert after.home.tolist() == before.home.tolist()
     assert any("km from the map's origin" in note for note in moved.route.notes)
+    assert [item.rule for item in judge_geometry(moved).findings].count("go_around") == 1
 
 
 def test_a_take_off_item_with_a_place_of_its_own_goes_on_from_there() -> None:
