@@ -7,11 +7,14 @@ does, and ends at the last waypoint before the landing point.  Phases are found 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flight.mission.ground_ways import GroundWays, airborne_route
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track
+
+Flags = NDArray[np.bool_]
 
 # So long after it has passed its last waypoint the part in the air ends, s: an autopilot turns before it.
 _PASSED_BY = 2.0
@@ -47,6 +50,19 @@ def _begun(track: Track, ways: GroundWays) -> int:
         return 0
     above = track.position[:, 2] > ways.take_off.top
     return int(np.argmax(above)) if above.any() else len(track) - 1
+
+
+def by_the_ground(track: Track, ways: GroundWays) -> Flags:
+    """Which rows (t,) are of a take-off that is flown, or of the leg of a landing that is.
+
+    >>> from logs.recording.example_log import example_log
+    >>> bool(by_the_ground(example_log().track, GroundWays()).any())
+    False
+    """
+    found = np.arange(len(track)) < _begun(track, ways)
+    if ways.approach is not None:
+        found |= track.leg >= ways.approach.leg
+    return np.asarray(found)
 
 
 def leg_ends(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[float, ...]:

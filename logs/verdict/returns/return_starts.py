@@ -9,6 +9,7 @@ from aircraft.envelope import GRAVITY, ground_speed
 from flight.autopilots.arduplane.swift_return import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
+from logs.verdict.measures.flown_phases import by_the_ground
 from logs.verdict.measures.path_moves import path_moves
 from world.geometry import leg_courses
 from world.kernels import Records
@@ -86,15 +87,10 @@ def _no_starts(*, flown: bool) -> ReturnStarts:
 def _by_the_ground(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
     """Of rows (n,): which are low over the ground in a flown take-off or landing, and which too slow to fly there."""
     ways, terrain = setup.ground_ways, setup.scenario.terrain
-    on_way = np.zeros(len(rows), dtype=np.bool_)
+    on_way = by_the_ground(track, ways)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
     if terrain is None or not ways:
         return on_way, on_way.copy()
-    if ways.take_off is not None:
-        above = track.position[:, 2] > ways.take_off.top
-        on_way |= rows < (int(np.argmax(above)) if above.any() else len(track))
-    if ways.approach is not None:
-        on_way |= track.leg[rows] >= ways.approach.leg
     above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
     low = on_way & (above_ground < setup.limits.min_clearance + SINKING)
     slowest = setup.envelope.level_speeds(float(setup.route.waypoints[0, 2]))[0]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, held_at_limit
+from logs.verdict.measures.flown_phases import by_the_ground
 from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
@@ -109,8 +110,10 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
         return ""
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
     above = ground_clearance(setup, track)
-    low = NOTHING if above is None else number(_least(above), digits=0)
-    height = f", never less than {low} m above ground" if low != NOTHING else ""
+    landed = by_the_ground(track, setup.ground_ways)
+    low = NOTHING if above is None else number(_least(above[~landed]), digits=0)
+    between = " between take-off and landing" if landed.any() else ""
+    height = f", never less than {low} m above ground{between}" if low != NOTHING else ""
     energy = float(track.energy[-1])
     # An imported log may hold no battery.
     used = f", {number(energy, digits=0)} of {number(setup.battery, digits=0)} Wh" if math.isfinite(energy) else ""

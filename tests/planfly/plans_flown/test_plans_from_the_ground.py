@@ -5,6 +5,7 @@ soak, and three otherwise.
 """
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,7 @@ from flight.mission.from_plan import plan_mission
 from flight.mission.items import Command, Mission, MissionItem
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import Airframe, load_airframe
-from planfly.pipeline import make_plan, make_setup
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from tests.ground_missions import draw_field
 from tests.soak import SOAK, note, scaled
 from world.frames import to_map
@@ -154,3 +155,48 @@ def test_no_way_of_a_fresh_plan_from_the_ground_meets_anything() -> None:
     note("plans from the ground to the ground", planned=planned, drawn=number - first)
     # Or nearly all would be refused.
     assert number - first <= 2 * wanted
+
+
+@pytest.mark.skipif(not SOAK, reason="minutes of plans and flights: in make soak")
+def test_fresh_plans_flown_by_arduplanes_law_do_no_harm() -> None:
+    """What harm is, is looked for row by row: no ground before the strip, no sphere, and at rest within the strip."""
+    wanted, planned, number, harmed, unflyable = 30, 0, 0, [], []
+    while planned < wanted:
+        drawn = draw_field(number)
+        number += 1
+        scenario = replace(drawn, flight=drawn.flight.model_copy(update={"autopilot": "ardupilot"}))
+        airframe = load_airframe(scenario)
+        plan = make_plan(scenario, airframe, 1)
+        if not plan.safe:
+            continue
+        planned += 1
+        mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+        setup = make_setup(scenario, airframe, mission, 1, plan=plan)
+        flown = fly_and_judge(setup, airframe, None, reference=False)
+        harm = harm_of_flight(scenario, setup.route.waypoints[-1], flown.track.position)
+        harmed += [f"{scenario.name}: {harm}"] if harm else []
+        unflyable += [] if flown.verdict.flyable else [f"{scenario.name}: {flown.verdict.headline}"]
+    note(
+        "plans from the ground to the ground, flown by ArduPlane's law",
+        planned=planned, drawn=number, harmed="; ".join(harmed), not_flyable="; ".join(unflyable),
+    )  # fmt: skip
+    assert not harmed
+    assert number <= 2 * wanted
+
+
+def harm_of_flight(scenario: Scenario, point: Floats, flown: Floats) -> str:
+    """What is wrong with a flown track (t, 3) m that lands at a point; "" for nothing."""
+    flown = np.asarray(flown, dtype=np.float64)
+    room, away = above(scenario, flown), np.hypot(*(flown[:, :2] - point[:2]).T)
+    gone = np.hypot(*(flown[:, :2] - flown[0, :2]).T) > 150.0
+    on_way = room[(away > 150.0) & (np.cumsum(gone) > 0)]
+    faults = []
+    if on_way.min(initial=math.inf) < 5.0:
+        faults.append(f"{on_way.min():.1f} m above ground on its way")
+    if room.min() < -0.5:
+        faults.append("in the ground")
+    if outside(scenario, flown) < 0.0:
+        faults.append("inside a sphere")
+    if not away[-1] < 100.0:
+        faults.append(f"it ends {away[-1]:.0f} m from the landing point")
+    return ", ".join(faults)

@@ -1,5 +1,6 @@
 """Returns from a take-off and a landing that were flown: what of them is left out, and what counts."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Kind, ReturnFlown, judge_returns, return_world, sinks_down
 from logs.verdict.returns.return_starts import SINKING, flown_starts
 from logs.verdict.returns.returns_text import headline
+from logs.views.report.tables import flight_sentence
 from tests.logs.verdict.rules.flown_circuits import flown_circuit
 from world.scenario import from_spec
 
@@ -64,6 +66,15 @@ def test_nothing_of_a_good_flight_from_the_ground_to_the_ground_hits_it() -> Non
     assert low[0] < 5.0
     # Without its engine it comes down straight ahead from there.
     assert {one.time for one in judge_glides(world, starts).each} == set(starts.time[~starts.low].tolist())
+
+
+def test_a_report_states_the_least_height_between_take_off_and_landing() -> None:
+    """The take-off ends at 60 m; the way leads over 80 m and 70 m to 54 m, where the landing begins."""
+    flown = flown_circuit()
+    said = flight_sentence(flown.setup, flown.track)
+    low = re.search(r"never less than (\d+) m above ground between take-off and landing", said)
+    assert low is not None, said
+    assert int(low[1]) == pytest.approx(54, abs=4)
 
 
 def test_a_return_from_the_climb_into_a_hill_counts() -> None:
