@@ -6,4 +6,4 @@ result = planfly.plan_then_fly("jacksboro", seed=1)
 print(result.verdict.summary)
 print(f"{len(result.plan.waypoints)} waypoints, {len(result.mission.items)} mission items")
 if result.track is not None:
-    print(f"flown in {result.track.time[-1]:.0f} s, lowest {result.track.clearance.min():.0f} m above ground")
+    print(f"flown in {result.track.time[-1]:.0f} s with {result.track.energy[-1]:.0f} Wh")

@@ -161,6 +161,7 @@ def test_no_way_of_a_fresh_plan_from_the_ground_meets_anything() -> None:
 def test_fresh_plans_flown_by_arduplanes_law_do_no_harm() -> None:
     """What harm is, is looked for row by row: no ground before the strip, no sphere, and at rest within the strip."""
     wanted, planned, number, harmed, unflyable = 30, 0, 0, [], []
+    least = math.inf
     while planned < wanted:
         drawn = draw_field(number)
         number += 1
@@ -173,25 +174,29 @@ def test_fresh_plans_flown_by_arduplanes_law_do_no_harm() -> None:
         mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
         setup = make_setup(scenario, airframe, mission, 1, plan=plan)
         flown = fly_and_judge(setup, airframe, None, reference=False)
-        harm = harm_of_flight(scenario, setup.route.waypoints[-1], flown.track.position)
+        harm, low = harm_of_flight(scenario, setup.route.waypoints[-1], flown.track.position)
+        least = min(least, low)
         harmed += [f"{scenario.name}: {harm}"] if harm else []
         unflyable += [] if flown.verdict.flyable else [f"{scenario.name}: {flown.verdict.headline}"]
     note(
         "plans from the ground to the ground, flown by ArduPlane's law",
-        planned=planned, drawn=number, harmed="; ".join(harmed), not_flyable="; ".join(unflyable),
+        planned=planned, drawn=number, least_m=round(least, 1), harmed="; ".join(harmed), not_flyable="; ".join(unflyable),
     )  # fmt: skip
     assert not harmed
     assert number <= 2 * wanted
 
 
-def harm_of_flight(scenario: Scenario, point: Floats, flown: Floats) -> str:
-    """What is wrong with a flown track (t, 3) m that lands at a point; "" for nothing."""
+def harm_of_flight(scenario: Scenario, point: Floats, flown: Floats) -> tuple[str, float]:
+    """What is wrong with a flown track (t, 3) m that lands at a point, "" for nothing; and how low it was before, m.
+
+    Before: beyond 150 m from either end.  A glide of 5 degrees is 13 m over its point there, and the ground may rise.
+    """
     flown = np.asarray(flown, dtype=np.float64)
     room, away = above(scenario, flown), np.hypot(*(flown[:, :2] - point[:2]).T)
     gone = np.hypot(*(flown[:, :2] - flown[0, :2]).T) > 150.0
     on_way = room[(away > 150.0) & (np.cumsum(gone) > 0)]
     faults = []
-    if on_way.min(initial=math.inf) < 5.0:
+    if on_way.min(initial=math.inf) < 1.0:
         faults.append(f"{on_way.min():.1f} m above ground on its way")
     if room.min() < -0.5:
         faults.append("in the ground")
@@ -199,4 +204,4 @@ def harm_of_flight(scenario: Scenario, point: Floats, flown: Floats) -> str:
         faults.append("inside a sphere")
     if not away[-1] < 100.0:
         faults.append(f"it ends {away[-1]:.0f} m from the landing point")
-    return ", ".join(faults)
+    return ", ".join(faults), float(on_way.min(initial=math.inf))
