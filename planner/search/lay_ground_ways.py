@@ -521,7 +521,8 @@ def _go_around(site: _Site, final: _Final) -> float | None:
     """
     home, field = float(site.home[2]), float(final.point[2])
     target = final.line_up[0]
-    first = max(_GO_AROUND, field - home + _GO_AROUND)
+    # Above the line-up: aborted above its go-around's height, an aircraft turns at once, between the hills.
+    first = max(_GO_AROUND, field - home + _GO_AROUND, float(target[2]) - home + _GO_AROUND_ROOM)
     for height in np.arange(math.ceil(first / _HEIGHT_STEP) * _HEIGHT_STEP, _HIGHEST, _HEIGHT_STEP).tolist():
         top = home + height
         climb = site.slopes(final.course, top)[0]

@@ -180,8 +180,12 @@ def test_fresh_plans_flown_by_arduplanes_law_do_no_harm() -> None:
         unflyable += [] if flown.verdict.flyable else [f"{scenario.name}: {flown.verdict.headline}"]
     note(
         "plans from the ground to the ground, flown by ArduPlane's law",
-        planned=planned, drawn=number, least_m=round(least, 1), harmed="; ".join(harmed), not_flyable="; ".join(unflyable),
-    )  # fmt: skip
+        planned=planned,
+        drawn=number,
+        least_m=round(least, 1),
+        harmed="; ".join(harmed),
+        not_flyable="; ".join(unflyable),
+    )
     assert not harmed
     assert number <= 2 * wanted
 

@@ -267,8 +267,8 @@ def test_a_strip_that_slopes_too_much_is_named_with_the_side() -> None:
 
 def test_the_go_around_is_higher_over_a_mound_behind_the_field() -> None:
     def mound(east: Floats, north: Floats) -> Floats:
-        # Below the climb, 200 m beyond the landing point, and within 30 m of the way back at 50 m.
-        return np.where((np.abs(east - 2200.0) < 15.0) & (np.abs(north - 2500.0) < 200.0), BASE + 28.0, BASE)
+        # Below the climb, 300 m beyond the landing point, and within 30 m of the way back at 70 m.
+        return np.where((np.abs(east - 2300.0) < 15.0) & (np.abs(north - 2500.0) < 200.0), BASE + 44.0, BASE)
 
     into = {"landing": FIELD | {"course_deg": 90.0}}
     found = []
@@ -277,9 +277,10 @@ def test_the_go_around_is_higher_over_a_mound_behind_the_field() -> None:
         assert ways is not None
         assert ways.descent is not None
         found.append(ways.descent.go_around)
-    # Field and home are at one height, over which it climbs 50 m at the least.
-    assert found[0] == 50.0
-    assert 50.0 < found[1] <= 80.0
+        # Field and home are at one height; it climbs 30 m over the line-up, in steps of 10 m.
+        up = float(ways.descent.line_up[0, 2]) - BASE
+        assert up + 30.0 <= found[0] < up + 40.0
+    assert (found[0], found[1]) == (70.0, 80.0)
 
 
 def test_a_field_higher_than_home_has_its_go_around_count_from_home() -> None:
