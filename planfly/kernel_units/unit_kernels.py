@@ -90,7 +90,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "glides": (
         *_WORLD,
         "aircraft.envelope.ground_speed",
-        "flight.autopilots.arduplane.swift_return._fly_return",
+        "flight.autopilots.arduplane.swift_return.fly_stages",
         _GLIDES + "glide_map._fill_slopes",
         _GLIDES + "glide_map._search",
         _GLIDES + "glide_reach._look_ahead",
