@@ -283,6 +283,7 @@ class HilLockstep(Lockstep):
         self._answered = 0
         # The last answer, and whether a step was taken since.
         self._last: tuple[float, ...] = (0.0,) * 4
+        self._flown = self._last
         self._owes = False
 
     @property
@@ -318,8 +319,7 @@ class HilLockstep(Lockstep):
                 self.hold(rail)
 
     def _take(self) -> Commands:
-        outputs = self._outputs()
-        servos = self._servos
+        outputs, servos = self._flown, self._servos
         return Commands(
             servos.elevator.at_share(outputs[ELEVATOR]),
             servos.aileron.at_share(outputs[AILERON]),
@@ -331,11 +331,14 @@ class HilLockstep(Lockstep):
         after = BodyMotion(*motion)
         before = self._before or after._replace(time=after.time - 1.0 / FRAME_HZ)
         self._before = after
-        self._send(self._port.packed(self._sensors.measured(between(before, after))))
+        data = self._port.packed(self._sensors.measured(between(before, after)))
+        # Its second step of the frame before, of which it has computed while JSBSim made this one.
+        self._outputs()
+        self._send(data)
         # Packed while PX4 computes that step.
         now = [self._sensors.measured(after)]
         if self._frame % _FIX_FRAMES == 0:
             now.append(self._sensors.fix(after))
         data = self._port.packed(*now)
-        self._outputs()
+        self._flown = self._outputs()
         self._send(data)
