@@ -74,6 +74,7 @@ def fly_go_arounds(
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import load_parameters
     >>> from flight.autopilots.arduplane.point_mass import point_mass
+    >>> from flight.autopilots.arduplane.swift_return import surroundings
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from world.scenario import load_scenario
     >>> from world.wind import Wind
