@@ -283,7 +283,7 @@ class HilLockstep(Lockstep):
         self._answered = 0
         # The last answer, and whether a step was taken since.
         self._last: tuple[float, ...] = (0.0,) * 4
-        self._flown = self._last
+        self._flown: tuple[float, ...] = self._last
         self._owes = False
 
     @property
