@@ -1,19 +1,26 @@
-"""How fast a real autopilot flies in our physics, and where the time goes, as numbers.
+"""How fast ArduPlane itself and PX4 itself fly in our physics, and where the time goes, as numbers.
 
-Where no ArduPlane is at hand the part says so and measures nothing.
+``python -m benchmarks autopilot``.  Of a program that is not at hand the part says so and measures nothing.
 """
 
 import os
 import statistics
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import load_parameters
+from flight.autopilots.px4_sitl.flight import Px4Flight
+from flight.autopilots.sitl.flight import SitlFlight
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import fly_to_end
-from tests.autopilots import find_arduplane
+from tests.autopilots import find_arduplane, find_px4
 from tests.setups import setup_maker, standard
 
 ROUNDS = 3
@@ -24,42 +31,59 @@ class AutopilotCost:
     """One flight, a mission of 13 km; seconds by the clock, or of a processor, a second of flight.
 
     times_real: seconds of the exchange, from the boot on, over seconds by the clock.
+    in_flight: the same from the first waypoint on.
     before: s by the clock, from the boot to the first waypoint.
     ours, theirs: CPU of our process and of the autopilot's.
     """
 
     times_real: float
+    in_flight: float
     before: float
     ours: float
     theirs: float
 
 
-def autopilot_cost(program: Path, seed: int) -> AutopilotCost:
+def autopilot_cost(make_flight: Callable[[int], SitlFlight], seed: int) -> AutopilotCost:
     """Fly once, in 5 m/s and light turbulence."""
-    aerosonde = load_aircraft("aerosonde")
-    setup = setup_maker(aerosonde)(standard(), wind=(5.0, 250.0), turbulence="light", seed=seed)
     cpu, started = os.times(), time.perf_counter()
-    with AutopilotFlight(setup, aerosonde, program, {}) as flight:
+    with make_flight(seed) as flight:
         flight.prepare()
-        before = time.perf_counter() - started
+        begun, before = flight.exchanged, time.perf_counter() - started
         fly_to_end(flight)
         spent, flown = time.perf_counter() - started, flight.exchanged
     after = os.times()
     ours = after.user + after.system - cpu.user - cpu.system
     theirs = after.children_user + after.children_system - cpu.children_user - cpu.children_system
-    return AutopilotCost(flown / spent, before, ours / flown, theirs / flown)
+    return AutopilotCost(flown / spent, (flown - begun) / (spent - before), before, ours / flown, theirs / flown)
 
 
 def run() -> dict[str, Any]:
-    """Print and return the median flight's figures."""
-    program = find_arduplane()
-    if program is None:
-        print("\nautopilot: no ArduPlane at hand (PLANFLY_ARDUPLANE names one): nothing measured")
-        return {}
-    costs = [autopilot_cost(program, seed) for seed in range(1, ROUNDS + 1)]
-    median = sorted(costs, key=lambda cost: cost.times_real)[len(costs) // 2]
-    print("\na real ArduPlane in our physics, 13 km in 5 m/s and light turbulence (median of three)")
-    print(f"  times real time        {median.times_real:.0f} (20)")
-    print(f"  before the first waypoint {statistics.median(cost.before for cost in costs):.1f} s")
-    print(f"  CPU a second of flight: ours {1e3 * median.ours:.1f} ms, ArduPlane's {1e3 * median.theirs:.1f} ms")
-    return asdict(median)
+    """Print and return the median flight's figures, by the programs' names."""
+    aerosonde = load_aircraft("aerosonde")
+
+    def mission(seed: int) -> FlightSetup:
+        return setup_maker(aerosonde)(standard(), wind=(5.0, 250.0), turbulence="light", seed=seed)
+
+    def arduplane(program: Path, seed: int) -> SitlFlight:
+        return AutopilotFlight(mission(seed), aerosonde, program, {})
+
+    def px4(program: Path, seed: int) -> SitlFlight:
+        return Px4Flight(replace(mission(seed), autopilot=Px4(load_parameters(aerosonde))), aerosonde, program)
+
+    found: dict[str, Any] = {}
+    for name, program, make_flight, goal in (
+        ("ArduPlane", find_arduplane(), arduplane, 20),
+        ("PX4", find_px4(), px4, 15),
+    ):
+        if program is None:
+            print(f"\nautopilot: no {name} at hand (PLANFLY_{name.upper()} names one): nothing measured")
+            continue
+        costs = [autopilot_cost(partial(make_flight, program), seed) for seed in range(1, ROUNDS + 1)]
+        median = sorted(costs, key=lambda cost: cost.in_flight)[len(costs) // 2]
+        print(f"\n{name} itself in our physics, 13 km in 5 m/s and light turbulence (median of three)")
+        print(f"  times real time, from the boot on         {median.times_real:.1f}")
+        print(f"  times real time, from the first waypoint  {median.in_flight:.1f} ({goal})")
+        print(f"  before the first waypoint {statistics.median(cost.before for cost in costs):.1f} s")
+        print(f"  CPU a second of flight: ours {1e3 * median.ours:.1f} ms, {name}'s {1e3 * median.theirs:.1f} ms")
+        found[name] = asdict(median)
+    return found

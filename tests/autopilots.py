@@ -42,10 +42,15 @@ def need_arduplane() -> Path:
     return _needed(find_arduplane(), "PLANFLY_ARDUPLANE", "an ArduPlane")
 
 
-def need_px4() -> Path:
-    """The program of a real PX4 that ``PLANFLY_PX4`` names, as `need_arduplane` has it."""
+def find_px4() -> Path | None:
+    """The program of a real PX4 that ``PLANFLY_PX4`` names; None where it names none."""
     named = os.environ.get("PLANFLY_PX4")
-    return _needed(Path(named) if named else None, "PLANFLY_PX4", "a PX4")
+    return Path(named) if named else None
+
+
+def need_px4() -> Path:
+    """The program of a real PX4, as `need_arduplane` has it."""
+    return _needed(find_px4(), "PLANFLY_PX4", "a PX4")
 
 
 def _needed(program: Path | None, variable: str, kind: str) -> Path:
