@@ -74,8 +74,8 @@ def survey(args: argparse.Namespace) -> int:
         # Where nothing switches a camera, any other command judges a mission as a path.
         settings = [f" --params {quote(str(path))}" for path in found.files if path.suffix == ".param"]
         also = settings[0] if missions[0].stem == "parameter" and settings else ""
-        told = f"next      planfly survey {quote(str(missions[0]))}{also} with the same options, as it was flown"
-        print(coloured(told, "hint"))
+        following = f"next      planfly survey {quote(str(missions[0]))}{also} with the same options, as it was flown"
+        print(coloured(following, "hint"))
     give_answer(args, lambda: _answer(str(args.what), found, code))
     return code
 
