@@ -187,6 +187,9 @@ NEAR, WIDER, AT_HEIGHT = 300.0, 1.3, 20.0
 # However its circles are flown, it is over after so many times the time that it is to circle, and that once around
 # takes, at this ground speed, m/s.
 MOST_CIRCLES, _SLOW = 5.0, 10.0
+# A mission that ends in a circle about its last waypoint is flown until the course has turned by this, rad: a quarter
+# of a turn onto the circle, and once around.
+AROUND_END = 2.5 * math.pi
 ENDS = {
     COMPLETED: "completed",
     NOT_A_NUMBER: "loss of control: the state is not a number",
@@ -304,6 +307,26 @@ def end_return(motion: Record, b: Record, memory: Record, dt: float) -> None:  #
         memory.circled += dt
     around = abs(memory.turned) >= 2.0 * math.pi
     memory.done = (memory.done and around and memory.circled > UNLIMITED) or memory.circled > longest_circling(radius)
+
+
+@inner
+def end_around(motion: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
+    """Note how far the course has turned since a mission's last waypoint was reached; past `AROUND_END` it ends.
+
+    By the course, and not by the bearing from the waypoint: where the circle is narrower than the aircraft can turn,
+    it flies loops beside the waypoint, and its bearing may go around in one of them or not until the third.
+
+    motion: a record of `flight.guidance.navigation_error.MOTION`.
+    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
+    """
+    # However wide it circles, it has not missed the mission's end.
+    memory.returning = True
+    course = math.atan2(motion.velocity_east, motion.velocity_north)
+    if memory.circled > 0.0:
+        memory.turned += wrap(course - memory.bearing)
+    memory.circled += dt
+    memory.bearing = course
+    memory.done = abs(memory.turned) >= AROUND_END
 
 
 @compiled

@@ -43,7 +43,7 @@ _OTHER_RETURNS = {
 }
 
 # What of `flight.autopilots.px4.law.PX4_MEMORY` belongs to the way that is flown, and not to the aircraft.
-_OF_THE_WAY = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "finished", "waited", "end_turned")
+_OF_THE_WAY = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed", "finished", "waited")
 
 
 @dataclass(frozen=True)

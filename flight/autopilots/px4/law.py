@@ -23,10 +23,10 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
+    end_around,
     end_return,
     end_tick,
 )
-from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.terrain import Heights
 
@@ -49,8 +49,6 @@ PX4_MEMORY = record_dtype(
     ("climbed", np.bool_),  # whether it is at the height that it returns at
     ("finished", np.bool_),  # whether the mission's last waypoint was reached
     "waited",  # s at the mission's end
-    "end_bearing",  # rad, from the last waypoint to the aircraft
-    "end_turned",  # rad, flown around the last waypoint
     # Lateral.
     "side_acceleration",  # m/s^2 to the right, as demanded
     "airspeed_for_ground",  # m/s, that the least ground speed takes; 0 for none
@@ -78,8 +76,6 @@ ROLL_LAG = 0.65
 PITCH_LAG = 1.0
 # A mission whose last height is not reached by then, or that is not once around its last waypoint, is over, s.
 LONGEST_WAIT = 300.0
-# Its circle about that begins within this share of its radius of the rim.
-_ON_CIRCLE = 0.5
 
 
 @compiled
@@ -161,36 +157,21 @@ def _end_mission(
     """End the flight past the last waypoint b, at its height, or not for as long as is waited for it.
 
     Where the mission goes no further, PX4 circles there without end (`MissionBase::setEndOfMissionItems`): the flight
-    goes once around.  A circle that is begun before the waypoint, and left at once because the height is there, does
-    not end it.
+    goes onto it and once around.  A circle that is begun before the waypoint, and left at once because the height is
+    there, does not end it.
     """
     here = own.waited > 0.0 or memory.done or own.circling or own.finished
     if not here or b.circle != 0.0:
         return
     own.waited += dt
-    # What circles at the end has not missed it.
-    memory.returning = True
-    if b.ends:
-        if own.finished:
-            _turn_about(estimated, b, parameters, own)
-        ended = abs(own.end_turned) >= 2.0 * math.pi
+    if own.finished:
+        end_around(estimated, memory, dt)
+        ended = memory.done
     else:
-        ended = memory.done and abs(estimated.up - b.up) <= parameters.height_acceptance
+        # What circles at the end has not missed it.
+        memory.returning = True
+        ended = not b.ends and memory.done and abs(estimated.up - b.up) <= parameters.height_acceptance
     memory.done = ended or own.waited > LONGEST_WAIT
-
-
-@inner
-def _turn_about(estimated: Record, b: Record, parameters: Record, own: Record) -> None:  # pragma: no cover - compiled
-    """Count how far the aircraft has turned about the last waypoint b, once it is on its circle."""
-    off_east, off_north = estimated.east - b.east, estimated.north - b.north
-    if math.hypot(off_east, off_north) < _ON_CIRCLE * abs(parameters.loiter_radius):
-        return
-    bearing = math.atan2(off_east, off_north)
-    if own.end_turned != 0.0:
-        own.end_turned += wrap(bearing - own.end_bearing)
-    else:
-        own.end_turned = math.copysign(1e-9, parameters.loiter_radius)
-    own.end_bearing = bearing
 
 
 @inner

@@ -37,12 +37,12 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
+    end_around,
     end_return,
     end_tick,
 )
 from world.errors import CrashError, FlightError
 from world.frames import to_geo
-from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner
 from world.terrain import Heights
 
@@ -79,7 +79,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     elif settings.on_last_leg and before.circle != 0.0 and before.stays == math.inf:
         end_circling(work.true, before, memory, work.timing.dt)
     elif settings.on_last_leg and last.ends:
-        end_around(work.true, last, memory, work.timing.dt)
+        end_around(work.true, memory, work.timing.dt)
     elif settings.on_last_leg:
         across, beyond = beyond_end(work.true, path.waypoint[: settings.waypoints])
         memory.done = beyond >= 0.0
@@ -132,31 +132,6 @@ def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:  #
     # As wide as it is flown it has not missed the mission's end.
     memory.returning = True
     memory.done = memory.circled > UNLIMITED
-
-
-# Nearer to a place than this, m, an aircraft does not fly around it; the narrowest circle of PX4 has 25 m.
-_OFF_MIDDLE = 20.0
-
-
-@inner
-def end_around(true: Record, b: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
-    """Count how far the aircraft has turned about the mission's last waypoint, and end the flight once around it.
-
-    true: a record of `flight.guidance.navigation_error.MOTION`.
-    b: that waypoint, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
-    """
-    # As wide as it is flown it has not missed the mission's end.
-    memory.returning = True
-    off_e, off_n = true.east - b.east, true.north - b.north
-    if math.hypot(off_e, off_n) < _OFF_MIDDLE:
-        return
-    bearing = math.atan2(off_e, off_n)
-    if memory.circled > 0.0:
-        memory.turned += wrap(bearing - memory.bearing)
-    memory.circled += dt
-    memory.bearing = bearing
-    memory.done = abs(memory.turned) >= 2.0 * math.pi
 
 
 @inner

@@ -27,6 +27,7 @@ from flight.simulation.tick import (
     STALLED,
     TIPPED,
     Workspace,
+    end_around,
     end_return,
 )
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE
@@ -252,6 +253,19 @@ def test_a_return_ends_with_its_path_a_minute_after_it_came_to_its_circle_and_he
     for away, up in ((301.0, 400.0), (0.0, 420.5), (0.0, 379.5)):
         assert not ended(fresh(done=True), away, up, 400)
     assert ended(fresh(done=True), 519.0, 400.0, 61, circle=-400.0)
+
+
+def test_a_mission_that_ends_in_a_circle_ends_once_its_course_has_turned_once_and_a_quarter() -> None:
+    for turning in (10.1, -10.1):
+        motion, memory = np.zeros(1, MOTION)[0], fresh(done=False)
+        for second in range(46):
+            assert not memory.done, second
+            motion.velocity_east = 25.0 * math.sin(math.radians(170.0 + turning * second))
+            motion.velocity_north = 25.0 * math.cos(math.radians(170.0 + turning * second))
+            end_around(motion, memory, 1.0)
+        # 450 degrees at 10.1 a second, from the second in which it came there.
+        assert memory.done
+        assert memory.returning
 
 
 def test_a_return_ends_no_sooner_than_it_was_all_around_its_circle() -> None:

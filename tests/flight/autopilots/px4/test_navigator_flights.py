@@ -130,8 +130,9 @@ def test_after_the_last_waypoint_it_goes_once_around(aerosonde: Aircraft, versio
     # It is reached where any other waypoint is: 2.24 s before it up to 1.16, NAV_ACC_RAD (10 m) before it from 1.17 on.
     turning = int(np.argmax(np.abs(result.track.attitude[:, 0]) > np.radians(5.0)))
     assert -north[turning] == pytest.approx(before, abs=20.0)
-    bearing = np.unwrap(np.arctan2(east[turning:], north[turning:]))
-    assert 2.0 * np.pi - 0.1 < abs(bearing[-1] - bearing[np.hypot(east, north)[turning:] > 40.0][0]) < 2.0 * np.pi + 0.1
+    # Onto the circle, a quarter of a turn, and once around.
+    course = np.degrees(np.unwrap(np.arctan2(result.track.velocity[:, 0], result.track.velocity[:, 1])))
+    assert course[-1] - course[turning] == pytest.approx(450.0, abs=6.0)
     # NAV_LOITER_RAD is 80 m, to the right.  At 25.7 m/s a bank of 30 degrees turns with 117 m: a circle of that from
     # the waypoint leads 233 m away, and a bank that is not all held some metres more.
     radius = 25.7**2 / (9.80665 * np.tan(np.pi / 6.0))
