@@ -233,7 +233,9 @@ def fly_and_judge(
     try:
         if autopilot is not None:
             program = program_autopilot(autopilot).flying(setup.autopilot, autopilot)
-            return _fly_program(setup, program, airframe, log, advance, every, limits, returns=returns)
+            return _fly_program(
+                setup, program, airframe, log, advance, every, limits, reference=reference, returns=returns
+            )
         how = off_nominal or OffNominal(Variation())
         flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
         return _record_and_judge(
@@ -259,12 +261,15 @@ def _fly_program(
     every: int,
     limits: FlightLimits,
     *,
+    reference: bool,
     returns: bool,
 ) -> JudgedFlight:
     with program.start(setup, airframe.aircraft) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every, limits, returns=returns)
+            judged = _record_and_judge(
+                flight.setup, airframe, flight, log, advance, every, limits, reference=reference, returns=returns
+            )
         except FlightError:
             if log is not None:
                 log.unlink(missing_ok=True)

@@ -1,26 +1,46 @@
-"""A return to launch flown in JSBSim by the whole law."""
+"""A return to launch flown in JSBSim, by the whole law or by ArduPlane itself."""
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.mission.items import Command, Frame, Mission, MissionItem
+from flight.mission.items import LANDINGS, Command, Frame, Mission, MissionItem
+from flight.mission.return_path import LandingStart
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
+from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import ReturnWorld
-from planfly.airframe import load_airframe
+from planfly.airframe import Airframe, load_airframe
 from planfly.pipeline import make_setup
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.kernels import Record
 
+Floats = NDArray[np.float64]
+
 # It is flown in from so far away, m, so that it is steady where the return begins.
-_LEAD = 500.0
+LEAD = 500.0
 # A flight that passes the start further away than this, m, across the ground or in height, has not begun there.
 _ASIDE, _HEIGHT = 60.0, 15.0
 # From a waypoint on, a law is late on a slope by this, s; so far ahead in height the waypoint stands.
 _LATE = 3.0
+
+
+class Met(NamedTuple):
+    """What a way came to meet.
+
+    clearance: least height above ground, m, NaN where that is not known; at: (3,) m, where.
+    outside: least distance outside a kill sphere, m, inf for none; threat: which, -1 for none.
+    """
+
+    clearance: float
+    at: tuple[float, float, float]
+    outside: float
+    threat: int
 
 
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
@@ -29,39 +49,65 @@ def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
     Exact navigation and the mean wind alone, as on the point mass.  start: a record of
     `flight.autopilots.arduplane.swift_return.RETURN_START`.  None for a return that cannot be flown.
     """
-    scenario = replace(world.scenario, wind=replace(world.scenario.wind, turbulence="none"))
     try:
-        airframe = replace(load_airframe(scenario), autopilot=ArduPlane(world.parameters))
-        setup = replace(make_setup(scenario, airframe, _mission(world, start), 1), nav="perfect")
+        setup, airframe = return_setup(world, start)
         flown = simulate(setup, airframe.aircraft)
     except PlanflyError:
         return None
-    track = flown.track
+    position = from_start(flown.track, start)
+    if position is None:
+        return None
+    met = met_on_way(world, position)
+    return (min(0.0, met.clearance) if flown.ended == "ground contact" else met.clearance), met.outside
+
+
+def return_setup(
+    world: ReturnWorld, start: Record, landing: LandingStart | None = None
+) -> tuple[FlightSetup, Airframe]:
+    """The flight of a return by the law, in the mean wind alone: it is flown in to where that begins.
+
+    landing: the landing sequence that it leads to, None for none.
+    Raises MissionError for a return that cannot be laid out, and ScenarioError or ParameterError as `load_airframe`.
+    """
+    scenario = replace(world.scenario, wind=replace(world.scenario.wind, turbulence="none"))
+    airframe = replace(load_airframe(scenario), autopilot=ArduPlane(world.parameters))
+    return replace(make_setup(scenario, airframe, _mission(world, start, landing), 1), nav="perfect"), airframe
+
+
+def from_start(track: Track, start: Record) -> Floats | None:
+    """Positions (t, 3) of a flight from where its return begins; None where it does not come there."""
     begin = np.array([float(start["east"]), float(start["north"])])
-    near = np.hypot(*(track.position[: round(2.0 * _LEAD / 10.0 * 60.0), :2] - begin).T)
+    near = np.hypot(*(track.position[: round(2.0 * LEAD / 10.0 * 60.0), :2] - begin).T)
     if not near.size or float(near.min()) > _ASIDE:
         return None
-    position = track.position[int(np.argmin(near)) :]
-    if abs(float(position[0, 2]) - float(start["up"])) > _HEIGHT:
-        return None
-    low = math.nan
+    position: Floats = track.position[int(np.argmin(near)) :]
+    return None if abs(float(position[0, 2]) - float(start["up"])) > _HEIGHT else position
+
+
+def met_on_way(world: ReturnWorld, position: Floats) -> Met:
+    """What a way (t, 3) comes nearest to."""
+    low, at = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
-        low = float((position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])).min())
-    outside = math.inf
+        above = position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])
+        lowest = int(np.argmin(above))
+        low, (east, north, up) = float(above[lowest]), position[lowest].tolist()
+        at = east, north, up
+    outside, threat = math.inf, -1
     threats = world.scenario.threats
     for k in np.flatnonzero(threats.kill_radius > 0.0):
-        away = np.linalg.norm(position - threats.position[k], axis=1) - threats.kill_radius[k]
-        outside = min(outside, float(away.min()))
-    return (min(0.0, low) if flown.ended == "ground contact" else low), outside
+        away = float((np.linalg.norm(position - threats.position[k], axis=1) - threats.kill_radius[k]).min())
+        if away < outside:
+            outside, threat = away, int(k)
+    return Met(low, at, outside, threat)
 
 
-def _mission(world: ReturnWorld, start: Record) -> Mission:
-    """A mission that passes a start on its course and slope, and returns from there."""
+def _mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
+    """A mission that passes a start on its course and slope, and returns from there, to a landing sequence if any."""
     east, north, up = (float(start[name]) for name in ("east", "north", "up"))
     ve, vn, vu = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
     over = max(1.0, math.hypot(ve, vn))
     up += _LATE * vu
-    places = [(east - _LEAD * ve / over, north - _LEAD * vn / over, up - _LEAD * vu / over), (east, north, up)]
+    places = [(east - LEAD * ve / over, north - LEAD * vn / over, up - LEAD * vu / over), (east, north, up)]
     origin, mission = world.scenario.origin, world.setup.mission
     items = []
     for number, place in enumerate(places, 1):
@@ -70,10 +116,21 @@ def _mission(world: ReturnWorld, start: Record) -> Mission:
         items.append(MissionItem(number, Command.NAV_WAYPOINT, Frame.GLOBAL, params, lat, lon, place[2]))
     back = int(Command.NAV_RETURN_TO_LAUNCH)
     items.append(MissionItem(3, back, int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0))
+    if landing is not None:
+        items += _sequence(mission.items, landing)
     rally = []
     for number, point in enumerate(world.rally):
         lat, lon = (float(value) for value in to_geo(origin, point.east, point.north))
         frame = Frame.GLOBAL_RELATIVE_ALT if point.base else Frame.GLOBAL
         place_up = point.up - point.base
         rally.append(MissionItem(number, Command.NAV_RALLY_POINT, frame, (0.0,) * 4, lat, lon, place_up))
-    return Mission(mission.home, tuple(items), rally=tuple(rally), source=mission.source)
+    home = None if mission.home is None else replace(mission.home, alt=world.home.up)
+    return Mission(home, tuple(items), rally=tuple(rally), source=mission.source)
+
+
+def _sequence(items: tuple[MissionItem, ...], landing: LandingStart) -> list[MissionItem]:
+    """The items of a landing sequence, from its DO_LAND_START to the landing, numbered from 4."""
+    first = next(k for k, item in enumerate(items) if item.seq == landing.item)
+    begin = max(k for k in range(first) if items[k].command == Command.DO_LAND_START)
+    end = next(k for k in range(first, len(items)) if items[k].command in LANDINGS)
+    return [replace(item, seq=number) for number, item in enumerate(items[begin : end + 1], 4)]

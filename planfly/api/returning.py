@@ -1,9 +1,11 @@
 """Will it come home?  From everywhere on the way of a mission, a plan or a flight, with its engine and without."""
 
+import shutil
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +29,7 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
+from planfly.api.flying import FencePaths, FlownMission, named_program, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.crash_safe_log import INTERRUPTED
@@ -35,6 +37,7 @@ from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
 from planfly.open_mission import OpenedMission, is_log
 from planfly.pipeline import fly_and_judge
+from planfly.program_returns import ProgramReturns, fly_by_program, refuse_program
 from planfly.return_flights import fly_return
 from planfly.returns_beside import return_starts
 from planfly.stages import stage
@@ -65,6 +68,7 @@ class ReturnsFound:
     glides: what can be reached where the engine stops; empty where that was not asked.
     suggested: what would help, the plainest first, each with the returns that it leads to; none where none was asked.
     files: written, none where no folder was named.
+    by_program: the worst, flown by ArduPlane itself; None where none was named.
     """
 
     setup: FlightSetup
@@ -72,6 +76,7 @@ class ReturnsFound:
     glides: Glides = NOT_ASKED
     suggested: tuple[Suggested, ...] = ()
     files: tuple[Path, ...] = ()
+    by_program: ProgramReturns | None = None
 
     @property
     def safe(self) -> bool:
@@ -97,6 +102,13 @@ class ReturnsFound:
     def lines_of_ranges(self) -> tuple[str, ...]:
         """Each range of seconds in words, the worst first."""
         return tuple(range_text(one, self.returns, self.setup.scenario) for one in self.returns.ranges)
+
+    @property
+    def lines_of_program(self) -> tuple[str, ...]:
+        """What ArduPlane itself made of the worst, and what the law did; none where it flew none."""
+        if self.by_program is None:
+            return ()
+        return (self.by_program.headline(), *self.by_program.lines(self.returns, self.setup.scenario))
 
     @property
     def line_of_no_return(self) -> str:
@@ -158,6 +170,8 @@ def returns(
     *,
     every: float = 1.0,
     suggest: bool = False,
+    autopilot: str | Path | None = None,
+    points: int = 3,
     out: str | Path | None = None,
     overwrite: bool = True,
     scenario: str | Path | None = None,
@@ -182,7 +196,8 @@ def returns(
     what: a `Plan`, the path of a plan.json, .waypoints or .plan, which is flown first; or a flight: what `planfly.fly`
     gave, a flight log or its path, or an autopilot's log.
     every: s between two returns.  suggest: whether to look for what would make all of them safe.
-    out: folder for pictures of them; None writes none.  overwrite: whether results in it are replaced.
+    autopilot: ArduPlane's program, which then flies the worst ``points`` of them, too, far apart.
+    out: folder for pictures; None writes none.  overwrite: whether results in it are replaced.
     scenario, terrain, fence, seed, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: of a
     plan or mission, as of `planfly.fly`; of a flight only terrain.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
@@ -193,25 +208,22 @@ def returns(
     >>> found.safe, found.returns.ranges[0].worst.target.name, found.glides.each[0].reach
     (False, 'home', 'home')
     """
-    check_arguments(every=every, seed=seed, flight=flight, datum=datum)
+    check_arguments(every=every, points=points, seed=seed, flight=flight, datum=datum)
     given: dict[str, Any] = {
-        "scenario": scenario, "fence": fence or None, "wind": wind, "turbulence": turbulence, "at": at,
-        "params": params, "aircraft": aircraft, "airspeed": airspeed, "guidance": guidance,
-    } | {"autopilot_law": autopilot_law}  # fmt: skip
+        "scenario": scenario, "fence": fence or None, "wind": wind, "turbulence": turbulence, "at": at, "params": params,
+        "aircraft": aircraft, "airspeed": airspeed, "guidance": guidance, "autopilot_law": autopilot_law}  # fmt: skip
     other, of_log = {"seed": seed, "nav": nav}, {"plan": plan, "flight": flight, "datum": datum}
     path = Path(what) if isinstance(what, str | Path) else None
-    asked = _asked(every, suggest, out, overwrite=overwrite)
+    asked = _asked(every, suggest, out, autopilot, points, overwrite=overwrite)
     if path is not None and is_imported_log(path):
         refuse(str(path), other, _AS_FLOWN)
         return _of_import(_imported(path, terrain=terrain, **{**given, **of_log, "fence": fence}), asked)
     refuse(str(path or "mission"), of_log, "goes with an imported log")
-    if path is not None and is_log(path):
-        what = read_log(path)
+    what = read_log(path) if path is not None and is_log(path) else what
     if isinstance(what, FlightLog | FlownMission):
         refuse(str(path or "flight"), given | other, _AS_FLOWN)
         return _judged(_over(what.setup, terrain), what.track, asked, what.ended or INTERRUPTED)
-    changes = {name: value for name, value in given.items() if name not in ("scenario", "fence")}
-    change = partial(changed_scenario, **changes, nav=nav)
+    change = partial(changed_scenario, nav=nav, **{k: given[k] for k in given if k not in ("scenario", "fence")})
     return _of_mission(opened_mission(what, scenario, terrain, seed, fence, change), asked)
 
 
@@ -227,21 +239,27 @@ def _over(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
     return setup if terrain is None else setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
 
 
-@dataclass(frozen=True, slots=True)
-class _Asked:
-    """What is asked of returns: how many, what would help, and pictures in a folder."""
+class _Asked(NamedTuple):
+    """What is asked of returns: how many, what would help, which of them a program flies, and pictures in a folder."""
 
     every: float
     suggest: bool
     folder: Path | None
     overwrite: bool
+    program: Path | None
+    points: int
 
 
-def _asked(every: float, suggest: bool, out: str | Path | None, *, overwrite: bool) -> _Asked:
-    """The same, its folder checked.  Raises PlanflyError for one that is a file, or holds anything."""
+def _asked(
+    every: float, suggest: bool, out: str | Path | None, autopilot: str | Path | None, points: int, *, overwrite: bool
+) -> _Asked:
+    """The same, checked.  Raises PlanflyError for a folder that is a file, or holds anything, and a wrong program."""
+    program = named_program(autopilot)
+    if program is not None:
+        refuse_program(program)
     if out is not None:
         refuse_folder(Path(out), overwrite)
-    return _Asked(every, suggest, None if out is None else Path(out), overwrite)
+    return _Asked(every, suggest, None if out is None else Path(out), overwrite, program, points)
 
 
 def _of_import(found: "ImportedFlight", asked: _Asked) -> ReturnsFound:
@@ -261,19 +279,28 @@ def _judged(setup: FlightSetup, track: Track, asked: _Asked, ended: str) -> Retu
     starts = return_starts(setup, track, asked.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
         judged = judge_returns(world, starts, asked.every, fly_return)
-    with stage("gliding from there without the engine"):
-        found = ReturnsFound(setup, judged, judge_glides(world, starts))
-    if asked.suggest and not found.safe and found.returns.each:
-        found = replace(found, suggested=_suggested(world, starts, found, asked.every))
-    if asked.folder is None or not found.returns.each:
-        return found
-    with stage("drawing", "drawing returns"):
-        drawn = drawn_returns(world, starts, judged, found.glides)
-        files = _files(setup, track, drawn)
-    folder = clean_folder(asked.folder, RETURN_FILES, overwrite=asked.overwrite)
-    for name, data in files.items():
-        write_whole(folder / name, data)
-    names = list(files)
+    with TemporaryDirectory(prefix="planfly-returns-") as kept:
+        flown = None
+        if asked.program is not None:
+            logs = None if asked.folder is None else Path(kept)
+            flown = fly_by_program(world, starts, judged, asked.program, asked.points, logs)
+            judged = flown.put_right(judged)
+        with stage("gliding from there without the engine"):
+            found = ReturnsFound(setup, judged, judge_glides(world, starts), by_program=flown)
+        if asked.suggest and not found.safe and found.returns.each:
+            found = replace(found, suggested=_suggested(world, starts, found, asked.every))
+        if asked.folder is None or not found.returns.each:
+            return found
+        with stage("drawing", "drawing returns"):
+            drawn = drawn_returns(world, starts, judged, found.glides)
+            files = _files(setup, track, drawn)
+        folder = clean_folder(asked.folder, RETURN_FILES, overwrite=asked.overwrite)
+        for name, data in files.items():
+            write_whole(folder / name, data)
+        names = list(files)
+        for log in sorted(Path(kept).iterdir()):
+            shutil.move(log, folder / log.name)
+            names.append(log.name)
     if len(track):
         with Recorder(folder / "returns.mcap", setup) as recorder:
             recorder.write(track)

@@ -13,6 +13,7 @@ from planfly.terminal.options import (
     call,
     flown_by_options,
     imported_log_options,
+    program_option,
     result_options,
     steering_options,
     world_options,
@@ -34,6 +35,7 @@ def returns_options(line: LineParser) -> None:
         " what can be reached without the engine",
         "planfly returns mission.waypoints --terrain jacksboro --wind 5,250",
         "planfly returns flight.mcap --every 5 --out pictures",
+        "planfly returns flight.mcap --autopilot ./arduplane --points 5",
     )
     completed(
         parser.add_argument(
@@ -49,6 +51,14 @@ def returns_options(line: LineParser) -> None:
         "--suggest",
         action="store_true",
         help="look for the least RTL_ALTITUDE, a climb before the turn or the fewest rally points that make all safe",
+    )
+    program_option(
+        group,
+        "fly the worst returns by ArduPlane itself, too, and say whether it does as its law: the path of its program,"
+        " built for software in the loop (extra planfly[live])",
+    )
+    group.add_argument(
+        "--points", metavar="N", type=number("points"), help="how many of the worst it flies, far apart (default: 3)"
     )
     imported_log_options(parser)
     world_options(parser)
@@ -78,6 +88,8 @@ def returns(args: argparse.Namespace) -> int:
         print(f"  {text}")
     if len(found.lines_of_ranges) > _LISTED:
         print(f"  and {len(found.lines_of_ranges) - _LISTED} ranges more; --json FILE has them all")
+    for text in found.lines_of_program:
+        print(f"  {text}")
     print(f"  {found.line_of_no_return}")
     for text in found.lines_of_suggestions:
         print(coloured("  would help: ", "hint") + text)
@@ -102,6 +114,7 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         CauseEntry,
         ReturnsAnswer,
         glides_entry,
+        program_entry,
         return_entry,
         suggestion_entry,
     )
@@ -122,6 +135,7 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         rtl_autoland=returns.autoland,
         not_judged=list(returns.open),
         ranges=[return_entry(found, one) for one in returns.ranges],
+        by_program=program_entry(found),
         left_out=returns.left_out,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),

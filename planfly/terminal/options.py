@@ -191,13 +191,17 @@ def steering_options(parser: CommandParser) -> OptionTaker:
     return group
 
 
+def program_option(group: OptionTaker, does: str) -> None:
+    """An autopilot's program."""
+    group.add_argument("--autopilot", metavar="PATH", help=does)
+
+
 def flight_options(parser: CommandParser) -> None:
     """What decides a flight beside its mission: aircraft, weather, autopilot, and when it is stopped."""
     flown_by_options(parser)
-    steering_options(parser).add_argument(
-        "--autopilot",
-        metavar="PATH",
-        help="fly ArduPlane or PX4 itself in planfly's physics: the path of its program, built for software in the"
+    program_option(
+        steering_options(parser),
+        "fly ArduPlane or PX4 itself in planfly's physics: the path of its program, built for software in the"
         " loop (extra planfly[live])",
     )
     limits = parser.group("limits of the flight")

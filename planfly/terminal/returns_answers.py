@@ -7,7 +7,7 @@ from pydantic.dataclasses import dataclass
 
 from logs.verdict.returns.glides_text import glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import MARGIN
-from logs.verdict.returns.judge_returns import ReturnRange
+from logs.verdict.returns.judge_returns import ReturnFlown, ReturnRange
 from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.returning import ReturnsFound, Suggested
 from planfly.terminal.verdict_answers import STRICT, ConditionsDocument
@@ -72,6 +72,45 @@ class ReturnSuggestion:
     unsafe: int
     headline: str
     """What the returns come to with it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class MeasuredReturn:
+    """What one return comes to."""
+
+    kind: str
+    target: str
+    clearance_m: float | None
+    outside_m: float | None
+    """Least distance outside a missile's sphere; null where there is none."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ProgramReturnEntry:
+    """A return that ArduPlane's program flew, too."""
+
+    at_s: float
+    east_m: float
+    north_m: float
+    law: MeasuredReturn
+    program: MeasuredReturn | None
+    """Null where it could not be flown."""
+    agrees: bool
+    """Whether both go to the same place and come to the same."""
+    worse: bool
+    """Whether the program's is worse, and counts."""
+    reason: str
+    """Why it could not be flown; empty where it was."""
+    log: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ByProgram:
+    """The worst returns by ArduPlane's program, the worst first."""
+
+    version: str
+    """Empty where it flew none."""
+    returns: list[ProgramReturnEntry]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -154,6 +193,8 @@ class ReturnsAnswer:
     not_judged: list[str]
     """What leaves the returns open: terrain, law, autoland, return path or landing; empty where nothing does."""
     ranges: list[ReturnEntry]
+    by_program: ByProgram | None
+    """Of --autopilot; what is worse there is counted in headline and ranges."""
     left_out: int
     """How many more there would be on the ground, or too low in a take-off or a landing to return."""
     no_return: str
@@ -183,6 +224,34 @@ def suggestion_entry(found: ReturnsFound, one: Suggested) -> ReturnSuggestion:
         safe=one.returns.count("safe"),
         unsafe=len(one.returns.each) - one.returns.count("safe"),
         headline=headline(one.returns),
+    )
+
+
+def program_entry(found: ReturnsFound) -> ByProgram | None:
+    """What ArduPlane's program flew as an answer has it."""
+    if found.by_program is None:
+        return None
+    names = {log.name: str(log) for log in found.files}
+    entries = [
+        ProgramReturnEntry(
+            at_s=round(one.law.time, 2),
+            east_m=round(one.law.start[0], 1),
+            north_m=round(one.law.start[1], 1),
+            law=_measured(one.law),
+            program=None if one.flown is None else _measured(one.flown),
+            agrees=one.agrees,
+            worse=one.worse,
+            reason=one.reason,
+            log=None if one.log is None else names.get(one.log.name),
+        )
+        for one in found.by_program.each
+    ]
+    return ByProgram(version=found.by_program.program, returns=entries)
+
+
+def _measured(one: ReturnFlown) -> MeasuredReturn:
+    return MeasuredReturn(
+        kind=one.kind, target=one.target.name, clearance_m=_tenths(one.clearance), outside_m=_tenths(one.outside)
     )
 
 

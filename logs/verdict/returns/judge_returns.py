@@ -571,11 +571,11 @@ def _set_right(
 ) -> tuple[list[ReturnFlown], list[float]]:
     """Fly the least sure of each stretch of unsure returns in JSBSim, and set right what that tells of the stretch."""
     out, differences = list(each), []
-    by_doubt = groupby(range(len(each)), lambda k: _doubt(each[k]) < UNSURE)
-    groups = [[k for k in group if _is_steady(world, starts.rows[k])] for unsure, group in by_doubt if unsure]
-    stretches = sorted((min(_doubt(each[k]) for k in group), group) for group in groups if group)
+    by_doubt = groupby(range(len(each)), lambda k: doubt(each[k]) < UNSURE)
+    groups = [[k for k in group if is_steady(world, starts.rows[k])] for unsure, group in by_doubt if unsure]
+    stretches = sorted((min(doubt(each[k]) for k in group), group) for group in groups if group)
     for _, group in stretches[:most]:
-        k = min(group, key=lambda k: _doubt(each[k]))
+        k = min(group, key=lambda k: doubt(each[k]))
         found = fly_again(world, starts.rows[k])
         if found is None:
             continue
@@ -613,7 +613,7 @@ def _moved(world: ReturnWorld, one: ReturnFlown, flown: Record, higher: float, f
     return replace(one, clearance=float(moved["clearance"]), outside=float(moved["outside"]), kind=kind)
 
 
-def _is_steady(world: ReturnWorld, row: Record) -> bool:
+def is_steady(world: ReturnWorld, row: Record) -> bool:
     """Whether an aircraft could be flown in to a start: not far banked, nor slower than it flies."""
     wind = world.scenario.wind
     over = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
@@ -623,7 +623,7 @@ def _is_steady(world: ReturnWorld, row: Record) -> bool:
     return abs(float(row["roll"])) <= _BANKED and airspeed >= float(world.aircraft.record.slowest)
 
 
-def _doubt(one: ReturnFlown) -> float:
+def doubt(one: ReturnFlown) -> float:
     """How near to what decides it a return comes, m: the ground, the height that is asked of it, or a kill sphere."""
     if one.kind in ("zone", "unknown"):
         # Neither comes of how far away anything is.

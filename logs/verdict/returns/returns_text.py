@@ -80,6 +80,25 @@ def outcome_text(one: ReturnFlown, limit: float) -> str:
     return "is safe" if one.safe else _ONE[one.kind].format(limit=limit)
 
 
+def measured_text(one: ReturnFlown, limit: float, scenario: Scenario) -> str:
+    """Where one return goes, what it comes to, and how near it comes to ground and spheres.
+
+    limit: least height above ground that is asked for, m.
+    """
+    east, north, _ = one.clearance_at
+    where = f"{east:.0f} m east, {north:.0f} m north"
+    said = [f"to {one.target.name}", outcome_text(one, limit)]
+    if one.kind == "ground":
+        said[-1] += f" at {where}"
+    elif not math.isnan(one.clearance):
+        said.append(f"{one.clearance:.0f} m above ground at the least at {where}")
+    if one.threat >= 0 and one.outside <= 0.0:
+        said.append(f"{-one.outside:.0f} m inside the sphere of {scenario.threats.names[one.threat]}")
+    elif math.isfinite(one.outside):
+        said.append(f"{one.outside:.0f} m outside every missile's sphere")
+    return ", ".join(said)
+
+
 def counts_text(returns: Returns) -> str:
     """How many returns come to what, the worst first; "" where all are safe."""
     counted = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}

@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 FAULTS = (
     *("none", "32-outputs", "magic", "deaf", "silent", "crash", "signal", "panic", "no-ekf", "refuses", "no-space"),
-    *("copter", "mute", "reboot", "dive", "crash-in-air", "will-not-arm"),
+    *("copter", "mute", "reboot", "dive", "crash-in-air", "will-not-arm", "dives-home"),
 )
 METRES = 111318.845
 AUTO = 10
@@ -26,9 +26,11 @@ NEUTRAL, FULL = 1500, 400
 EKF_GOOD = 0b111111
 FLOWN = (
     *(mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_LOITER_UNLIM),
-    *(mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND),
+    *(mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH),
 )
 OVER_HOME = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+# It returns to a circle so wide over home, m, at RTL_ALTITUDE, and sinks at once; one that fails to this height, m.
+HOME_CIRCLE, TOO_LOW = 150.0, 20.0
 # It flares so high over the landing point, m.
 FLARE = 4.0
 # Seconds on the rail before it knows where it is, and in AUTO before what is to go wrong in the air does.
@@ -168,6 +170,8 @@ class Fake:
 
     def place(self, item: Any) -> tuple[float, float, float]:
         """North, east and down of an item from home, m."""
+        if item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
+            return 0.0, 0.0, -TOO_LOW if self.fault == "dives-home" else -self.parameters.get("RTL_ALTITUDE", 100.0)
         lat, lon = item.x / 1e7, item.y / 1e7
         scale = math.cos(math.radians(0.5 * (lat + self.home[0])))
         down = -item.z if item.frame in OVER_HOME else self.home[2] - item.z
@@ -217,9 +221,11 @@ class Fake:
         if (distance < 10.0 or (distance < 60.0 and ahead < 0.0)) and self.current + 1 < len(self.items):
             self.current += 1
         wanted, level = math.atan2(to_east - east, to_north - north), 0.0
-        if item.command == mavlink.MAV_CMD_NAV_LOITER_UNLIM and distance < 2.0 * abs(item.param3):
+        home = item.command == mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
+        circle = HOME_CIRCLE if home else item.param3 if item.command == mavlink.MAV_CMD_NAV_LOITER_UNLIM else 0.0
+        if distance < 2.0 * abs(circle):
             # Around its middle: square to the way there on the rim, towards it outside, and banked for the circle.
-            side, radius = math.copysign(1.0, item.param3), abs(item.param3)
+            side, radius = math.copysign(1.0, circle), abs(circle)
             wanted += side * (math.atan(4.0 * (distance - radius) / radius) - 0.5 * math.pi)
             level = side * math.atan((v_north**2 + v_east**2) / (9.80665 * radius))
         turn = math.remainder(wanted - math.atan2(v_east, v_north), math.tau)

@@ -1,0 +1,112 @@
+"""``planfly returns --autopilot``: the worst returns by a program; what counts where it and the law disagree."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import planfly
+from logs.verdict.returns.judge_returns import badness, judge_returns, return_world
+from logs.verdict.returns.return_starts import planned_starts
+from planfly.cli import main
+from planfly.program_returns import ProgramReturn, ProgramReturns, worst_apart
+from tests.autopilots import need_arduplane, write_fake, write_fake_px4
+from tests.logs.verdict.returns.hill import SCENARIO, hill_setup, mission_text
+
+# A mound, 90 m high, 400 m from home, and a mission behind it at 180 m: a straight slope from there to 100 m over home
+# passes it at some 125 m, and what sinks to 20 m at once does not.
+_PEAK = "east_m = 400\nnorth_m = 0\nheight_m = 90\nsigma_m = 200\n"
+MOUND = SCENARIO.partition("[[terrain.peak]]")[0] + "[[terrain.peak]]\n" + _PEAK
+
+
+@pytest.fixture
+def mound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "mound.toml").write_text(MOUND, encoding="utf-8")
+    (tmp_path / "mound.waypoints").write_text(mission_text(1150.0, 1300.0, amsl=180.0), encoding="utf-8")
+    (tmp_path / "flat.toml").write_text(MOUND.replace("= 400", "= 8000"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+ASKED = ["returns", "mound.waypoints", "--scenario", "mound.toml", "--every", "3", "--points", "1", "--json", "a.json"]
+
+
+def test_a_return_that_a_program_flies_as_the_law_does_agrees(mound: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    flat = [word.replace("mound.toml", "flat.toml") for word in ASKED]
+    assert main([*flat, "--autopilot", str(write_fake(mound)), "--out", "drawn"]) == 0
+    out = capsys.readouterr().out
+    assert "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst flown, all of them as by the law" in out
+    (one,) = json.loads((mound / "a.json").read_text(encoding="utf-8"))["by_program"]["returns"]
+    assert (one["agrees"], one["worse"], one["reason"]) == (True, False, "")
+    assert one["program"]["kind"] == one["law"]["kind"] == "safe"
+    assert one["program"]["target"] == "home"
+    assert (mound / "drawn" / "worst-return-1.BIN").read_bytes() == b"\xa3\x95fake"
+    # Its log is a flight like any other, which ends in its circle at home.
+    assert Path(one["log"]) == Path("drawn/worst-return-1.mcap")
+    assert planfly.read_log(mound / one["log"]).ended == "completed"
+
+
+def test_harm_that_a_program_does_counts_where_the_law_does_none(
+    mound: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*ASKED, "--autopilot", str(write_fake(mound, "dives-home"))]) == 4
+    out = capsys.readouterr().out
+    assert "returns 1 hits the ground" in out
+    assert "1 of the worst flown, 0 of them as by the law; 1 worse than by the law" in out
+    assert "the program's counts" in out
+    answer = json.loads((mound / "a.json").read_text(encoding="utf-8"))
+    (one,) = answer["by_program"]["returns"]
+    assert (one["law"]["kind"], one["program"]["kind"], one["worse"]) == ("safe", "ground", True)
+    assert answer["ranges"][0]["kind"] == "ground"
+    # On the mound.
+    assert 0.0 < answer["ranges"][0]["clearance_east_m"] < 600.0
+
+
+def test_no_program_but_arduplanes_is_flown(mound: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for program, said in (
+        (write_fake_px4(mound), "ArduPlane's program is expected: how PX4 returns is not flown here"),
+        (mound / "none", "no such file"),
+    ):
+        assert main(["returns", "mound.waypoints", "--autopilot", str(program)]) == 2
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert said in captured.err
+        assert len(captured.err.strip().splitlines()) == 1
+
+
+def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> None:
+    setup = hill_setup(tmp_path)
+    world, starts = return_world(setup), planned_starts(setup, 2.0)
+    returns = judge_returns(world, starts, 2.0)
+    chosen = worst_apart(world, starts, returns, 4)
+    assert len(chosen) == 4
+    assert chosen[0][0] == min(returns.each, key=badness)
+    east = [one.start[0] for one, _ in chosen]
+    # Half of a fourth of 6.5 km.
+    assert min(abs(a - b) for k, a in enumerate(east) for b in east[:k]) > 0.95 * 6500.0 / 8.0
+    assert all(float(starts.rows[k]["east"]) == one.start[0] for one, k in chosen)
+    # 20 m over the ground all the way in, or none begins there.
+    buried = replace(starts, rows=starts.rows.copy())
+    buried.rows["up"] = 15.0
+    assert worst_apart(world, buried, returns, 4) == []
+    safe, ground = (next(one for one in returns.each if one.kind == kind) for kind in ("safe", "ground"))
+    hit = replace(safe, kind="ground", clearance=-3.0)
+    both = ProgramReturns("it", (ProgramReturn(safe, hit), ProgramReturn(ground, replace(ground, kind="safe"))))
+    right = both.put_right(returns)
+    assert right.count("ground") == returns.count("ground") + 1
+    assert right.count("safe") == returns.count("safe") - 1
+    assert [one.worse for one in both.each] == [True, False]
+    assert "the law's, the worse, counts" in both.lines(returns, setup.scenario)[1]
+
+
+@pytest.mark.client
+def test_arduplane_returns_as_its_law_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From behind the hill into it, and from before it home."""
+    (tmp_path / "hill.toml").write_text(SCENARIO, encoding="utf-8")
+    (tmp_path / "hill.waypoints").write_text(mission_text(), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    found = planfly.returns("hill.waypoints", scenario="hill.toml", every=10, autopilot=need_arduplane(), points=2)
+    assert found.by_program is not None
+    assert found.by_program.each[0].law.kind == "ground"
+    assert all(one.agrees for one in found.by_program.each), found.lines_of_program
