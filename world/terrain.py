@@ -6,8 +6,8 @@ The raster stays in its own grid at its source resolution; map positions are tak
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -55,6 +55,10 @@ class Terrain:
             heights.setflags(write=False)
         object.__setattr__(self, "heights", heights)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """In another process its raster is locked, too: compiled code has other types for arrays that are not."""
+        return _locked, tuple(getattr(self, field.name) for field in fields(self))
+
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
         """Ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
@@ -68,6 +72,11 @@ class Terrain:
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
         low, at = segment_clearance(self.heights, self.to_pixel.record, start, end)
         return float(low), float(at)
+
+
+def _locked(heights: Heights, *others: Any) -> Terrain:
+    heights.setflags(write=False)
+    return Terrain(heights, *others)
 
 
 @inlined

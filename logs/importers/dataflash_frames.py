@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.setup import Damage
-from world.kernels import compiled
+from world.kernels import compiled, read_only
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -227,7 +227,7 @@ def _find_messages(data: Bytes, wanted: NDArray[np.bool_], let_go: Callable[[], 
     state[_READING], lengths[FMT] = 1, _FMT_LENGTH
     at, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
     for until in pieces(data.size, let_go):
-        found = _walk_messages(data, until, state, lengths, counts, HEADER, FMT, TRAILING, wanted)
+        found = _walk_messages(read_only(data), until, state, lengths, counts, HEADER, FMT, TRAILING, wanted)
         at.append(found[0])
         kinds.append(found[1])
     places, size, behind = int(state[_PLACES]), int(state[_LOST]), int(state[_BEHIND])

@@ -24,7 +24,7 @@ from logs.importers.px4_formats import MessageFormats
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.address_space import AddressSpaceError
 from world.errors import LogError
-from world.kernels import compiled
+from world.kernels import compiled, read_only
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -110,7 +110,7 @@ def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damag
     state = np.zeros(5, np.int64)
     state[_AT], state[_READING] = _HEADER, 1
     for until in pieces(data.size, let_go):
-        _walk(data, until, state, np.frombuffer(_LETTERS, np.uint8))
+        _walk(read_only(data), until, state, np.frombuffer(_LETTERS, np.uint8))
     cut = bool(state[_CUT]) or int(state[_AT]) < data.size
     return Damage(int(state[_PLACES]), int(state[_LOST]), cut)
 

@@ -40,6 +40,8 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     missile spheres and zones, and the headroom below the maximum height above ground, are those of the same pieces.
     """
     data = problem.certified
+    # A copy: compiled code has one type for arrays that are locked, as a plan's, and one for others.
+    waypoints = np.array(waypoints, dtype=np.float64)
     problems: list[str] = []
     turn = _turns(data, waypoints, problems)
     available_length = _turn_lengths(data, waypoints, problems)
@@ -53,7 +55,7 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
 
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
     """Distance from the path to the surface of the nearest missile sphere, m: negative inside, inf without any."""
-    return float(missile_distance(data, np.ascontiguousarray(waypoints)))
+    return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
 
 
 # How far inside its limit (negative: beyond), where, and what is wrong.

@@ -43,7 +43,7 @@ from flight.mission.return_path import LandingStart, ReturnCircle
 from flight.simulation.tick import AT_HEIGHT, NEAR, WIDER
 from world.frames import POLYMAP, PolyMapRecord
 from world.geometry import wrap
-from world.kernels import Record, Records, compiled, inner, record_dtype
+from world.kernels import Record, Records, compiled, inner, read_only, record_dtype
 from world.scenario import Scenario
 from world.terrain import Heights, ground_height
 from world.wind import mean_wind_speed
@@ -145,7 +145,7 @@ def surroundings(scenario: Scenario) -> Surroundings:
     spheres, radii = threats.position.reshape(-1, 3), threats.kill_radius
     if terrain is None:
         nothing: Heights = np.full((2, 2), np.nan, dtype=np.float32)
-        return Surroundings(nothing, np.zeros(1, POLYMAP)[0], spheres, radii, False)
+        return Surroundings(read_only(nothing), np.zeros(1, POLYMAP)[0], spheres, radii, False)
     return Surroundings(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
 
 

@@ -31,7 +31,7 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
     NaN where a segment leaves the raster or its data.
     """
-    low, at = _path_clearance(read_only(heights), to_pixel, read_only(points))
+    low, at = _path_clearance(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
     return low, at
 
 
@@ -81,7 +81,7 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
     >>> float(visits.closest[0]), round(float(visits.inside[0]), 6)
     (30.0, 8.0)
     """
-    given = (read_only(array) for array in (points, time, centres, radii, scales))
+    given = (read_only(np.ascontiguousarray(array)) for array in (points, time, centres, radii, scales))
     visits: SphereVisits = _path_spheres(*given)
     return visits
 

@@ -18,7 +18,7 @@ from logs.verdict.measures.acceptance import reach
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST, MAX_PLAUSIBLE
-from world.kernels import compiled
+from world.kernels import compiled, read_only
 
 Floats = NDArray[np.float64]
 RowNumbers = NDArray[np.int64]
@@ -182,7 +182,7 @@ def _assign(track: Track, apexes: Floats) -> tuple[RowNumbers, Floats]:
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
     step = max(1, int(CHORD_TIME / tick), -(-len(track) * count // _CELLS))
-    chords, capped = _align(position, apexes, step, CAPTURE_RADIUS)
+    chords, capped = _align(read_only(position), apexes, step, CAPTURE_RADIUS)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
     # Missed waypoints lie between their neighbours; those after the last one met lie at the end.

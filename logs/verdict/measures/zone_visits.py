@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from logs.verdict.measures.path_moves import BLOCK_MOVES, move_blocks, move_point
 from world.airspace.zone_kernels import ZoneRecords, box_distance, distance_to_edge, nearest_edge, outside_band
 from world.frames import POLYMAP, PolyMapRecord
-from world.kernels import Record, Records, compiled, inlined, inner, record_dtype
+from world.kernels import Record, Records, compiled, inlined, inner, read_only, record_dtype
 from world.terrain import Terrain, ground_height
 
 Heights = NDArray[np.float32]
@@ -182,7 +182,7 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
 
     moves: (m,) of `logs.verdict.measures.path_moves.MOVE`.  terrain: None where none is known.
     """
-    heights, to_pixel, pitch = np.full((2, 2), np.nan, dtype=np.float32), np.zeros(1, POLYMAP)[0], 1.0
+    heights, to_pixel, pitch = read_only(np.full((2, 2), np.nan, dtype=np.float32)), np.zeros(1, POLYMAP)[0], 1.0
     if terrain is not None:
         heights, to_pixel, pitch = terrain.heights, terrain.to_pixel.record, terrain.spacing
     # What compiled code makes has its fields, and not numpy's records that have them as attributes.

@@ -14,6 +14,7 @@ from planner.evaluation.corners import LEG, measure_legs
 from planner.evaluation.problem import SlopeBounds, make_problem, required_clearance
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags, terrain_excess
 from tests.planner.tracking_limits import with_tracking_error
+from world.kernels import read_only
 from world.scenario import Scenario
 from world.terrain import TILE, steepest_slopes
 
@@ -24,7 +25,7 @@ def test_steepest_slopes_bound_the_ground_of_each_tile() -> None:
     rng = np.random.default_rng(2)
     heights = (rng.random((45, 70)) * rng.choice([1.0, 30.0], (45, 70))).astype(np.float32)
     heights[3, 5] = np.nan
-    slopes = steepest_slopes(heights, 30.0)
+    slopes = steepest_slopes(read_only(heights), 30.0)
     assert slopes.shape == (3, 5)
     rows, cols = np.mgrid[0:44, 0:69]
     corner = heights[:-1, :-1].astype(float)
@@ -49,11 +50,12 @@ def test_steps_over_the_ground_leave_nothing_out(scenario: Scenario, limits: Lim
         slope = 0.8 if col < data.heights.shape[1] / 2 else 0.3
         cone = rng.uniform(100.0, 300.0) - slope * pitch * np.hypot(rows - row, cols - col)
         rough = np.maximum(rough, cone.astype(np.float32))
-    slopes = steepest_slopes(rough, pitch)
+    slopes = steepest_slopes(read_only(rough), pitch)
     padded = np.pad(slopes, 1)
     around = np.max([padded[i : i + len(slopes), j : j + slopes.shape[1]] for i in range(3) for j in range(3)], axis=0)
     data = data._replace(
-        heights=rough, slope_bounds=SlopeBounds(float(slopes.max()), around, data.slope_bounds.tile_side)
+        heights=read_only(rough),
+        slope_bounds=SlopeBounds(float(slopes.max()), read_only(around), data.slope_bounds.tile_side),
     )
     required = required_clearance(data)
     terrain = scenario.terrain
@@ -81,15 +83,15 @@ def test_steps_over_the_ground_leave_nothing_out(scenario: Scenario, limits: Lim
         rise = rng.normal(0.0, 100.0)
         # Just clear of the ground, or just below what is wanted.
         wanted = float((ground - rise * share).max()) + required.clearance + required.buffer
-        step = slopes.max() * required.sample_pitch + abs(rise) / run * required.sample_pitch
+        step = float(slopes.max()) * required.sample_pitch + abs(rise) / run * required.sample_pitch
         for off in (0.5, -step):
             height = wanted + off
             line = a[0], a[1], height, b[0], b[1], height + rise
-            depth = terrain_excess(rough, data.slope_bounds, required, 0.0, tuple(ends), *line)
+            depth = terrain_excess(data.heights, data.slope_bounds, required, 0.0, tuple(ends), *line)
             assert (depth > 0.0) == (off < 0.0)
             # With more wanted by what it is clear, or less by what it is deep and a step between samples.
             more = terrain_excess(
-                rough, data.slope_bounds, required, step if off > 0.0 else -step - 0.5, tuple(ends), *line
+                data.heights, data.slope_bounds, required, step if off > 0.0 else -step - 0.5, tuple(ends), *line
             )
             assert (more > 0.0) == (off > 0.0)
             both[int(depth > 0.0)] += 1

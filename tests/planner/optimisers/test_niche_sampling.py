@@ -85,6 +85,6 @@ def test_a_row_that_costs_too_much_is_kept_only_to_have_a_few() -> None:
 def test_at_most_half_of_the_rows_are_kept() -> None:
     rows = sampling().first(50)
     costs = np.tile(np.arange(50.0), (2, 1))
-    out = sampling(2).next(rows, costs, 20, np.array([1e-3, 1e-3]), np.inf, rows[:, 49])
+    out = sampling(2).next(rows, costs, 20, np.array([1e-3, 1e-3]), np.inf, rows[:, 49].copy())
     same = [(out[0, :, None] == rows[0]).all(axis=2).any(axis=1)]
     assert np.sum(same) == 10

@@ -30,6 +30,7 @@ from planner.seeding.grids import (
     set_cell_costs,
     trace_back,
 )
+from world.kernels import read_only
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -183,7 +184,8 @@ def test_a_step_climbs_and_sinks_no_more_than_the_limits_allow(
 ) -> None:
     # 200 m at 20 degrees less half a degree of margin are 70.8 m; there is no place aside for a longer step.
     def between(first: float, last: float) -> Records:
-        ends = {"start": np.array([0.0, 0.0, first]), "destination": np.array([6000.0, 0.0, last])}
+        places = np.array([[0.0, 0.0, first], [6000.0, 0.0, last]])
+        ends = {"start": read_only(places[0]), "destination": read_only(places[1])}
         grid = Grid(30, np.zeros(1), np.array([150.0, top]))
         frame = rotated_frame(ends["start"], ends["destination"])
         return cheapest_route(level_data._replace(**ends), frame, grid, np.zeros((31, 1)), math.inf)[0]

@@ -24,7 +24,7 @@ from flight.mission.return_path import ReturnCircle, ReturnPlace, choose_target
 from planfly.airframe import Airframe, load_airframe
 from tests.flight.autopilots.arduplane.kept_flights import HOME, KEPT, WIND, flown_return, jacksboro, kept_track, rally
 from tests.soak import SOAK
-from world.kernels import Records
+from world.kernels import Records, read_only
 from world.wind import Wind
 
 # Law less flight of ArduPlane, where the least clearance before the circle is compared, m (issue 35).
@@ -134,7 +134,8 @@ def flat(height: float = 0.0, spheres: tuple[tuple[float, ...], ...] = ()) -> Su
     real = around()
     level = np.full_like(real.heights, height)
     made = np.array(spheres).reshape(-1, 4)
-    return Surroundings(level, real.to_pixel, made[:, :3], made[:, 3], True)
+    spheres, radii = np.ascontiguousarray(made[:, :3]), np.ascontiguousarray(made[:, 3])
+    return Surroundings(read_only(level), real.to_pixel, read_only(spheres), read_only(radii), True)
 
 
 def returned(begin: Records, circle: ReturnCircle, world: Surroundings, **values: float) -> Records:
@@ -177,7 +178,9 @@ def test_what_cannot_end_is_told() -> None:
     assert high["ended"] == NEVER
     off = returned(begin, ReturnCircle(0.0, 90_000.0, 900.0, 120.0), flat(100.0))
     assert off["ended"] == OFF_GROUND
-    nowhere = Surroundings(around().heights, around().to_pixel, np.zeros((0, 3)), np.zeros(0), False)
+    nowhere = Surroundings(
+        around().heights, around().to_pixel, read_only(np.zeros((0, 3))), read_only(np.zeros(0)), False
+    )
     told = returned(begin, ReturnCircle(0.0, 2000.0, 900.0, 120.0), nowhere)
     assert told["ended"] == CIRCLED
     assert math.isnan(told["clearance"])

@@ -24,7 +24,9 @@ class Tick:
 
     def __init__(self, setup: FlightSetup, gains: Gains) -> None:
         self.path = fly_by_path(setup.route, setup.limits)
-        self.waypoints = waypoint_records(setup.route)
+        # Laid out as the compiled tick has them, so that its compiled form serves here, too.
+        way = self.path.pieces, self.path.nodes, waypoint_records(setup.route)
+        self.way = [np.repeat(records, 2)[::2] for records in way]
         self.gains = gains.record()
         self.memory: Record = np.zeros(1, GUIDANCE_MEMORY)[0]
         self.memory.last_airspeed, self.memory.max_bank = -1.0, math.radians(33.0)
@@ -44,9 +46,7 @@ class Tick:
         guide(
             values,
             estimated,
-            self.path.pieces,
-            self.path.nodes,
-            self.waypoints,
+            *self.way,
             self.gains,
             self.memory,
             commands,

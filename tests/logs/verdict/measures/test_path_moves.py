@@ -13,7 +13,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from tests.logs.verdict.measures.test_zone_visits import move
 from tests.synthetic import bank_radius, fly_path, make_setup
-from world.kernels import Records
+from world.kernels import Records, read_only
 from world.terrain import Terrain, gridded
 
 # North for 2 km and up, a right angle, east and level.
@@ -148,7 +148,7 @@ def test_a_block_holds_its_moves() -> None:
         for _ in range(2 * BLOCK_MOVES + 5)
     ]
     moves: Records = np.array(rows, MOVE)
-    blocks = move_blocks(moves, np.zeros((2, 2), np.float32), ridge().to_pixel.record, 100.0, False)
+    blocks = move_blocks(moves, read_only(np.zeros((2, 2), np.float32)), ridge().to_pixel.record, 100.0, False)
     assert len(blocks) == 3
     for k, one in enumerate(moves):
         block = blocks[k // BLOCK_MOVES]
@@ -164,13 +164,16 @@ def test_a_block_holds_its_moves() -> None:
 def test_a_block_is_full_before_the_next_begins(count: int, blocks: int) -> None:
     moves: Records = np.array([move(0.0, 0.0, 0.0, length=10.0)] * count, MOVE)
     assert BLOCK_MOVES == 64
-    assert len(move_blocks(moves, np.zeros((2, 2), np.float32), ridge().to_pixel.record, 100.0, False)) == blocks
+    assert (
+        len(move_blocks(moves, read_only(np.zeros((2, 2), np.float32)), ridge().to_pixel.record, 100.0, False))
+        == blocks
+    )
 
 
 def test_a_move_alone_has_the_box_about_its_middle() -> None:
     """A way of 40 m and a rise of 30 m that bends by 8 m, by plain sums."""
     moves: Records = np.array([move(100.0, 50.0, 300.0, length=40.0, climb=30.0, bend=8.0)], MOVE)
-    block = move_blocks(moves, np.zeros((2, 2), np.float32), ridge().to_pixel.record, 100.0, False)[0]
+    block = move_blocks(moves, read_only(np.zeros((2, 2), np.float32)), ridge().to_pixel.record, 100.0, False)[0]
     assert (block["west"], block["east"]) == pytest.approx((100.0, 140.0))
     assert (block["south"], block["north"]) == pytest.approx((30.0, 70.0))
     middle, lift = 300.0 + 15.0 + 2.0, 15.0 + 10.0
