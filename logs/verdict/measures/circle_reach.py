@@ -16,13 +16,15 @@ from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.tolerances import CLEARANCE_TOLERANCE, HEIGHT_TOLERANCE, ROUNDING, SWING
+from world.airspace.zones import Cylinder, Zone
+from world.airspace.zones_on_map import CIRCLE_CORNERS, zone_rings
 from world.kernels import Records
 from world.threats import threat_label
 
 Floats = NDArray[np.float64]
 
-# Rings that a disc is looked at along: one in a step of the ground's raster, so many at most, and of so many corners.
-_FEWEST, _MOST, _CORNERS = 24, 120, 96
+# Rings that a disc is looked at along: one in a step of the ground's raster, so many at the least and at the most.
+_FEWEST, _MOST = 24, 120
 # Heights between which a spiral climbs are looked at in steps of this, m, at most so many of them.
 _STEP, _LEVELS = 20.0, 12
 
@@ -116,10 +118,8 @@ def _rings(middle: Floats, reach: float, spacing: float) -> Floats:
     """Points (n, 2) m along rings about a middle out to its reach, a raster's spacing apart."""
     count = min(_MOST, max(_FEWEST, math.ceil(reach / spacing) if spacing > 0.0 else _FEWEST))
     # A polygon outside its circle leaves nothing between the last ring and the reach.
-    radii = np.linspace(0.0, reach / math.cos(math.pi / _CORNERS), count + 1)
-    angles = np.linspace(0.0, 2.0 * math.pi, _CORNERS + 1)
-    east, north = np.outer(radii, np.sin(angles)).ravel(), np.outer(radii, np.cos(angles)).ravel()
-    return np.column_stack([middle[0] + east, middle[1] + north])
+    last = Cylinder(float(middle[0]), float(middle[1]), reach / math.cos(math.pi / CIRCLE_CORNERS))
+    return np.linspace(middle, zone_rings(Zone("", "exclusion", last))[0], count + 1).reshape(-1, 2)
 
 
 def _at(places: Floats, up: float) -> Floats:

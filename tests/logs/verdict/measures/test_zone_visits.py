@@ -103,6 +103,15 @@ def test_a_blend_between_its_ends_heights() -> None:
         assert found.beyond == pytest.approx(2.0 if depth > 0.0 else 0.0, abs=1e-3)
 
 
+def test_a_climb_that_begins_level_goes_through_a_band() -> None:
+    # The height is 300 m by the square of the time's share: both ends are outside 100 m to 160 m, 30 m deep between.
+    zone = box(floor=ZoneLevel(100.0, "amsl"), ceiling=ZoneLevel(160.0, "amsl"))
+    found = visit([move(50.0, 100.0, 0.0, bend=300.0, lasts=30.0)], zone)
+    assert found.depth == pytest.approx(30.0, abs=0.011)
+    times = [30.0 * math.sqrt(up / 300.0) for up in (100.0, 160.0)]
+    assert (found.entry_time, found.exit_time) == pytest.approx(times, abs=1e-4)
+
+
 @pytest.mark.parametrize("kind", ["exclusion", "inclusion"])
 def test_a_climb_through_a_band(kind: str) -> None:
     # 300 m up in 30 s, on the spot: 50 m from the nearest edge; the band is 100 m to 160 m.
