@@ -37,4 +37,5 @@ def test_the_blocks_of_a_page_run(
         elif left:
             compile(block.text, page.name, "exec")
         else:
-            bench.run(block, names)
+            # Outside the soak a reader's own lines fly a scenario that is a seventh as long.
+            bench.run(block if SOAK else block._replace(text=block.text.replace('"jacksboro"', '"tight"')), names)

@@ -24,6 +24,7 @@ from flight.guidance.path import (
 from flight.simulation.setup import FlightSetup
 from tests.sampled_paths import sample_path
 from tests.setups import MakeSetup
+from tests.soak import scaled
 from world.geometry import leg_runs, turning_angles
 from world.kernels import Record, field_names
 
@@ -96,7 +97,7 @@ def test_a_right_angle_by_hand(make_setup: MakeSetup) -> None:
     assert away.min() == pytest.approx(RADIUS * (math.sqrt(2) - 1), abs=0.01)
 
 
-@settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=scaled(40, 20), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_any_route_with_long_legs_is_whole_smooth_and_at_the_bank_limit(make_setup: MakeSetup, data: Any) -> None:
     turns = data.draw(st.lists(st.floats(-100.0, 100.0), min_size=1, max_size=5))
@@ -126,7 +127,7 @@ def test_any_route_with_long_legs_is_whole_smooth_and_at_the_bank_limit(make_set
     assert profile(path.nodes, path.length)[0] == pytest.approx(points[-1][2], abs=1e-6)
 
 
-@settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=scaled(40, 20), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(
         st.tuples(st.floats(-400.0, 400.0), st.floats(-400.0, 400.0), st.floats(450.0, 550.0)), min_size=3, max_size=7

@@ -266,8 +266,8 @@ def resident() -> int:
 
 
 def test_any_datagram_is_survived_through_a_socket(fake: FakeVehicle) -> None:
-    """4,000 datagrams from two addresses, a million in the soak: none is lost on the way, and memory stays."""
-    count, batch = scaled(1_000_000, 4_000), 100
+    """2,000 datagrams from two addresses, a million in the soak: none is lost on the way, and memory stays."""
+    count, batch = scaled(1_000_000, 2_000), 100
     senders = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2)]
     try:
         for host, sender in zip(("127.0.0.1", "127.0.0.2"), senders, strict=True):
@@ -299,8 +299,8 @@ def test_any_datagram_is_survived_through_a_socket(fake: FakeVehicle) -> None:
 
 
 def test_any_datagram_is_survived(fake: FakeVehicle) -> None:
-    """30,000 datagrams, a million in the soak: alive, no more memory, and a real upload works afterwards."""
-    count, batch = scaled(1_000_000, 30_000), 1000
+    """10,000 datagrams, a million in the soak: alive, no more memory, and a real upload works afterwards."""
+    count, batch = scaled(1_000_000, 10_000), 1000
     before = judged = 0
     for k in range(count // batch):
         for port in (5, 6):

@@ -23,6 +23,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.views.replay.timeline import timeline
 from tests.mission_lines import ORIGIN, ground, refusal, route, setup_of, wp
 from tests.sampled_paths import sample_path
+from tests.soak import scaled
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
 from world.scenario_tables import MAP_EXTENT
@@ -39,7 +40,7 @@ def circled(flown: Route, item: int) -> tuple[float, float]:
     return float(turns[at].sum()) / TURN, float(flown.arcs[at][0])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=scaled(60, 25), deadline=None)
 @given(
     st.floats(-4000, 4000), st.floats(-4000, 4000), st.floats(-math.pi, math.pi), st.floats(400, 5000),
     st.floats(15, 350), st.booleans(), st.sampled_from([0.0, 0.5, 1.0, 2.0, 3.7]),

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, is_located, on_grid
 from flight.mission_files.formats import mission_text, parse_mission, read_mission
 from flight.mission_files.wpl import fence_text, rally_text
+from tests.soak import scaled
 
 SAMPLES = Path(__file__).parents[1] / "missions"
 
@@ -109,7 +110,7 @@ def missions(draw: st.DrawFn) -> Mission:
     return Mission(home, tuple(items))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=scaled(150, 50), deadline=None)
 @given(mission=missions())
 def test_write_then_read_is_the_same_mission(mission: Mission) -> None:
     assert parse_mission(mission_text(mission, "waypoints"), "a.waypoints") == mission

@@ -12,6 +12,7 @@ from flight.autopilots.arduplane.swift_return import CIRCLED, HIT, SwiftReturns,
 from flight.mission.return_path import LandingStart, ReturnCircle
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND
 from tests.flight.autopilots.arduplane.test_swift_return import aerosonde, around, flat, parameters, start
+from tests.soak import some
 from world.wind import Wind
 
 
@@ -53,7 +54,7 @@ def glided(flight: str) -> SwiftReturns:
     return fly_returns(begin, [None], parameters(), aerosonde(WIND), world, landings=[on], keep=True, engine_out=True)
 
 
-@pytest.mark.parametrize("flight", GLIDES)
+@pytest.mark.parametrize("flight", some(GLIDES, 2))
 def test_it_is_as_high_as_arduplane_was(flight: str) -> None:
     (way,) = glided(flight).ways
     seconds, compared = np.arange(len(way)), 0

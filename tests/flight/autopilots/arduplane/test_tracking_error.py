@@ -8,6 +8,7 @@ from aircraft.catalog import load_aircraft
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
 from flight.autopilots.arduplane.tracking_error import MIN_ACCEPTANCE, WIND_SPREAD, tracking_error
+from tests.soak import some
 from world.wind import Turbulence
 
 # s by which a bank follows its demand, as ArduPlane's flights show it; and by which it turns late on the mean: it looks
@@ -53,7 +54,7 @@ def still_air(error: TrackingError, turn_deg: float, share: int) -> tuple[float,
     return float(error.acceptance[i, share]), float(error.excursion[i, share]) / spread
 
 
-@pytest.mark.parametrize("turn_deg", [15.0, 30.0, 60.0, 90.0])
+@pytest.mark.parametrize("turn_deg", some([15.0, 30.0, 60.0, 90.0], 3))
 @pytest.mark.parametrize("share", [0, 1, 2])
 def test_a_corner_is_turned_at_where_it_strays_least(error: TrackingError, turn_deg: float, share: int) -> None:
     acceptance, excursion = still_air(error, turn_deg, share)
