@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from flight.autopilots.sitl import flight as sitl_flight
+
 _AUTOPILOTS = Path(__file__).parent / "flight" / "autopilots"
 _FAKE = _AUTOPILOTS / "arduplane_sitl" / "fake_autopilot.py"
 _FAKE_PX4 = _AUTOPILOTS / "px4_sitl" / "fake_px4.py"
@@ -29,6 +31,12 @@ def _write_program(program: Path, fake: Path, fault: str) -> Path:
     program.write_text(f'#!/bin/sh\nexec {shlex.join([sys.executable, str(fake), fault])} "$@"\n', encoding="utf-8")
     program.chmod(0o755)
     return program
+
+
+def shorten_run_in(patch: pytest.MonkeyPatch) -> None:
+    """For the fakes, which fly steadily at once, where a real autopilot needs the run-in to settle."""
+    patch.setattr(sitl_flight, "RUN_IN", 100.0)
+    patch.setattr(sitl_flight, "RUN_IN_SECONDS", 4.0)
 
 
 def find_arduplane() -> Path | None:

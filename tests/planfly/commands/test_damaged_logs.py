@@ -60,7 +60,7 @@ def test_damaged_copies_are_refused_or_told(tmp_path: Path, capsys: Output, name
     # A track holds no mission; a route and a task may be what was damaged.
     plan = ["--plan", str(example_plan(tmp_path))] if name == "a.kml" else []
     codes: list[int] = []
-    for seed in range(scaled(1000, 8)):
+    for seed in range(scaled(1000, 5)):
         log.write_bytes(damaged(data, seed, suffix))
         code = main(["import", str(log), str(target), "--overwrite", *plan])
         out, err = capsys.readouterr()

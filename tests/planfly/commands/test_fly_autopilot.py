@@ -12,8 +12,8 @@ import pytest
 
 from logs.recording.reader import read_log
 from planfly.cli import main
-from tests.autopilots import need_arduplane, write_fake, write_fake_px4
-from tests.soak import some
+from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
+from tests.soak import SOAK, some
 
 ROOT = Path(__file__).parents[3]
 MISSION = """QGC WPL 110
@@ -31,6 +31,13 @@ def mission(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.fixture
+def short_run_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    if not SOAK:
+        shorten_run_in(monkeypatch)
+
+
+@pytest.mark.usefixtures("short_run_in")
 def test_a_flight_is_logged_judged_and_judged_again(
     mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -54,6 +61,7 @@ def test_a_flight_is_logged_judged_and_judged_again(
     assert recorded.recorded_verdict["flown_by"]["changed"] == {"NAVL1_PERIOD": 17.0, "ROLL_LIMIT_DEG": 35.0}
 
 
+@pytest.mark.usefixtures("short_run_in")
 def test_a_program_with_px4s_start_up_files_is_flown_as_px4(
     mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

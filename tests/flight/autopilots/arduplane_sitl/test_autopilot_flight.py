@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
-from flight.autopilots.sitl import flight as sitl_flight
 from flight.simulation.setup import FlightSetup
+from tests.autopilots import shorten_run_in
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
 from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
@@ -46,10 +46,8 @@ def own_folder_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 @pytest.fixture
 def short_run_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The fake flies steadily at once, where ArduPlane needs the run-in to settle."""
     if not SOAK:
-        monkeypatch.setattr(sitl_flight, "RUN_IN", 100.0)
-        monkeypatch.setattr(sitl_flight, "RUN_IN_SECONDS", 4.0)
+        shorten_run_in(monkeypatch)
 
 
 def left_behind() -> list[Path]:

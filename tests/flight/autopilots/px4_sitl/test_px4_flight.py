@@ -15,10 +15,10 @@ from flight.autopilots.px4.parameters import load_parameters
 from flight.autopilots.px4_sitl import flight as px4_flight
 from flight.autopilots.px4_sitl import physics
 from flight.autopilots.px4_sitl.flight import Px4Flight
-from flight.autopilots.sitl import flight as sitl_flight
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import SimulatedFlight, fly_to_end
+from tests.autopilots import shorten_run_in
 from tests.flight.autopilots.px4_sitl.conftest import MakeFake
 from tests.flight.autopilots.px4_sitl.fake_px4 import CIRCLE
 from tests.setups import setup_maker, waypoint_mission
@@ -44,9 +44,7 @@ def own_folder_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 @pytest.fixture
 def short_run_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The fake flies steadily at once, where PX4 needs the run-in to settle."""
-    monkeypatch.setattr(sitl_flight, "RUN_IN", 100.0)
-    monkeypatch.setattr(sitl_flight, "RUN_IN_SECONDS", 4.0)
+    shorten_run_in(monkeypatch)
 
 
 @pytest.fixture
