@@ -216,7 +216,7 @@ def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floa
 
     position: (t, 3).  Returns (t - 1,) twice; NaN where the segment leaves the terrain's data or is not a number.
     """
-    return _clearances(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(position))
+    return _clearances(terrain.heights, terrain.to_pixel.record, read_only(np.ascontiguousarray(position)))
 
 
 def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
@@ -226,7 +226,8 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     """
     if not radius > 0.0 or _far(position, centre, radius):
         return []
-    closest, enter, leave = _windows(np.ascontiguousarray(position), np.ascontiguousarray(centre), float(radius))
+    track, middle = read_only(np.ascontiguousarray(position)), read_only(np.ascontiguousarray(centre))
+    closest, enter, leave = _windows(track, middle, float(radius))
     rows = np.flatnonzero(leave > enter)
     if not rows.size:
         return []
