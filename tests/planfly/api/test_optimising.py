@@ -15,10 +15,10 @@ from planner.search.plan_path import plan_path
 from planner.search.search_state import KILL, LENGTH, Search
 from world.scenario import load_scenario, with_planner
 
-EDAS: tuple[Model, ...] = ("umda", "emna")
+EDAS: tuple[Model, ...] = ("umda", "emna", "multistart")
 
 
-@pytest.mark.parametrize("model", [*EDAS, "differential"])
+@pytest.mark.parametrize("model", ["umda", "emna", "differential"])
 def test_the_bottom_of_a_bowl_is_found(model: Model) -> None:
     bottom = np.linspace(-1.0, 2.0, 5)
     search = planfly.optimise(np.full(5, -3.0), np.full(5, 5.0), model=model, seed=3)
@@ -29,11 +29,42 @@ def test_the_bottom_of_a_bowl_is_found(model: Model) -> None:
     assert search.evaluations == 100 + 119 * 50
 
 
+def test_a_narrow_bottom_beside_others_is_found_by_many_starts() -> None:
+    """Rastrigin's function in four variables, moved: a bottom of 0 among some 10,000."""
+    bottom = np.array([1.3, -2.1, 0.4, 3.2])
+
+    def hills(points: np.ndarray) -> np.ndarray:
+        off = points - bottom
+        return np.asarray((off**2 + 10.0 * (1.0 - np.cos(2.0 * np.pi * off))).sum(axis=1))
+
+    search = planfly.optimise([-5.0] * 4, [5.0] * 4, model="multistart", seed=3)
+    best = search.minimise(hills, evaluations=20_000)
+    np.testing.assert_allclose(best.x, bottom, atol=0.05)
+    assert 20_000 <= search.evaluations < 20_100
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_a_gap_in_a_wall_is_found_by_many_starts(seed: int) -> None:
+    """Two waypoints on each side of a wall: through its gap, or around its end, which is twice as long."""
+    gap = 0.2
+
+    def length(across: np.ndarray) -> np.ndarray:
+        rows = np.pad(across, ((0, 0), (1, 1)))
+        wall = 0.5 * (rows[:, 2] + rows[:, 3])
+        shut = (np.abs(wall) < 1.0) & (np.abs(wall - gap) > 0.01)
+        return np.where(shut, np.inf, np.hypot(0.2, np.diff(rows, axis=1)).sum(axis=1))
+
+    search = planfly.optimise([-2.0] * 4, [2.0] * 4, model="multistart", seed=seed)
+    # The least through the gap: straight up to its lower edge between the two waypoints beside the wall, and back.
+    least = 0.2 + 2.0 * np.hypot(0.4, gap - 0.01)
+    assert search.minimise(length, evaluations=10_000).value == pytest.approx(least, abs=0.005)
+
+
 @pytest.mark.parametrize("model", EDAS)
 def test_a_bottom_that_a_constraint_forbids_gives_way_to_its_edge(model: Model) -> None:
     # x^2 + y^2 with x at least 1: the bottom of what is left is (1, 0), worth 1.
     search = planfly.optimise([-4, -4], [4, 4], model=model, seed=3)
-    for _ in range(60):
+    while search.evaluations < 3000:
         x, y = search.ask().T
         search.tell(x**2 + y**2, violations=1.0 - x)
     assert search.best.feasible
@@ -142,7 +173,7 @@ def test_a_box_that_is_none_is_refused(arguments: tuple[list[float], list[float]
 
 @pytest.mark.parametrize(("options", "words"), [
     ({"population": 2}, "even number from 4"), ({"population": 5}, "even number from 4"),
-    ({"model": "ga"}, "allowed umda, emna, differential"),
+    ({"model": "ga"}, "allowed umda, emna, multistart, differential"),
     ({"initial": [[0.5]]}, r"\(100, 1\) are expected"), ({"initial": [[np.nan]] * 100}, "finite"),
 ])  # fmt: skip
 def test_options_that_are_none_are_refused(options: dict[str, Any], words: str) -> None:

@@ -6,12 +6,13 @@ import pytest
 from planner.optimisers.differential_evolution import DifferentialEvolution
 from planner.optimisers.emna import Emna
 from planner.optimisers.markov_chain import MarkovChain, draw_chain, fit_chain
+from planner.optimisers.multistart import Multistart, reflected
 from planner.optimisers.preference import Level, ranks
 from planner.optimisers.umda import Umda
 
 BY_VALUE = (Level((0,), (-np.inf,)),)
 LOWER, UPPER = np.array([-1.0, 10.0]), np.array([1.0, 40.0])
-Optimiser = type[Umda] | type[DifferentialEvolution]
+Optimiser = type[Umda] | type[DifferentialEvolution] | type[Multistart]
 # UMDA knows no two variables together: a turned valley is not for it.
 OPTIMISERS = (DifferentialEvolution, Emna, MarkovChain)
 
@@ -21,7 +22,7 @@ def rank(scores: np.ndarray) -> np.ndarray:
     return ranks(scores, BY_VALUE)
 
 
-def least_after(search: Umda | DifferentialEvolution, target: np.ndarray, generations: int) -> float:
+def least_after(search: Umda | DifferentialEvolution | Multistart, target: np.ndarray, generations: int) -> float:
     """Least value of a narrow, turned valley after some generations; every sample is in the box."""
     for _ in range(generations):
         asked = search.ask()
@@ -42,7 +43,7 @@ def test_finds_the_bottom_of_a_turned_valley(kind: Optimiser) -> None:
     assert least_after(search, np.linspace(-1.0, 2.0, 6), 150) < 0.05
 
 
-@pytest.mark.parametrize("kind", [Umda, *OPTIMISERS])
+@pytest.mark.parametrize("kind", [Umda, Multistart, *OPTIMISERS])
 def test_same_seed_same_samples(kind: Optimiser) -> None:
     """The samples after five generations, bit by bit."""
     ends = []
@@ -101,3 +102,22 @@ def test_a_chain_keeps_the_covariance_of_neighbours_but_not_of_others() -> None:
     for g in range(3):
         block = slice(3 * g, 3 * g + 6)
         np.testing.assert_allclose(got[block, block], wanted[block, block], atol=0.05)
+
+
+def test_points_beyond_the_box_are_reflected_at_its_sides() -> None:
+    np.testing.assert_allclose(reflected(np.array([0.3, -0.3, 1.2, 2.4, -1.7])), [0.3, 0.3, 0.8, 0.4, 0.3], atol=1e-12)
+
+
+def test_many_starts_leave_what_is_worth_nothing_and_share_their_evaluations() -> None:
+    """Half of the evaluations go to the best search, and starts that see no difference end within 100 evaluations."""
+
+    def far_corner(points: np.ndarray) -> np.ndarray:
+        return np.where((points > 0.4).all(axis=1), (points**2).sum(axis=1), np.inf)[:, None]
+
+    search = Multistart(np.zeros(6), np.ones(6), rank, 40, np.random.default_rng(5))
+    asked = 0
+    while asked < 20_000:
+        samples = search.ask()
+        search.tell(far_corner(samples))
+        asked += len(samples)
+    assert search.scores.min() == pytest.approx(6 * 0.4**2, abs=0.05)

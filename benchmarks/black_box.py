@@ -1,0 +1,261 @@
+"""`planfly.optimise` on black boxes of others, beside the defaults of pymoo and cmaes.
+
+``python -m benchmarks.black_box functions [--seeds N]``: functions of the CEC 2005 kind (Suganthan et al., Nanyang
+Technological University 2005) in 20 variables, each moved and turned by a seed of its own, 100,000 evaluations; the
+median error of each method.
+
+``python -m benchmarks.black_box paths TERRAIN [--seeds N]``: the cost of Phung and Ha, "Safety-enhanced UAV path
+planning with spherical vector-based particle swarm optimization", Applied Soft Computing 107, 2021, on the scenario
+that their program SPSO comes with.  TERRAIN is its elevation file, ChrismasTerrain.tif, which is public with that
+program.  Ten waypoints are written in three ways: distances and bearings, as the paper has it, at a height of 150 m (20
+variables); the same with climb angles (30); and offsets from the straight line, with heights (20).
+"""
+
+import argparse
+import math
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+import planfly
+from planfly.api.optimising import Model
+from world.kernels import compiled
+
+Floats = NDArray[np.float64]
+Cost = Callable[[Floats], Floats]
+
+VARIABLES, EVALUATIONS = 20, 100_000
+MODELS: tuple[Model, ...] = ("multistart", "umda", "emna", "differential")
+# Seeds on which nothing was tuned begin here.
+FIRST_SEED = 100
+
+# The paper's scenario, in cells of its terrain, counted from 1: start and end (east, north, m above ground), cylinders
+# (east, north, radius), and the heights between which it flies.
+START, END = (200.0, 100.0, 150.0), (800.0, 800.0, 150.0)
+CYLINDERS = np.array([
+    [400.0, 500.0, 80.0], [600.0, 200.0, 70.0], [500.0, 350.0, 80.0],
+    [350.0, 200.0, 70.0], [700.0, 550.0, 70.0], [650.0, 750.0, 80.0],
+])  # fmt: skip
+LOW, HIGH = 100.0, 200.0
+NODES = 10
+# The vehicle's size and the margin beside a cylinder, in cells; the weights of length and height; and the turn and the
+# change of climb from which on they cost, degrees.
+SIZE, MARGIN, PER_LENGTH, PER_HEIGHT, STEEP = 1.0, 10.0, 5.0, 10.0, 45.0
+
+
+@compiled
+def path_cost(nodes: Floats, ground: Floats, cylinders: Floats) -> float:  # pragma: no cover - compiled
+    """Cost of a path (w, 3), in cells and m above ground: length, cylinders, heights, turns; infinite through one."""
+    count = nodes.shape[0]
+    up = np.empty(count)
+    for i in range(count):
+        up[i] = nodes[i, 2] + ground[int(nodes[i, 1] + 0.5) - 1, int(nodes[i, 0] + 0.5) - 1]
+    length, danger, heights, turns = 0.0, 0.0, 0.0, 0.0
+    for i in range(count - 1):
+        east, north = nodes[i + 1, 0] - nodes[i, 0], nodes[i + 1, 1] - nodes[i, 1]
+        length += math.sqrt(east * east + north * north + (up[i + 1] - up[i]) ** 2)
+        for k in range(cylinders.shape[0]):
+            to_east, to_north = cylinders[k, 0] - nodes[i, 0], cylinders[k, 1] - nodes[i, 1]
+            squared = east * east + north * north
+            share = min(1.0, max(0.0, (to_east * east + to_north * north) / squared)) if squared > 0.0 else 0.0
+            away = math.hypot(to_east - share * east, to_north - share * north) - cylinders[k, 2] - SIZE
+            if away < 0.0:
+                return math.inf
+            danger += max(0.0, MARGIN - away)
+    for i in range(1, count - 1):
+        heights += abs(nodes[i, 2] - 0.5 * (LOW + HIGH))
+        a_east, a_north = nodes[i, 0] - nodes[i - 1, 0], nodes[i, 1] - nodes[i - 1, 1]
+        b_east, b_north = nodes[i + 1, 0] - nodes[i, 0], nodes[i + 1, 1] - nodes[i, 1]
+        turn = math.degrees(math.atan2(abs(a_east * b_north - a_north * b_east), a_east * b_east + a_north * b_north))
+        before = math.atan2(up[i] - up[i - 1], math.hypot(a_east, a_north))
+        bend = abs(math.degrees(math.atan2(up[i + 1] - up[i], math.hypot(b_east, b_north)) - before))
+        turns += (turn if turn > STEEP else 0.0) + (bend if bend > STEEP else 0.0)
+    return PER_LENGTH * length + danger + PER_HEIGHT * heights + turns
+
+
+@compiled
+def path_costs(paths: Floats, ground: Floats, cylinders: Floats) -> Floats:  # pragma: no cover - compiled
+    """Costs (n,) of paths (n, w, 3)."""
+    out = np.empty(paths.shape[0])
+    for k in range(out.size):
+        out[k] = path_cost(paths[k], ground, cylinders)
+    return out
+
+
+def by_bearing(rows: Floats, ground: Floats) -> Floats:
+    """Paths (n, 12, 3) from distances, [climb angles,] and bearings (n, 20 or 30), as `SphericalToCart.m` has them."""
+    distance, bearing = rows[:, :NODES], rows[:, -NODES:]
+    climb = rows[:, NODES:-NODES] if rows.shape[1] > 2 * NODES else np.zeros_like(distance)
+    steps = (distance * np.cos(climb) * np.sin(bearing), distance * np.cos(climb) * np.cos(bearing))
+    paths = np.empty((len(rows), NODES + 2, 3))
+    paths[:, 0], paths[:, -1] = START, END
+    limits = (1.0, ground.shape[1]), (1.0, ground.shape[0]), (LOW, HIGH)
+    for k in range(NODES):
+        for axis, step in enumerate((*steps, distance * np.sin(climb))):
+            paths[:, k + 1, axis] = np.clip(paths[:, k, axis] + step[:, k], *limits[axis])
+    return paths
+
+
+def by_offset(rows: Floats, ground: Floats) -> Floats:
+    """Paths (n, 12, 3) from offsets to the left of the straight line, at equal steps along it, and heights (n, 20)."""
+    start, way = np.array(START), np.array(END) - np.array(START)
+    left = np.array([-way[1], way[0]]) / math.hypot(way[0], way[1])
+    paths = np.empty((len(rows), NODES + 2, 3))
+    paths[:, 0], paths[:, -1] = START, END
+    along = start[:2] + np.linspace(0.0, 1.0, NODES + 2)[1:-1, None] * way[:2]
+    paths[:, 1:-1, :2] = np.clip(along + rows[:, :NODES, None] * left, 1.0, (ground.shape[1], ground.shape[0]))
+    paths[:, 1:-1, 2] = rows[:, NODES:]
+    return paths
+
+
+def path_boxes() -> dict[str, tuple[Callable[[Floats, Floats], Floats], Floats, Floats]]:
+    """How a path is written, and the box of its variables, by name."""
+    way = np.array(END[:2]) - np.array(START[:2])
+    ahead, reach = math.atan2(way[1], way[0]), 2.0 * math.hypot(*way) / NODES
+    distance, quarter = (np.zeros(NODES), np.full(NODES, reach)), np.full(NODES, 0.25 * math.pi)
+    low, high = (distance[0], ahead - quarter), (distance[1], ahead + quarter)
+    offset = np.full(NODES, 450.0)
+    return {
+        "distances and bearings (20)": (by_bearing, np.concatenate(low), np.concatenate(high)),
+        "with climb angles (30)": (
+            by_bearing, np.concatenate([low[0], -quarter, low[1]]), np.concatenate([high[0], quarter, high[1]]),
+        ),
+        "offsets and heights (20)": (
+            by_offset, np.concatenate([-offset, np.full(NODES, LOW)]), np.concatenate([offset, np.full(NODES, HIGH)]),
+        ),
+    }  # fmt: skip
+
+
+def measure_paths(terrain: Path, seeds: int) -> None:
+    """Print the median and the worst cost of each model, for each way of writing a path."""
+    with Image.open(terrain) as picture:
+        ground = np.maximum(np.asarray(picture, dtype=np.float64), 0.0)
+    for name, (decode, low, high) in path_boxes().items():
+        print(f"paths by {name}: {EVALUATIONS:,} evaluations, {seeds} seeds; median, worst")
+
+        def cost(rows: Floats, decode: Callable[[Floats, Floats], Floats] = decode) -> Floats:
+            return np.asarray(path_costs(decode(rows, ground), ground, CYLINDERS))
+
+        for model in MODELS:
+            values = [
+                planfly.optimise(low, high, model=model, seed=seed).minimise(cost, evaluations=EVALUATIONS).value
+                for seed in range(FIRST_SEED, FIRST_SEED + seeds)
+            ]
+            print(f"  {model:14s} {np.median(values):9.1f} {max(values):9.1f}", flush=True)
+
+
+def functions(seed: int) -> dict[str, Cost]:
+    """Functions of points (n, d) in [-5, 5], each with a bottom of 0 that is moved and turned by a seed."""
+    rng = np.random.default_rng(seed)
+    bottom = rng.uniform(-4.0, 4.0, VARIABLES)
+    turn = np.linalg.qr(rng.standard_normal((VARIABLES, VARIABLES)))[0]
+    scales = 10.0 ** (6.0 * np.arange(VARIABLES) / (VARIABLES - 1))
+
+    def turned(points: Floats) -> Floats:
+        return np.asarray((points - bottom) @ turn)
+
+    def rosenbrock(points: Floats) -> Floats:
+        z = turned(points) * 0.4 + 1.0
+        return np.asarray((100.0 * (z[:, 1:] - z[:, :-1] ** 2) ** 2 + (z[:, :-1] - 1.0) ** 2).sum(axis=1))
+
+    def rastrigin(points: Floats) -> Floats:
+        z = turned(points)
+        return np.asarray((z**2 + 10.0 * (1.0 - np.cos(2.0 * np.pi * z))).sum(axis=1))
+
+    def ackley(points: Floats) -> Floats:
+        z = turned(points) * 6.0
+        ripples = np.exp(np.cos(2.0 * np.pi * z).mean(axis=1))
+        return np.asarray(20.0 * (1.0 - np.exp(-0.2 * np.sqrt((z**2).mean(axis=1)))) + math.e - ripples)
+
+    def griewank(points: Floats) -> Floats:
+        z = turned(points) * 120.0
+        waves = np.cos(z / np.sqrt(np.arange(1, VARIABLES + 1))).prod(axis=1)
+        return np.asarray((z**2).sum(axis=1) / 4000.0 - waves + 1.0)
+
+    return {
+        "sphere": lambda points: ((points - bottom) ** 2).sum(axis=1),
+        "ellipsoid": lambda points: (scales * turned(points) ** 2).sum(axis=1),
+        "Rosenbrock": rosenbrock,
+        "Rastrigin": rastrigin,
+        "Ackley": ackley,
+        "Griewank": griewank,
+    }
+
+
+def by_model(model: Model, cost: Cost, seed: int) -> float:
+    """Least value by `planfly.optimise`."""
+    search = planfly.optimise([-5.0] * VARIABLES, [5.0] * VARIABLES, model=model, seed=seed)
+    return search.minimise(cost, evaluations=EVALUATIONS).value
+
+
+def by_cmaes(cost: Cost, seed: int) -> float:
+    """Least value by `cmaes.CMA` from the middle, a sixth of the box wide; restarted anywhere when it stops."""
+    from cmaes import CMA
+
+    bounds, rng = np.tile([-5.0, 5.0], (VARIABLES, 1)), np.random.default_rng(seed)
+    search = CMA(mean=np.zeros(VARIABLES), sigma=10.0 / 6.0, bounds=bounds, seed=seed)
+    least, evaluations = math.inf, 0
+    while evaluations < EVALUATIONS:
+        if search.should_stop():
+            mean = rng.uniform(-5.0, 5.0, VARIABLES)
+            search = CMA(mean=mean, sigma=10.0 / 6.0, bounds=bounds, seed=int(rng.integers(2**31)))
+        points = np.array([search.ask() for _ in range(search.population_size)])
+        values = cost(points)
+        search.tell(list(zip(points, values.tolist(), strict=True)))
+        least, evaluations = min(least, float(values.min())), evaluations + len(points)
+    return least
+
+
+def by_pymoo(name: str, cost: Cost, seed: int) -> float:
+    """Least value by an algorithm of pymoo as it comes."""
+    from pymoo.algorithms.soo.nonconvex.de import DE
+    from pymoo.algorithms.soo.nonconvex.ga import GA
+    from pymoo.algorithms.soo.nonconvex.pso import PSO
+    from pymoo.core.problem import Problem
+    from pymoo.optimize import minimize
+
+    class Box(Problem):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__(n_var=VARIABLES, n_obj=1, xl=-5.0, xu=5.0)
+
+        def _evaluate(self, x: Floats, out: dict[str, Floats], *_: object, **__: object) -> None:
+            out["F"] = cost(x)
+
+    found = minimize(Box(), {"DE": DE, "GA": GA, "PSO": PSO}[name](), ("n_eval", EVALUATIONS), seed=seed)
+    return float(found.F[0])
+
+
+def measure_functions(seeds: int) -> None:
+    """Print the median error of every method on every function."""
+    methods: dict[str, Callable[[Cost, int], float]] = {model: partial(by_model, model) for model in MODELS}
+    methods |= {"cmaes": by_cmaes} | {f"pymoo {name}": partial(by_pymoo, name) for name in ("DE", "GA", "PSO")}
+    print(f"functions in {VARIABLES} variables: median error after {EVALUATIONS:,} evaluations, {seeds} seeds")
+    print(f"{'':12s}" + "".join(f"{name:>13s}" for name in methods))
+    for function in functions(FIRST_SEED):
+        row = [
+            np.median([method(functions(seed)[function], seed) for seed in range(FIRST_SEED, FIRST_SEED + seeds)])
+            for method in methods.values()
+        ]
+        print(f"{function:12s}" + "".join(f"{value:13.2g}" for value in row), flush=True)
+
+
+def main() -> None:
+    """Measure what is asked for."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.black_box")
+    parser.add_argument("--seeds", type=int, default=10)
+    parts = parser.add_subparsers(dest="part", required=True)
+    parts.add_parser("functions")
+    parts.add_parser("paths").add_argument("terrain", type=Path)
+    args = parser.parse_args()
+    if args.part == "paths":
+        measure_paths(args.terrain, args.seeds)
+    else:
+        measure_functions(args.seeds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,257 @@
+"""Many searches by one Gaussian each, from starts of many widths and places, of which the promising go on.
+
+A single Gaussian follows one valley.  Where a narrow gap leads to a better one, no widening of it finds the gap, but a
+start that is as wide as the gap does.  Nobody knows how wide that is, so that starts are drawn with widths of all
+orders of magnitude.  Each is searched for a slice of evaluations, and goes on while it is among the better half of
+those that became as narrow, by what they had found by then (after the median rule of Golovin et al., "Google Vizier",
+KDD 2017).  Half of the evaluations go to the best search that waits, so that it converges too.
+
+The Gaussian is learned as by CMA-ES (Hansen and Ostermeier, "Completely derandomized self-adaptation in evolution
+strategies", Evolutionary Computation 9, 2001; Hansen, "The CMA evolution strategy: a tutorial", arXiv:1604.00772), with
+a Cholesky factor in place of its eigenvectors (Krause, Arbones and Igel, NIPS 2016).  Only ranks count.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from planner.optimisers.box_search import BoxSearch, Floats, Ints
+from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
+
+# Standard deviations with which searches start, as shares of the box: drawn uniformly by their logarithm.
+WIDTHS = 0.003, 0.3
+# Standard deviation of the first start.
+FIRST_WIDTH = 0.2
+# Evaluations of a slice, for each variable.
+SLICE = 25
+# Share of searches that start from the box's middle, where a person puts what he expects; the others start anywhere.
+FROM_MIDDLE = 0.5
+# A search that is not the best waits once it has had this share of all evaluations.
+MAX_SHARE = 0.1
+# A start whose first so many evaluations are all worth the same is given up; and a search in which so many later ones
+# are, which narrows by this factor in each such generation.
+BLIND_START, BLIND, NARROWING = 100, 1000, 0.9
+# A search has converged at a standard deviation of this share of the box, or this ratio of widest to narrowest.
+CONVERGED, LONGEST = 1e-10, 1e7
+
+
+class Gaussian:
+    """One Gaussian in the unit box, reflected at its sides, and the best that it has found.
+
+    mean: (d,).  deviation: share of the box.  population: of a generation.
+    scale: (d,) standard deviations beside each other at the start; None for equal ones.
+    """
+
+    def __init__(self, mean: Floats, deviation: float, population: int, scale: Floats | None = None) -> None:
+        size = mean.size
+        self.mean, self.deviation, self.population = mean.copy(), deviation, population
+        weights = np.log(population / 2.0 + 0.5) - np.log(np.arange(1, population // 2 + 1))
+        self.weights = weights / weights.sum()
+        effective = 1.0 / float((self.weights**2).sum())
+        self._effective = effective
+        # Rates as in the tutorial's table 1.
+        self._step_rate = (effective + 2.0) / (size + effective + 5.0)
+        self._damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (size + 1.0)) - 1.0) + self._step_rate
+        self._path_rate = (4.0 + effective / size) / (size + 4.0 + 2.0 * effective / size)
+        self._one_rate = 2.0 / ((size + 1.3) ** 2 + effective)
+        rate = 2.0 * (effective - 2.0 + 1.0 / effective) / ((size + 2.0) ** 2 + effective)
+        self._many_rate = min(1.0 - self._one_rate, rate)
+        self._length = math.sqrt(size) * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size**2))
+        self._matrix = np.diag(np.ones(size) if scale is None else scale**2)
+        self._factor = cholesky(self._matrix, 0.0)
+        self._step_path, self._path = np.zeros(size), np.zeros(size)
+        self._draws: Floats = np.empty((0, size))
+        self._generations = 0
+        self._blind, self._since_better = 0, 0
+        self.evaluations = 0
+        self.done = False
+        # The best point (d,) in the unit box and its scores (c,), once a generation has told points apart.
+        self.best: tuple[Floats, Floats] | None = None
+        # Its width, and the scores of its best, after each slice.
+        self.curve: list[tuple[float, Floats]] = []
+
+    @property
+    def width(self) -> float:
+        """Standard deviation of a variable, as a share of the box: the mean of all, by their squares."""
+        return self.deviation * math.sqrt(float(np.diag(self._matrix).mean()))
+
+    def draw(self, rng: np.random.Generator) -> Floats:
+        """A generation (population, d) in the unit box."""
+        self._draws = rng.standard_normal((self.population, self.mean.size))
+        return reflected(self.mean + self.deviation * times_lower(self._draws, self._factor))
+
+    def learn(self, points: Floats, scores: Floats, rank: Callable[[Floats], Ints], noise: Floats) -> None:
+        """Take the scores (n, c) of the generation last drawn, (n, d).  noise: (n,), what ties are broken by."""
+        self.evaluations += len(points)
+        ranks = rank(scores)
+        if not ranks.any():
+            self._blind += len(points)
+            self.deviation *= 1.0 if self.best is None else NARROWING
+            self.done = self._blind >= (BLIND_START if self.best is None else BLIND)
+            return
+        self._blind = 0
+        order = np.lexsort((noise, ranks))
+        first = order[0]
+        self._since_better += 1
+        if self.best is None or rank(np.stack([self.best[1], scores[first]]))[1] == 0:
+            if self.best is None or not np.array_equal(self.best[1], scores[first]):
+                self._since_better = 0
+            self.best = points[first].copy(), scores[first].copy()
+        self._update(self._draws[order[: self.weights.size]])
+        spread = np.diag(self._factor)
+        patience = 30 + round(60 * self.mean.size / self.population)
+        widest = self.deviation * math.sqrt(float(np.diag(self._matrix).max()))
+        self.done = (
+            widest < CONVERGED or float(spread.max()) > LONGEST * float(spread.min()) or self._since_better > patience
+        )
+
+    def _update(self, draws: Floats) -> None:
+        """Move mean, deviation and covariance towards the better half's standard normal draws (m, d), best first."""
+        self._generations += 1
+        steps = times_lower(draws, self._factor)
+        draw, step = (self.weights[:, None] * draws).sum(axis=0), (self.weights[:, None] * steps).sum(axis=0)
+        self.mean = reflected(self.mean + self.deviation * step)
+        rate = self._step_rate
+        self._step_path = (1.0 - rate) * self._step_path + math.sqrt(rate * (2.0 - rate) * self._effective) * draw
+        length = math.sqrt(float((self._step_path**2).sum()))
+        expected = self._length * math.sqrt(1.0 - (1.0 - rate) ** (2 * self._generations))
+        steady = float(length < (1.4 + 2.0 / (self.mean.size + 1.0)) * expected)
+        rate = self._path_rate
+        push = steady * math.sqrt(rate * (2.0 - rate) * self._effective)
+        self._path = (1.0 - rate) * self._path + push * step
+        size, half = self.mean.size, self.weights.size
+        many = covariance(np.sqrt(self.weights * half)[:, None] * steps, 0, 0, size)
+        one = np.outer(self._path, self._path) + (1.0 - steady) * rate * (2.0 - rate) * self._matrix
+        keep = 1.0 - self._one_rate - self._many_rate
+        self._matrix = keep * self._matrix + self._one_rate * one + self._many_rate * many
+        self._factor = cholesky(self._matrix, 0.0)
+        self.deviation *= math.exp(min(1.0, self._step_rate / self._damping * (length / self._length - 1.0)))
+
+
+class Multistart(BoxSearch):
+    """Searches by one Gaussian each, from starts of many widths; a slice of evaluations at a time.
+
+    >>> def rank(scores):
+    ...     return np.argsort(np.argsort(scores[:, 0]))
+    >>> search = Multistart(np.full(3, -2.0), np.full(3, 6.0), rank, 40, np.random.default_rng(1))
+    >>> for generation in range(200):
+    ...     samples = search.ask()
+    ...     search.tell((samples**2).sum(axis=1)[:, None])
+    >>> bool(search.scores.min() < 1e-6)
+    True
+
+    The arguments are those of `BoxSearch`; population is the most that a generation has, once there have been many
+    starts.  With first samples, these are asked for first, and the middle is that of their better half, with its
+    deviations.
+
+    samples and scores are the best of all and then the last generation's, (n, d) and (n, c), best first; empty before
+    the first `tell`.
+    """
+
+    def __init__(
+        self,
+        lower: Floats,
+        upper: Floats,
+        rank: Callable[[Floats], Ints],
+        population: int,
+        rng: np.random.Generator,
+        *,
+        initial: Floats | None = None,
+    ) -> None:
+        super().__init__(lower, upper, rank, population, rng, initial=initial)
+        self._population = population
+        self._middle, self._scale = np.full(lower.size, 0.5), None
+        self._searches: list[Gaussian] = []
+        # Evaluations at which the slice began; spent on new starts, and on searches that waited.
+        self._sliced, self._continued = 0, False
+        self._spent = {False: 0, True: 0}
+        self._search: Gaussian | None = None
+        if initial is None:
+            self._search = self._start()
+            self._draw(self._search)
+
+    def tell(self, scores: Floats) -> None:
+        """Take the scores (n, c) of the samples last asked for, and draw the next generation."""
+        ranks, noise = self._rank(scores), self._rng.random(len(scores))
+        order = np.lexsort((noise, ranks))
+        self._keep(self._asked[order], scores[order])
+        if self._search is None:
+            half = self._unit(self._asked[order[: self._half]])
+            self._middle, spread = half.mean(axis=0), np.maximum(half.std(axis=0), WIDTHS[0])
+            self._scale = spread / math.sqrt(float((spread**2).mean()))
+            self._search = self._start()
+        else:
+            self._search.learn(self._unit_asked, scores, self._rank, noise)
+            if self._search.done or self._search.evaluations - self._sliced >= SLICE * self.lower.size:
+                self._search = self._next(self._search)
+        self._draw(self._search)
+
+    def _keep(self, points: Floats, scores: Floats) -> None:
+        """Keep a generation, best first, and before it the best of all."""
+        if len(self.scores) and self._rank(np.stack([self.scores[0], scores[0]]))[0] == 0:
+            points, scores = np.concatenate([self.samples[:1], points]), np.concatenate([self.scores[:1], scores])
+        self.samples, self.scores = points, scores
+
+    def _unit(self, points: Floats) -> Floats:
+        return (points - self.lower) / (self.upper - self.lower)
+
+    def _draw(self, search: Gaussian) -> None:
+        self._unit_asked = search.draw(self._rng)
+        self._asked = np.clip(self.lower + self._unit_asked * (self.upper - self.lower), self.lower, self.upper)
+
+    def _next(self, search: Gaussian) -> Gaussian:
+        """The search that the next slice goes to, after a slice of this one."""
+        self._spent[self._continued] += search.evaluations - self._sliced
+        chosen = search if self._goes_on(search) else self._choose()
+        self._sliced = chosen.evaluations
+        return chosen
+
+    def _goes_on(self, search: Gaussian) -> bool:
+        """Whether a search, at the end of a slice, is among the better half of those that became as narrow.
+
+        Those are compared by what they had found when they were as wide.  The best of all waits for its turn, so that
+        half of the evaluations go to others.
+        """
+        if search.best is None:
+            return False
+        search.curve.append((search.width, search.best[1]))
+        others = [other.curve for other in self._searches if other is not search and other.curve]
+        if search.done or not others or search.evaluations > MAX_SHARE * sum(self._spent.values()):
+            return False
+        if self._rank(np.stack([search.best[1], *(curve[-1][1] for curve in others)]))[0] == 0:
+            return False
+        then = [next((scores for width, scores in curve if width <= search.width), None) for curve in others]
+        as_narrow = [scores for scores in then if scores is not None]
+        ranks = self._rank(np.stack([search.best[1], *as_narrow]))
+        return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(as_narrow)
+
+    def _choose(self) -> Gaussian:
+        """The best search that waits, or a new start, whichever has had fewer evaluations."""
+        waiting = [search for search in self._searches if search.curve and not search.done]
+        self._continued = bool(waiting) and self._spent[True] <= self._spent[False]
+        if self._continued:
+            return waiting[int(np.argmin(self._rank(np.stack([search.curve[-1][1] for search in waiting]))))]
+        return self._start()
+
+    def _start(self) -> Gaussian:
+        """A new search: the first from the middle, as wide as most need, later ones of any width."""
+        size = self.lower.size
+        least = min(self._population, 4 + int(3.0 * math.log(size)))
+        if not self._searches:
+            search = Gaussian(self._middle, FIRST_WIDTH, least, self._scale)
+        else:
+            low, high = (math.log(width) for width in WIDTHS)
+            width = math.exp(self._rng.uniform(low, high))
+            mean = self._middle if self._rng.random() < FROM_MIDDLE else self._rng.random(size)
+            # Generations grow with the number of starts.
+            most = max(1.0, min(self._population / least, 1.0 + len(self._searches) / 4.0))
+            search = Gaussian(mean, width, int(least * most ** self._rng.random()), self._scale)
+        self._searches.append(search)
+        return search
+
+
+def reflected(points: Floats) -> Floats:
+    """Points (n, d) or (d,) brought into the unit box by reflection at its sides."""
+    folded = np.mod(points, 2.0)
+    return np.where(folded > 1.0, 2.0 - folded, folded)
