@@ -225,6 +225,12 @@ ABOVE_FLARE = 15.0
 POINT_ERROR = 10.0
 # m.  Least height above ground of a go-around's way: it turns on it, and turns are not laid out.
 GO_AROUND_ROOM = 20.0
+# m.  So near to a place of the landing sequence that is lower itself a go-around may be as low: slopes down to one that
+# is 10 m lower take as much.
+NEAR_LINE_UP = 500.0
+# m.  A climb of a go-around that passes the ground beyond the landing point by less is left open: the point mass met
+# the one of ArduPlane's that was kept within so much of height, and that one did not have to climb.
+GO_AROUND_ERROR = 6.0
 
 # The take-off and the landing that are flown
 

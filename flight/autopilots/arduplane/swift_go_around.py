@@ -3,15 +3,16 @@
 The law is that of `AP_Landing::type_slope_verify_abort_landing` and `restart_landing_sequence` (libraries/AP_Landing)
 and of `Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6.  With its wings
 level it climbs at the pitch of the last take-off with the throttle open, until it is higher over *home* than its height
-for that says.  Where the field lies higher than home that may be at once.  Then it flies from where it is to the first
-place of the landing sequence, turning on the short side, on a straight slope from the height that it has, and by the
-sequence's other places back to the line-up.
+for that says.  Where the field lies higher than home that may be at once.  Then it goes to the landing sequence that is
+nearest there: from where it is to its first place, turning on the short side, on a straight slope from the height that
+it has, and by the sequence's other places back to the line-up.
 
 The point mass and the law of each way are those of `flight.autopilots.arduplane.swift_return`.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,6 @@ from flight.autopilots.arduplane.swift_return import (
     RETURN_FLOWN,
     RETURN_START,
     Surroundings,
-    SwiftReturns,
     fill_stage,
     fly_stages,
     most_seconds,
@@ -31,11 +31,35 @@ from flight.autopilots.arduplane.swift_return import (
     until_circle,
 )
 from flight.guidance.lateral_reference_laws import WAYPOINT
-from flight.mission.return_path import LandingStart
+from flight.mission.return_path import LandingStart, nearest_landing
 from world.kernels import Record, Records
 from world.wind import mean_wind_speed
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class GoArounds:
+    """Go-arounds that were flown.
+
+    flown: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_FLOWN`.
+    ways: n arrays (t, 3) of places a second apart, m.
+    landings: n, the landing sequence that each of them goes to.
+    """
+
+    flown: Records
+    ways: tuple[Floats, ...]
+    landings: tuple[LandingStart, ...]
+
+
+def climb_rows(way: Floats, top: float) -> int:
+    """How many places (t, 3) of a go-around come before the one at which its climb is over; t where it never is.
+
+    >>> climb_rows(np.array([[0.0, 0.0, 10.0], [0.0, 20.0, 14.0], [0.0, 40.0, 18.0]]), 13.0)
+    1
+    """
+    above = way[:, 2] > top
+    return int(np.argmax(above)) if above.any() else len(way)
 
 
 def aborted_at(place: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass) -> Records:
@@ -60,16 +84,17 @@ def fly_go_arounds(
     starts: Records,
     top: float,
     pitch: float,
-    sequence: Sequence[LandingStart],
+    landings: Sequence[LandingStart],
     parameters: ArduPilotParameters,
     aircraft: PointMass,
     around: Surroundings,
-) -> SwiftReturns:
-    """Fly a go-around from each of n places on a glide to the last place of a landing sequence; their ways are kept.
+) -> GoArounds:
+    """Fly a go-around from each of n places on a glide to the last place of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.
     top: height above which the climb ends, m AMSL.  pitch: of the climb, rad.
-    sequence: the places to fly to.  One that is a circle is the last: the go-around is over once around it.
+    landings: one or more landing sequences, of which each goes to the nearest where its climb is over.  A place of it
+        that is a circle is its last: the go-around is over once around it.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import load_parameters
@@ -84,28 +109,38 @@ def fly_go_arounds(
     >>> behind = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
     >>> world, law = surroundings(load_scenario("jacksboro")), load_parameters(aerosonde)
     >>> (way,) = fly_go_arounds(start, 840.0, 0.17, behind, law, made, world).ways
-    >>> k = int(np.argmax(way[:, 2] > 840.0))
+    >>> k = climb_rows(way, 840.0)
     >>> bool(abs(way[k, 0]) < 1.0), bool(abs(way[-1, 0] - 800.0) < 100.0), bool(way[:, 2].min() > 797.0)
     (True, True, True)
     """
-    stages = _stages(sequence, parameters)
     flown = np.zeros(len(starts), RETURN_FLOWN)
     law, staged, climb = parameters.record(), _climbing(parameters, pitch), np.zeros(1, CLIMB)[0]
     climb.climbs, climb.top, climb.slew = True, top, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
-    ways = []
-    for k, start in enumerate(starts):
-        ends = np.concatenate([straight_on(start), stages])
+
+    def fly(k: int, landing: LandingStart) -> Floats:
+        ends = np.concatenate([straight_on(starts[k]), _stages((landing, *landing.onward), parameters)])
         ends["airspeed"] = aircraft.record.airspeed
-        most = most_seconds(start, ends[1:], aircraft) + max(0.0, top - float(start["up"]))
+        most = most_seconds(starts[k], ends[1:], aircraft) + max(0.0, top - float(starts[k]["up"]))
         way = np.zeros((int(most) + 2, 3))
         fly_stages(
-            start, ends, law, staged, climb, aircraft.record, aircraft.excess, aircraft.power, around.heights,
+            starts[k], ends, law, staged, climb, aircraft.record, aircraft.excess, aircraft.power, around.heights,
             around.to_pixel, around.spheres, around.radii, around.known, most,
             -math.inf, -math.inf, False, way, flown[k],
         )  # fmt: skip
-        ways.append(way[: int(flown[k]["rows"])].copy())
-    return SwiftReturns(flown, tuple(ways))
+        return way[: int(flown[k]["rows"])].copy()
+
+    ways, chosen = [], []
+    for k in range(len(starts)):
+        way, landing = fly(k, landings[0]), landings[0]
+        # Until its climb is over it flies to none of them.
+        over = way[min(climb_rows(way, top), len(way) - 1)]
+        nearest = nearest_landing((float(over[0]), float(over[1]), float(over[2])), landings)
+        if nearest is not None and nearest != landing:
+            way, landing = fly(k, nearest), nearest
+        ways.append(way)
+        chosen.append(landing)
+    return GoArounds(flown, tuple(ways), tuple(chosen))
 
 
 def _climbing(parameters: ArduPilotParameters, pitch: float) -> Record:

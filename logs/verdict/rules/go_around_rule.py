@@ -3,8 +3,9 @@
 A go-around is no item of the mission: it comes when somebody commands it, anywhere on the glide.  So it is flown from
 several places of the glide that the autopilot lays out, by ArduPlane's law on a point mass
 (`flight.autopilots.arduplane.swift_go_around`), back to the last place before the glide, and what it meets is judged as
-flown.  It climbs on the landing course to a height over home, whatever the height of the field, and only then turns:
-from a field that lies higher than home it may turn into a hill at once.
+flown.  One that never gets there fails, and one whose way is not known in full is left open.  It climbs on the landing
+course to a height over home, whatever the height of the field, and only then turns: from a field that lies higher than
+home it may turn into a hill at once.
 """
 
 import math
@@ -15,14 +16,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.swift_go_around import aborted_at, fly_go_arounds
-from flight.autopilots.arduplane.swift_return import HIT
+from flight.autopilots.arduplane.swift_go_around import aborted_at, climb_rows, fly_go_arounds
+from flight.autopilots.arduplane.swift_return import HIT, NEVER, OFF_GROUND
 from flight.autopilots.autopilot import LandingGlide
 from flight.mission.ground_ways import climb_pitch
-from flight.mission.items import MissionItem
+from flight.mission.items import Command, MissionItem, command_name
 from flight.mission.placing import home_place, landing_sequence, landing_starts
-from flight.mission.return_path import LandingStart, nearest_landing
-from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
+from flight.mission.return_path import LandingStart
+from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -30,7 +31,7 @@ from logs.verdict.measures.ways import Way, entered_by_way, first_item, is_laid_
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import ReturnWorld, return_world
 from logs.verdict.rule import Rule, located
-from logs.verdict.tolerances import EARLY_TOUCH, GO_AROUND_ROOM, ON_THE_SPOT
+from logs.verdict.tolerances import EARLY_TOUCH, GO_AROUND_ERROR, GO_AROUND_ROOM, NEAR_LINE_UP, ON_THE_SPOT
 from logs.verdict.wording import shortened
 from world.kernels import Record, Records
 from world.terrain import Terrain
@@ -53,7 +54,8 @@ class _Landing:
     at: its waypoint.  glide: to the point (3,) m, its height that of the mission; ground: m AMSL, under the point.
     course: rad.  run: of the last leg, m.  high: at which the glide begins, m AMSL.  airspeed: on it, true, m/s.
     pitch: of the climb, rad.  height: that it goes to over home, m; home: m AMSL.
-    sequence: the places that are flown to after it.  item: of the landing.
+    landings: the landing sequences, of which one is flown to after it, or else the place before.
+    item: of the landing.  open: why its go-around is not known, "" where it is.
     """
 
     at: int
@@ -67,8 +69,9 @@ class _Landing:
     pitch: float
     home: float
     height: float
-    sequence: tuple[LandingStart, ...]
+    landings: tuple[LandingStart, ...]
     item: MissionItem
+    open: str
 
     def place(self, before: float) -> tuple[float, float, float]:
         """East, north and up of the glide so far before the landing point, m."""
@@ -84,23 +87,35 @@ class _Aborted(NamedTuple):
 
     before: where, m before the landing point.  over: height above ground there, m.
     at_once: whether it is as high there as its climb goes.
-    room: least height above ground once the climb is over, or of all of it where it meets the ground; NaN where that is
-        not known, m.
+    room: height above ground where it is nearest to what is asked of it, once the climb is over, or the least of all of
+        it where it meets the ground; inf where none is known, m.  needed: asked there, m.
+    climb: least height above ground of its climb beyond the landing point, m; inf for none.
     after: s from the abort to where it meets the ground, NaN where it does not.
     entered: the sphere or zone that it enters, "" for none.
+    lost: whether it does not get back to the line-up.
+    open: what of it is not known, "" for nothing.
     """
 
     before: float
     over: float
     at_once: bool
-    room: float = math.nan
+    room: float = math.inf
+    needed: float = GO_AROUND_ROOM
+    climb: float = math.inf
     after: float = math.nan
     entered: str = ""
+    lost: bool = False
+    open: str = ""
 
     @property
-    def badness(self) -> tuple[bool, bool, float]:
+    def is_free(self) -> bool:
+        """Whether nothing that is known of it is wrong."""
+        return math.isnan(self.after) and not self.entered and not self.lost and self.room >= self.needed
+
+    @property
+    def badness(self) -> tuple[bool, bool, bool, float]:
         """By what they are ordered, the worst last."""
-        return not math.isnan(self.after), bool(self.entered), -self.room
+        return not math.isnan(self.after), bool(self.entered), self.lost, self.needed - self.room
 
 
 def go_around_findings(
@@ -138,6 +153,7 @@ def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: Mi
     first, takeoff = first_item(requirements)
     climbed = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home
     height = setup.autopilot.go_around_height(item.params[0], climbed)
+    landings = _landings(requirements, at)
     low, under = setup.route.landing_ground, float(ground.height(float(end[0]), float(end[1])))
     if height is None or math.isnan(home + low + under) or run < ON_THE_SPOT or begin[2] <= low:
         return None
@@ -155,21 +171,28 @@ def _landing(requirements: RouteRequirements, ground: Terrain, at: int, item: Mi
         pitch=_PITCH if takeoff is None else climb_pitch(takeoff),
         home=home,
         height=height,
-        sequence=_sequence(requirements, at, point),
+        landings=landings,
         item=item,
+        open=_left_open(requirements, item, landings),
     )
 
 
-def _sequence(requirements: RouteRequirements, at: int, point: Floats) -> tuple[LandingStart, ...]:
-    """The places that a go-around flies to: of the nearest landing sequence, or the one before the landing."""
+def _landings(requirements: RouteRequirements, at: int) -> tuple[LandingStart, ...]:
+    """What a go-around flies to: one of the landing sequences, or the place before the landing where there are none."""
     setup = requirements.setup
     mission, origin, terrain = setup.mission, setup.scenario.origin, setup.scenario.terrain
-    here = (float(point[0]), float(point[1]), float(point[2]))
-    start = nearest_landing(here, landing_starts(mission, origin, terrain))
-    if start is not None and not start.lands:
-        return (start, *start.onward)
     before = int(setup.route.items[at - 1])
-    return landing_sequence(mission, origin, terrain, before)[:1] if before >= 0 else ()
+    back = landing_sequence(mission, origin, terrain, before)[:1] if before >= 0 else ()
+    return landing_starts(mission, origin, terrain) or back
+
+
+def _left_open(requirements: RouteRequirements, item: MissionItem, landings: tuple[LandingStart, ...]) -> str:
+    """Why it is not known where a go-around of a landing leads; "" where it is."""
+    after = next((one for one in requirements.setup.mission.items if one.seq == item.seq + 1), None)
+    # Before any landing sequence (`AP_Landing::restart_landing_sequence`).
+    if after is not None and after.command == Command.NAV_CONTINUE_AND_CHANGE_ALT and int(after.params[0]) in (0, 1):
+        return f"{command_name(after.command)} (item {after.seq}) follows the landing, and is flown instead"
+    return "" if landings else "no place before the landing is known to fly back to"
 
 
 def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing, *, required: bool) -> Finding:
@@ -179,27 +202,24 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
     # No rally point is flown to, wherever they are.
     setup = requirements.setup
     world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
-    needed = _needed(ground, landing)
-    flown = _fly(requirements, ground, world, landing, height, _places(landing)) if landing.sequence else []
-    known = [one for one in flown if not math.isnan(one.room)]
-    worst = max(known, key=lambda one: one.badness, default=None)
-    unknown = "" if len(known) == len(flown) > 0 else "it leads to where the ground is not known"
-    if not landing.sequence:
-        unknown = "no place before the landing is known to fly back to"
-    elif not flown:
-        unknown = "its glide is in the ground, or the ground below is not known"
-    if worst is None or (unknown and _is_free(worst, needed)):
+    flown = [] if landing.open else _fly(requirements, ground, world, landing, height, _places(landing))
+    worst = max(flown, key=lambda one: one.badness, default=None)
+    unknown = landing.open or next((one.open for one in flown if one.open), "")
+    climb = Fact("climb above ground", min((one.climb for one in flown), default=math.inf), "m")
+    if worst is None or (unknown and worst.is_free):
+        unknown = unknown or "its glide is in the ground, or the ground below is not known"
         open_ = message("a go-around is not judged", f": {said}; {unknown}")
         check = GROUND_WAY if required else ""
-        return make_finding("go_around", place, ok=None, reason=open_.text, faults=[open_], unit="m", check=check)
-    enough = math.nan
-    if _is_free(worst, needed):
+        return make_finding(
+            "go_around", place, ok=None, reason=open_.text, faults=[open_], unit="m", check=check, facts=[climb]
+        )
+    if worst.is_free:
         fault = message(f"{said}; {worst.room:.0f} m above ground or more on the way back")
     else:
         enough = _enough(requirements, ground, world, landing, worst.before)
         would = f"{enough:.0f} m would do (the first number of item {landing.item.seq})"
         fault = message(_brief(worst), f": {said}, and {_described(worst)}; {would if enough > 0.0 else _NONE_DO}")
-    ok = _is_free(worst, needed) or (False if required else None)
+    ok = worst.is_free or (False if required else None)
     return make_finding(
         "go_around",
         place,
@@ -207,12 +227,13 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
         reason=fault.text,
         faults=[] if ok else [fault],
         planned=worst.room,
-        limit=needed,
+        limit=worst.needed,
         source="check",
         tolerance=0.0,
-        margin=None if worst.entered else worst.room - needed,
+        margin=None if worst.entered or worst.lost else worst.room - worst.needed,
         unit="m",
         method=f"flown by ArduPlane's law on a point mass from {len(flown)} places of the glide",
+        facts=[climb],
     )
 
 
@@ -244,56 +265,87 @@ def _fly(
             for _, place, _ in kept
         ]
     )
-    flown = fly_go_arounds(starts, top, landing.pitch, landing.sequence, world.parameters, world.aircraft, world.around)
+    flown = fly_go_arounds(starts, top, landing.pitch, landing.landings, world.parameters, world.aircraft, world.around)
     return [
-        _judged(requirements, ground, _Aborted(before, high, at_once=place[2] > top), row, way, top)
-        for (before, place, high), row, way in zip(kept, flown.flown, flown.ways, strict=True)
+        _judged(requirements, ground, landing, _Aborted(before, high, at_once=place[2] > top), row, way, goal, top)
+        for (before, place, high), row, way, goal in zip(kept, flown.flown, flown.ways, flown.landings, strict=True)
     ]
 
 
 def _judged(
-    requirements: RouteRequirements, ground: Terrain, begun: _Aborted, flown: Record, positions: Floats, top: float
+    requirements: RouteRequirements,
+    ground: Terrain,
+    landing: _Landing,
+    begun: _Aborted,
+    flown: Record,
+    positions: Floats,
+    goal: LandingStart,
+    top: float,
 ) -> _Aborted:
     """What a go-around comes to.
 
     flown: of `flight.autopilots.arduplane.swift_return.RETURN_FLOWN`.  positions: (n, 3) m, a second apart.
-    top: height above which its climb is over, m AMSL.
+    goal: what it flies to.  top: height above which its climb is over, m AMSL.
     """
+    rows, ended = climb_rows(positions, top), int(flown["ended"])
+    begun = begun._replace(lost=ended == NEVER, open=_unknown(ended, climbs=rows < len(positions)))
+    if goal.lands and rows < len(positions):
+        # What it does on a glide that begins anywhere is not known; what it met before is.
+        positions, ended = positions[: rows + 1], 0
+        begun = begun._replace(lost=False, open=f"its landing sequence begins with the landing (item {goal.item})")
     if len(positions) < 2:
-        # Aborted where it is to fly back to.
+        # Aborted where it is to fly back to, or where the climb is over at once.
         return begun._replace(room=begun.over)
     step = np.diff(positions[:, :2], axis=0)
     way = Way(positions, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
-    entered, above = entered_by_way(requirements, way), positions[:-1, 2] > top
     low = path_clearance(ground.heights, ground.to_pixel.record, positions)[0]
     least = float(np.nanmin(low, initial=math.inf))
-    if flown["ended"] == HIT or least <= 0.0:
-        return begun._replace(room=min(least, 0.0), after=float(flown["clearance_time"]), entered=entered)
-    # Where ground is not known, nor is the least height above it.
-    over = low[int(np.argmax(above)) :] if above.any() else low
-    return begun._replace(room=float(over.min()), entered=entered)
+    begun = begun._replace(entered=entered_by_way(requirements, way))
+    if ended == HIT or least <= 0.0:
+        return begun._replace(room=min(least, 0.0), after=float(flown["clearance_time"]))
+    ahead = (positions[:-1, :2] - landing.point[:2]) @ (math.sin(landing.course), math.cos(landing.course)) > 0.0
+    climb = float(np.nanmin(low[:rows][ahead[:rows]], initial=math.inf))
+    if climb < GO_AROUND_ERROR and not begun.open:
+        passes = (
+            f"aborted {begun.before:.0f} m before the landing point it passes the ground in its climb by {climb:.0f} m"
+        )
+        begun = begun._replace(open=f"{passes}, and may be flown {GO_AROUND_ERROR:.0f} m lower")
+    asked = _asked(ground, goal, 0.5 * (positions[:-1] + positions[1:]))[rows:]
+    back = np.where(np.isnan(low[rows:]), math.inf, low[rows:])
+    if not back.size:
+        return begun._replace(climb=climb)
+    k = int(np.argmin(back - asked))
+    return begun._replace(climb=climb, room=float(back[k]), needed=float(asked[k]))
 
 
-def _needed(ground: Terrain, landing: _Landing) -> float:
-    """Height above ground that is asked of the way back: that of the landing sequence's lowest place, if it is less."""
-    places = [one.place for one in landing.sequence]
-    return min(GO_AROUND_ROOM, *(up - float(ground.height(east, north)) for east, north, up in places))
+def _unknown(ended: int, *, climbs: bool) -> str:
+    """What is not known of a go-around that ended somehow, and climbs to its height or not; "" for nothing."""
+    if ended != OFF_GROUND:
+        return ""
+    return "it leads to where the ground is not known" if climbs else "it does not reach its height on known ground"
 
 
-def _is_free(one: _Aborted, needed: float) -> bool:
-    return math.isnan(one.after) and not one.entered and one.room >= needed
+def _asked(ground: Terrain, goal: LandingStart, points: Floats) -> Floats:
+    """Height above ground (n,) that is asked at places (n, 3) of the way back, m: less near lower places to fly to."""
+    asked = np.full(len(points), GO_AROUND_ROOM)
+    for east, north, up in (one.place for one in (goal, *goal.onward)):
+        high = up - float(ground.height(east, north))
+        near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= NEAR_LINE_UP
+        if high < GO_AROUND_ROOM:
+            asked[near] = np.minimum(asked[near], high)
+    return asked
 
 
 def _enough(
     requirements: RouteRequirements, ground: Terrain, world: ReturnWorld, landing: _Landing, worst: float
 ) -> float:
     """The next height over home (m) that would do, in steps; NaN where none does.  worst: place to be tried first."""
-    needed, first = _needed(ground, landing), _HEIGHT_STEP * math.ceil(landing.height / _HEIGHT_STEP + 1e-9)
+    first = _HEIGHT_STEP * math.ceil(landing.height / _HEIGHT_STEP + 1e-9)
     order = [worst, *_places(landing).tolist()]
     for up in np.arange(first, _HIGHEST + 1.0, _HEIGHT_STEP).tolist():
         for before in order:
             flown = _fly(requirements, ground, world, landing, up, [before])
-            if not all(_is_free(one, needed) for one in flown):
+            if not all(one.is_free and not one.open for one in flown):
                 # Where one height does not do, the next is tried first.
                 order[0] = before
                 break
@@ -306,7 +358,9 @@ def _brief(worst: _Aborted) -> str:
     """What becomes of the worst, in a few words."""
     if not math.isnan(worst.after):
         return "a go-around meets the ground"
-    return f"a go-around enters {worst.entered}" if worst.entered else "a go-around comes too near to the ground"
+    if worst.entered:
+        return f"a go-around enters {worst.entered}"
+    return "a go-around does not get back to the line-up" if worst.lost else "a go-around comes too near to the ground"
 
 
 def _described(worst: _Aborted) -> str:
@@ -317,6 +371,8 @@ def _described(worst: _Aborted) -> str:
         does = f"meets the ground {worst.after:.0f} s later"
     elif worst.entered:
         does = f"enters {worst.entered}"
+    elif worst.lost:
+        does = "does not get back to the line-up"
     else:
         does = f"comes down to {worst.room:.0f} m above ground on the way back"
     return f"{where}{turns} and {does}" if turns else f"{where} {does}"
@@ -328,7 +384,7 @@ RULE = Rule(
     noun="go-around",
     asks="Would a go-around from anywhere on the glide stay clear of ground, missiles and zones?",
     margin=None,
-    tolerances=("GO_AROUND_ROOM", "EARLY_TOUCH", "ON_THE_SPOT"),
+    tolerances=("GO_AROUND_ROOM", "NEAR_LINE_UP", "GO_AROUND_ERROR", "EARLY_TOUCH", "ON_THE_SPOT"),
     judge=go_around_findings,
     phrase=lambda item: located("go-around", item, shortened(item.brief)),
     warns=True,

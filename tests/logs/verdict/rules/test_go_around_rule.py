@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.mission.items import Command
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.rules import go_around_rule
@@ -106,12 +105,87 @@ def test_only_of_arduplane_a_go_around_is_told() -> None:
     assert "go_around" not in {item.rule for item in judge_geometry(over(higher_field, *landing(HEIGHT))).findings}
 
 
-def test_where_nothing_is_known_to_fly_back_to_it_is_said() -> None:
-    """DO_LAND_START with the landing behind it, which is flown to from anywhere: the place before is taken."""
+REQUIRED = {"returns": {"require": ["go_around"]}}
+LEVEL = wall(0.0, 100.0)
+MARK = "3 189 0 0 0 0 0 0 0"
+
+
+def test_a_go_around_whose_landing_sequence_begins_with_the_landing_is_left_open() -> None:
     lines = landing(p="60 0 0 0")
-    marked = (lines[0], lines[1], "3 189 0 0 0 0 0 0 0", lines[2])
-    assert go_around(wall(0.0, 100.0), *marked)[0].ok is True
-    assert Command.DO_LAND_START == 189
+    found, verdict = go_around(LEVEL, lines[0], lines[1], MARK, lines[2], **REQUIRED)
+    assert found.ok is None
+    assert "its landing sequence begins with the landing (item 4)" in found.reason
+    assert verdict.headline.startswith("not judged in full: a go-around is not judged")
+    # What it meets before that is known.
+    assert go_around(wall(POINT + 150.0, 300.0), lines[0], lines[1], MARK, lines[2], **REQUIRED)[0].ok is False
+
+
+def test_a_go_around_that_does_not_get_back_fails() -> None:
+    # As fast against the wind as that blows: south of the field it gets nowhere.
+    found, _ = go_around(LEVEL, *landing(p="60 0 0 0"), wind={"speed_mps": 25.0, "from_deg": 180.0}, **REQUIRED)
+    assert found.ok is False
+    assert found.reason.startswith("a go-around does not get back to the line-up: ")
+
+
+def test_a_go_around_goes_to_the_landing_sequence_that_is_nearest_where_its_climb_is_over() -> None:
+    """From the landing point that behind it is 1,000 m away and that ahead 1,100 m; 300 m further on it is not so."""
+    land = wp(0, -500, 0, command=21, p="60 0 0 0")
+    behind, ahead = (MARK, wp(0, -1500, 60), land), (MARK, wp(0, 600, 60), land)
+    for order in ((*behind, *ahead), (*ahead, *behind)):
+        assert go_around(LEVEL, wp(0, -3000, 60), *order, **REQUIRED)[0].ok is True
+        into, _ = go_around(wall(300.0, 300.0), wp(0, -3000, 60), *order, **REQUIRED)
+        assert "meets the ground" in into.reason
+    assert go_around(wall(300.0, 300.0), wp(0, -3000, 60), *behind, **REQUIRED)[0].ok is True
+
+
+def test_a_command_behind_the_landing_that_is_flown_instead_leaves_it_open() -> None:
+    for first, ok in ((0, None), (1, None), (2, True)):
+        after = f"3 30 {first} 0 0 0 0 0 150"
+        found, verdict = go_around(LEVEL, *landing(p="60 0 0 0"), after, **REQUIRED)
+        assert found.ok is ok
+        assert verdict.undecided is (ok is None)
+    found, _ = go_around(LEVEL, *landing(p="60 0 0 0"), "3 30 1 0 0 0 0 0 150")
+    assert "NAV_CONTINUE_AND_CHANGE_ALT (item 4) follows the landing, and is flown instead" in found.reason
+
+
+def test_a_climb_that_passes_the_ground_beyond_the_landing_point_by_too_little_is_left_open() -> None:
+    def climbs(top: float) -> tuple[Finding, float]:
+        found, _ = go_around(wall(POINT + 150.0, top), *landing(p="60 0 0 0"), **REQUIRED)
+        return found, next(fact.value for fact in found.facts if fact.what == "climb above ground")
+
+    level, least_level = climbs(100.0)
+    # So high that the wall is what decides.
+    _, high = climbs(125.0)
+    assert 0.0 < high < least_level
+    top = 125.0 + high - 6.0
+    for more, ok in ((-0.5, True), (0.5, None)):
+        found, least = climbs(top + more)
+        assert found.ok is ok
+        assert least == pytest.approx(6.0 - more, abs=0.1)
+    assert "in its climb by" in climbs(top + 1.0)[0].reason
+    assert level.ok is True
+
+
+def test_a_go_around_that_leaves_the_known_ground_in_its_climb_is_left_open() -> None:
+    found, verdict = go_around(LEVEL, *landing(p="3000 0 0 0"), **REQUIRED)
+    assert (found.ok, verdict.undecided) == (None, True)
+    assert found.reason.endswith("it does not reach its height on known ground")
+
+
+def test_a_low_place_of_the_landing_sequence_lowers_what_is_asked_for_only_near_it() -> None:
+    # From 60 m it sinks to a place at 12 m, 2 km to the east: half way there it is at 36 m.
+    low = (MARK, wp(2000, POINT - RUN, 12))
+    lines = landing(p="60 0 0 0")
+
+    def past(top: float) -> Finding:
+        def ridge(east: Floats, north: Floats) -> Floats:
+            return np.where(east == 1000.0, top, 100.0) + 0.0 * north
+
+        return go_around(ridge, lines[0], *low, *lines[1:], **REQUIRED)[0]
+
+    assert past(108.0).limit == pytest.approx(12.0)
+    into = past(122.0)
+    assert (into.ok, into.limit) == (False, 20.0)
 
 
 def test_it_is_aborted_all_along_the_glide_to_the_flare(monkeypatch: pytest.MonkeyPatch) -> None:
