@@ -40,12 +40,17 @@ def parsed(file: Path) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"))
 
 
+@cache
+def nodes_of(file: Path) -> tuple[ast.AST, ...]:
+    return tuple(ast.walk(parsed(file)))
+
+
 def name_of(file: Path) -> str:
     return file.relative_to(ROOT).as_posix()
 
 
 def functions(file: Path) -> Iterator[Function]:
-    return (node for node in ast.walk(parsed(file)) if isinstance(node, Function))
+    return (node for node in nodes_of(file) if isinstance(node, Function))
 
 
 def is_kernel(function: Function) -> bool:
@@ -81,7 +86,7 @@ def test_nothing_that_is_installed_imports_tests_or_benchmarks() -> None:
     found = [
         f"{name_of(file)}:{node.lineno}"
         for file in OURS
-        for node in ast.walk(parsed(file))
+        for node in nodes_of(file)
         if (isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in apart)
         or (isinstance(node, ast.Import) and apart & {alias.name.partition(".")[0] for alias in node.names})
     ]
@@ -164,7 +169,7 @@ def called_from_python(kernels: dict[tuple[str, str], str]) -> set[tuple[str, st
             continue
         known = {
             alias.asname or alias.name: (node.module, alias.name)
-            for node in ast.walk(parsed(file))
+            for node in nodes_of(file)
             if isinstance(node, ast.ImportFrom) and node.module
             for alias in node.names
         } | {name: (home, name) for home, name in kernels if home == module}
@@ -209,7 +214,7 @@ def test_docstrings_and_comments_lean_on_no_other_text() -> None:
 @cache
 def names_of(file: Path) -> frozenset[str]:
     """What a module defines or imports, at any depth."""
-    nodes = list(ast.walk(parsed(file)))
+    nodes = list(nodes_of(file))
     defined = {node.name for node in nodes if isinstance(node, Function | ast.ClassDef)}
     assigned = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
     attributes = {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
@@ -235,7 +240,7 @@ def test_benchmarks_and_examples_import_what_there_is() -> None:
         f"{name_of(file)}:{node.lineno}: {node.module}.{alias.name}"
         for file in CODE
         if file.relative_to(ROOT).parts[0] in ("benchmarks", "examples")
-        for node in ast.walk(parsed(file))
+        for node in nodes_of(file)
         if isinstance(node, ast.ImportFrom) and node.module
         if node.module.partition(".")[0] in (*PACKAGES, "benchmarks", "tests") and node.module != "planfly"
         for alias in node.names
@@ -273,7 +278,7 @@ def test_optimisers_import_nothing_of_ours_but_kernels() -> None:
     imported = {
         node.module
         for file in files
-        for node in ast.walk(parsed(file))
+        for node in nodes_of(file)
         if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] in PACKAGES
     }
     assert {module for module in imported if not module.startswith("planner.optimisers")} <= {"world.kernels"}
@@ -282,7 +287,7 @@ def test_optimisers_import_nothing_of_ours_but_kernels() -> None:
 def error_kinds() -> set[str]:
     """Names of `PlanflyError` and of all that is made of it."""
     kinds, before = {"PlanflyError"}, set[str]()
-    classes = [node for file in OURS for node in ast.walk(parsed(file)) if isinstance(node, ast.ClassDef)]
+    classes = [node for file in OURS for node in nodes_of(file) if isinstance(node, ast.ClassDef)]
     while kinds != before:
         before = set(kinds)
         kinds |= {node.name for node in classes if before & {ast.unparse(base) for base in node.bases}}

@@ -16,8 +16,8 @@ MODULES = sorted(
     for file in (ROOT / package).rglob("*.py")
     if ">>> " in file.read_text(encoding="utf-8")
 )
-# Each makes a whole run with its pictures; the tests of the API do, too.
-LONG = {"planfly.api.running", "planfly.api.reporting"}
+# Each makes whole runs, or many returns; the tests of the API do, too.
+LONG = {"planfly.api.running", "planfly.api.reporting", "planfly.api.flying", "planfly.api.returning"}
 
 
 @pytest.mark.parametrize("module", [name for name in MODULES if SOAK or name not in LONG])

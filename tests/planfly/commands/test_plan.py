@@ -12,7 +12,8 @@ from planfly.cli import main
 from tests.instances import make_instance, scenario_text
 
 # Without seeds a search goes on for all its generations: hours.
-PLANNER = 'algorithm = "umda-smooth"\nwaypoints = 10\npopulation = 2000\ngenerations = 100000\n'
+# Each generation ends well within what a command is given after Ctrl-C, on a loaded machine, too.
+PLANNER = 'algorithm = "umda-smooth"\nwaypoints = 10\npopulation = 200\ngenerations = 100000\n'
 
 
 @pytest.fixture
@@ -41,7 +42,7 @@ def test_ctrl_c_leaves_the_best_plan_so_far(endless: Path, tmp_path: Path) -> No
     assert "ended by Ctrl-C" in text
     plan = json.loads(out.read_text(encoding="utf-8"))
     assert plan["ended"] == "interrupted"
-    assert plan["evaluations"] >= 2000
+    assert plan["evaluations"] >= 200
     assert len(plan["waypoints_east_north_amsl_m"]) == 10
 
 
