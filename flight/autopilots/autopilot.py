@@ -362,11 +362,13 @@ class Autopilot(ABC):
         """
         return cruise
 
-    def as_asked(self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool) -> "Autopilot":
+    def as_asked(
+        self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
+    ) -> "Autopilot":
         """The autopilot with what a scenario sets of its returns; as it is where it has no parameters for it.
 
         rtl_altitude: over home, m.  rtl_autoland: ArduPlane's; None where the scenario leaves them as they are.
-        lands: whether the scenario's missions end with a landing sequence.
+        lands: whether the scenario's missions end with a landing sequence.  lower: by so much than home, m.
         """
         return self
 

@@ -1,5 +1,6 @@
 """Every autopilot that planfly knows: the one list that a new autopilot is added to."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -45,7 +46,29 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
     made, returns = _LAWS[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
     set_by = (None, None) if returns is None else (returns.rtl_altitude, returns.rtl_autoland)
-    return made.as_asked(*set_by, lands=scenario.landing is not None)
+    asked = made.as_asked(*set_by, lands=scenario.landing is not None, lower=_lower_field(scenario))
+    _refuse_conflict(scenario, made, asked)
+    return asked
+
+
+def _lower_field(scenario: Scenario) -> float:
+    """By how much the ground at the landing is lower than home, m; 0 where either is not known."""
+    landing, home = scenario.landing, scenario.home
+    if landing is None or home is None or scenario.terrain is None:
+        return 0.0
+    lower = float(home[2] - scenario.terrain.height(landing.east, landing.north))
+    return 0.0 if math.isnan(lower) else lower
+
+
+def _refuse_conflict(scenario: Scenario, made: Autopilot, asked: Autopilot) -> None:
+    """Raise ScenarioError where a scenario asks for another value than a person's file of parameters states."""
+    if made.parameters is None or asked.parameters is None:
+        return
+    values = asked.parameters.by_origin("file")
+    for name, stated in made.parameters.by_origin("file").items():
+        if not math.isclose(values[name], stated, rel_tol=1e-6, abs_tol=1e-6):
+            allowed = f"{made.parameters.source} states {name} {stated:g}"
+            raise ScenarioError.at(scenario.name, f"returns ({name})", values[name], allowed, shown=f"{values[name]:g}")
 
 
 def program_autopilot(program: Path) -> type[ProgramAutopilot]:

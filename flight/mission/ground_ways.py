@@ -85,6 +85,7 @@ class Approach:
     point: (3,) m, the landing point at the height that the mission states.
     course: of the landing, rad.  run: length of the leg, m.  begin: height at its beginning, m AMSL.
     tail_wind: m/s on that course at the landing point.
+    base: height of home, m AMSL; the landing point's of a mission without one.
     """
 
     strip: LandingStrip
@@ -95,6 +96,7 @@ class Approach:
     run: float
     begin: float
     tail_wind: float
+    base: float
 
     def place(self, position: Floats) -> tuple[Floats, Floats]:
         """How far beyond the landing point, and to the right of its course, positions (n, 3) are, (n,) m."""
@@ -200,8 +202,9 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     step = end[:2] - begin[:2]
     course, run = math.atan2(step[0], step[1]), float(np.hypot(*step))
     point = np.array([end[0], end[1], up])
-    wind = scenario.wind.along(course, up)[0]
-    return Approach(strip, int(route.items[last]), last - 1, point, course, run, float(begin[2]), wind), ""
+    wind, home = scenario.wind.along(course, up)[0], home_place(mission, scenario.origin, scenario.terrain)
+    base = up if home is None else home.up
+    return Approach(strip, int(route.items[last]), last - 1, point, course, run, float(begin[2]), wind, base), ""
 
 
 def airborne_route(route: Route, ways: GroundWays, begun: Floats | None) -> Route:

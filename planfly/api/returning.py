@@ -210,8 +210,8 @@ def returns(
     """
     check_arguments(every=every, points=points, seed=seed, flight=flight, datum=datum)
     given: dict[str, Any] = {
-        "scenario": scenario, "fence": fence or None, "wind": wind, "turbulence": turbulence, "at": at, "params": params,
-        "aircraft": aircraft, "airspeed": airspeed, "guidance": guidance, "autopilot_law": autopilot_law}  # fmt: skip
+        "scenario": scenario, "wind": wind, "turbulence": turbulence, "at": at, "params": params, "aircraft": aircraft,
+        "fence": fence or None, "airspeed": airspeed, "guidance": guidance, "autopilot_law": autopilot_law}  # fmt: skip
     other, of_log = {"seed": seed, "nav": nav}, {"plan": plan, "flight": flight, "datum": datum}
     path = Path(what) if isinstance(what, str | Path) else None
     asked = _asked(every, suggest, out, autopilot, points, overwrite=overwrite)

@@ -152,18 +152,26 @@ class ArduPlane(Autopilot):
         """By TECS_LAND_ARSPD, or AIRSPEED_CRUISE and AIRSPEED_MIN, and LAND_WIND_COMP."""
         return landing_airspeed(self.parameters, tail_wind) * self.airspeed_factor(amsl)
 
-    def as_asked(self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool) -> Autopilot:
+    def as_asked(
+        self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
+    ) -> Autopilot:
         """With RTL_ALTITUDE and RTL_AUTOLAND, and the latter 1 where nobody states it: 0 does not arm with a landing.
 
-        >>> made = ArduPlane(default_parameters()).as_asked(180.0, None, lands=True)
-        >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland
-        (180.0, 1.0)
+        On a field that is lower than home the flare would rise (`flight.autopilots.arduplane.ground_law`): there
+        TECS_LAND_PMAX holds the nose down where nobody states it.
+
+        >>> made = ArduPlane(default_parameters()).as_asked(180.0, None, lands=True, lower=50.0)
+        >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland, round(made.parameters.landing_pitch_max, 4)
+        (180.0, 1.0, 0.0175)
         """
         values = {} if rtl_altitude is None else {"RTL_ALTITUDE": rtl_altitude}
+        stated = self.parameters.by_origin("file")
         if rtl_autoland is not None:
             values["RTL_AUTOLAND"] = float(rtl_autoland)
-        elif lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in self.parameters.by_origin("file"):
+        elif lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in stated:
             values["RTL_AUTOLAND"] = 1.0
+        if lands and lower > _LOWER and "TECS_LAND_PMAX" not in stated:
+            values["TECS_LAND_PMAX"] = _NOSE_DOWN
         return ArduPlane(self.parameters.changed(**values)) if values else self
 
     def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
@@ -329,11 +337,14 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         glide = self.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
         ground.lands, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
+        ground.home = approach.base
         ground.begin, ground.slope = approach.begin, glide.slope
         ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance
         ground.airspeed = landing_airspeed(self.parameters, approach.tail_wind)
 
 
+# A field that is lower than home by more than this (m) has a flare that rises; so high (degrees) the nose may be in it.
+_LOWER, _NOSE_DOWN = 3.0, 1.0
 # Faster than this share of its slowest flight no aircraft touches the ground with its nose, its tail or a wing.
 _TURNOVER_SHARE = 0.75
 # Faster over the ground than this ArduPlane knows its course, m/s.

@@ -22,7 +22,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     NAVIGATION_TICK,
@@ -97,6 +96,7 @@ GROUND_STATE = record_dtype(
     "east",  # m, of the landing point
     "north",
     "up",  # m AMSL
+    "home",  # m AMSL, of home
     "begin",  # m AMSL, of the waypoint before
     "slope",
     "flare_height",  # m over the landing point, and before it
@@ -104,6 +104,9 @@ GROUND_STATE = record_dtype(
     "airspeed",  # m/s, equivalent
     "entry_sink",  # m/s and m, where the flare began
     "entry_height",
+    # Heights that the flare demands, m: over home, on from the glide's; over the landing point, on from its own.
+    "flare_adjusted",
+    "flare_ideal",
 )
 ARDUPLANE_GROUND = record_dtype(
     ("memory", ARDUPILOT_MEMORY),
@@ -331,6 +334,9 @@ def _land(work: Record, own: Record) -> None:  # pragma: no cover - compiled
         _demand_glide(estimated, own.parameters, ground, memory, left[0])
         _stage_landing(estimated, own.parameters, staged, ground, left[1])
         work.memory.speed_command = ground.airspeed * factor
+        if ground.stage == FLARING:
+            # Slow with no throttle, it is not short of speed: in the flare that counts for nothing.
+            memory.throttle_demand = 0.0
         update_tecs(state, estimated, staged, memory, ground.airspeed * factor, factor, NAVIGATION_TICK)
     work.memory.height_error = estimated.up - memory.height_demand
     before = work.commands.throttle
@@ -388,10 +394,7 @@ def _find_stage(
     if (ground.stage == APPROACHING and (low or soon)) or share >= 1.0:
         ground.stage = FLARING
         ground.entry_sink, ground.entry_height = sink, height
-        # The pitch goes on from the one that it has.
-        ground.airspeed = memory.airspeed / true_by_equivalent(estimated.up)
-        memory.airspeed_demand, memory.speed_sum = memory.airspeed, 0.0
-        memory.balance_sum = memory.pitch_demand * memory.airspeed * GRAVITY
+        ground.flare_adjusted, ground.flare_ideal = memory.height_demand - ground.home, height
 
 
 @inner
@@ -412,7 +415,12 @@ def _demand_glide(
             share = min(1.0, max(0.0, (entry - height) / (entry - parameters.flare_holdoff)))
         last = parameters.landing_sink + parameters.landing_sink_change * max(0.0, -left)
         memory.height_rate = -ground.entry_sink * (1.0 - share) - last * share
-        memory.height_demand = estimated.up
+        ground.flare_adjusted += memory.height_rate * NAVIGATION_TICK
+        ground.flare_ideal += memory.height_rate * NAVIGATION_TICK
+        # As `AP_TECS::_update_height_demand` has it, which mixes a height over home with one over the landing point: on
+        # a field lower than home it asks for as much more height, up to twice, and on a higher one for less.
+        over_home = ground.flare_adjusted * (1.0 - share) + ground.flare_ideal * share
+        memory.height_demand = ground.home + over_home + (ground.home - ground.up)
     memory.height_asked, memory.height_limited = memory.height_demand, memory.height_demand
 
 

@@ -232,7 +232,9 @@ class Px4(Autopilot):
         """How far its law strays with these parameters; it flies no waypoint over."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
-    def as_asked(self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool) -> Autopilot:
+    def as_asked(
+        self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
+    ) -> Autopilot:
         """With RTL_RETURN_ALT."""
         return self if rtl_altitude is None else Px4(self.parameters.changed(RTL_RETURN_ALT=rtl_altitude))
 

@@ -1,9 +1,11 @@
 """The list of autopilots: every one can be told by its name, stored in a log and restored, and told from the others."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
+import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
@@ -24,6 +26,7 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.px4 import parameters as px4_parameters
 from flight.autopilots.px4.autopilot import Px4
+from world.airfield import AskedReturns
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario, with_flight
 
@@ -49,9 +52,51 @@ def tight(**flight: str) -> Scenario:
     return with_flight(load_scenario("tight"), **flight)
 
 
+def arduplane(scenario: Scenario) -> ArduPlane:
+    made = load_autopilot(scenario, AEROSONDE)
+    assert isinstance(made, ArduPlane)
+    return made
+
+
 def test_a_scenario_names_its_autopilot() -> None:
     assert load_autopilot(tight(autopilot="ardupilot"), AEROSONDE).parameters is not None
     assert load_autopilot(tight(guidance="l1"), AEROSONDE) == PlanflyGuidance("l1")
+
+
+def test_what_a_scenario_asks_of_its_returns_and_a_file_denies_is_refused(tmp_path: Path) -> None:
+    """One of the two is wrong, and nobody but a person knows which."""
+    file = tmp_path / "mine.parm"
+    asking = replace(load_scenario("tight"), returns=AskedReturns((), 180.0, np.zeros((0, 3))))
+    for stated, refused in (("RTL_ALTITUDE 180", False), ("RTL_ALTITUDE 181", True), ("ALT_HOLD_RTL 12000", True)):
+        file.write_text(f"{stated}\n", encoding="utf-8")
+        scenario = with_flight(asking, autopilot="ardupilot", params=str(file))
+        if not refused:
+            assert arduplane(scenario).parameters.by_origin("file") == {"RTL_ALTITUDE": 180.0}
+            continue
+        with pytest.raises(ScenarioError, match=r"tight: returns \(RTL_ALTITUDE\): 180: .*mine.parm states RTL_ALT"):
+            load_autopilot(scenario, AEROSONDE)
+
+
+@pytest.mark.parametrize(("lower", "file", "most"), [(3.5, "", 1.0), (2.5, "", 10.0), (3.5, "TECS_LAND_PMAX 7", 7.0)])
+def test_on_a_lower_field_the_nose_is_held_down_in_the_flare(lower: float, file: str, most: float) -> None:
+    made = ArduPlane(parameters_of(f"RTL_AUTOLAND 2\n{file}\n", "mine.parm"))
+    asked = made.as_asked(None, None, lands=True, lower=lower)
+    assert isinstance(asked, ArduPlane)
+    assert asked.parameters.landing_pitch_max == pytest.approx(math.radians(most))
+
+
+def test_a_field_is_as_much_lower_as_the_ground_is_there() -> None:
+    """jacksboro's field is higher than home; with the two exchanged it is lower, and the flare is held down."""
+    scenario = load_scenario("jacksboro")
+    assert scenario.landing is not None
+    assert scenario.home is not None
+    assert scenario.terrain is not None
+    assert arduplane(scenario).parameters.landing_pitch_max == pytest.approx(math.radians(10.0))
+    there = np.array([scenario.landing.east, scenario.landing.north])
+    home = np.array([*there, float(scenario.terrain.height(*there))])
+    strip = replace(scenario.landing, east=float(scenario.home[0]), north=float(scenario.home[1]))
+    back = arduplane(replace(scenario, home=home, landing=strip))
+    assert back.parameters.landing_pitch_max == pytest.approx(math.radians(1.0))
 
 
 def test_a_name_that_is_not_listed_is_one_line() -> None:

@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from flight.simulation.tick import ENDS, GROUND, NO_MOTOR
-from tests.flight.autopilots.arduplane.flown_grounds import FLIGHTS, HOME, Flown, circuit, fly, fly_kept, kept
+from tests.flight.autopilots.arduplane.flown_grounds import (
+    FLIGHTS,
+    HOME,
+    Flown,
+    circuit,
+    fly,
+    fly_kept,
+    kept,
+    make_ground_setup,
+)
 from tests.soak import SOAK
 from world.airfield import LandingStrip, Launch
 
@@ -41,7 +50,7 @@ def test_take_offs_are_those_of_arduplane(flight: str) -> None:
 
 @flights
 def test_landings_are_those_of_arduplane(flight: str) -> None:
-    """Slope within 0.2 degrees, flare within 2 m and 25 m, touch-down within 30 m: what is asked of the law."""
+    """Slope within 0.2 degrees, flare within 2 m and 25 m, as is asked of the law; touch-down within 6 m, 16 m of d."""
     flown, real = fly_kept(flight), kept(flight, "landing")
     approach, track = flown.approach, flown.track
     glide = flown.setup.autopilot.landing_glide(
@@ -68,7 +77,7 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     assert track.position[k, 2] - approach.point[2] == pytest.approx(glide.flare_height, abs=2.0)
     mine = approach.place(np.asarray(track.position[touch(flown)], dtype=np.float64))
     down = int(np.argmax(real["amsl_m"] - real["ground_m"] < 0.35))
-    assert float(mine[0]) == pytest.approx(along[down], abs=25.0)
+    assert float(mine[0]) == pytest.approx(along[down], abs=16.0 if flight == "d" else 6.0)
     assert float(mine[1]) == pytest.approx(aside[down], abs=1.0)
     rest = approach.place(np.asarray(track.position[-1], dtype=np.float64))
     assert float(rest[0]) == pytest.approx(along[-1], abs=20.0)
@@ -147,6 +156,21 @@ def test_a_throttle_without_a_limit_is_closed_at_once_in_the_flare() -> None:
     assert flown.flight.ended == "completed"
     assert track.commands[down - 600 : down, 3].max() > 0.05
     assert track.commands[down:, 3].max() == 0.0
+
+
+def test_on_a_field_lower_than_home_the_flare_balloons() -> None:
+    """ArduPlane mixes heights over home and over the field: on lower fields its flare rises (seen in three flights)."""
+    setup, rises = circuit(None, STRIP, wind=(3.0, 270.0)), []
+    for lower in (0.0, 60.0):
+        home = setup.mission.home
+        assert home is not None
+        items = tuple(replace(item, alt=item.alt - lower) for item in setup.mission.items)
+        mission = replace(setup.mission, home=replace(home, alt=home.alt + lower), items=items)
+        track = fly(make_ground_setup(setup.scenario, mission)).track
+        flare = int(np.argmax((track.time > 60.0) & (track.position[:, 0] < 600.0) & (track.commands[:, 3] == 0.0)))
+        rises.append(float(track.position[flare:, 2].max() - track.position[flare, 2]))
+    assert rises[0] < 0.5
+    assert rises[1] > 3.0
 
 
 def test_home_is_where_kept_flights_began() -> None:
