@@ -198,7 +198,7 @@ def _in_its_wind(scenario: Scenario, flight: LoggedFlight, options: ImportOption
         own = "as the scenario has it: the log holds no wind" if options.scenario else ""
         return scenario, own
     blown = with_wind(scenario, found.speed, found.from_course, None)
-    return blown, f"from {math.degrees(found.from_course) % 360.0:03.0f}°, by {found.source} of the log"
+    return blown, f"from {round(math.degrees(found.from_course)) % 360:03d}°, by {found.source} of the log"
 
 
 def _setup(

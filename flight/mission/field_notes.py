@@ -70,7 +70,7 @@ def _tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
     for name, course, up in ends:
         tail = scenario.wind.along(course, up)[0]
         if tail > CALM:
-            yield f"{name}: {tail:.1f} m/s of wind from behind on {math.degrees(course) % 360.0:.0f}°"
+            yield f"{name}: {tail:.1f} m/s of wind from behind on {round(math.degrees(course)) % 360}°"
 
 
 def _home_elsewhere(mission: Mission, scenario: Scenario) -> Iterator[str]:
@@ -152,4 +152,4 @@ def _landed_on(mission: Mission, route: Route, scenario: Scenario) -> Iterator[s
         if max(abs(one) for one in slopes) > STEEPEST_STRIP:
             ground += f" ({STEEPEST_STRIP:.0%} is the most that a plan lands on)"
     unknown = "no [landing] states its strip: touch-down and way to rest are not judged"
-    yield f"item {last}: lands on {math.degrees(course) % 360.0:.0f}°{wind}; {ground}; {unknown}"
+    yield f"item {last}: lands on {round(math.degrees(course)) % 360}°{wind}; {ground}; {unknown}"

@@ -312,7 +312,7 @@ def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[li
             height = climb * run
             needed = np.minimum(site.problem.certified.clearance, _IN_HAND * height)
             room = (site.home[2] + height - low - needed)[run > _LAUNCH_RUN]
-            where = f"on {math.degrees(course) % 360.0:.0f}°"
+            where = f"on {round(math.degrees(course)) % 360}°"
             if not (room >= 0.0).all():
                 worst = float(np.nanmin(room)) if not np.isnan(room).all() else -math.inf
                 k = int(np.argmin(np.where(np.isnan(room), math.inf, room)))
@@ -392,7 +392,7 @@ def _descent(site: _Site, strip: LandingStrip, final: FinalLaw) -> tuple[Descent
             continue
         go_around = _go_around(site, one)
         if go_around is None:
-            why = f"no height would do for a go-around on {math.degrees(one.course) % 360.0:.0f}°"
+            why = f"no height would do for a go-around on {round(math.degrees(one.course)) % 360}°"
             continue
         return Descent(corners, one.line_up, point, one.course, one.height / one.length, go_around), ""
     return None, why
@@ -404,7 +404,7 @@ def _rough(terrain: Terrain, strip: LandingStrip, course: float) -> str:
         if math.isnan(slope):
             return "the ground of the strip is not known to its ends"
         if abs(slope) > STEEPEST_STRIP:
-            on = f"on {math.degrees(course) % 360.0:.0f}°"
+            on = f"on {round(math.degrees(course)) % 360}°"
             return f"the strip slopes by {abs(slope):.0%} {name} it {on}; at most {STEEPEST_STRIP:.0%} can be landed on"
     return ""
 
@@ -431,7 +431,7 @@ def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law:
             why = max(why, (margin, f"a final of {length:.0f} m at {math.degrees(slope):.1f}° {blocked}"))
         else:
             found.append(made)
-    return found, f"on {math.degrees(course) % 360.0:.0f}° {why[1]}"
+    return found, f"on {round(math.degrees(course)) % 360}° {why[1]}"
 
 
 def _line_up(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
@@ -495,7 +495,7 @@ def _way_down(site: _Site, final: _Final) -> tuple[Floats | None, str]:
                 nearest.add(found)
             if nearest.tried >= _CERTIFIED:
                 break
-    where = f"from the destination to the final on {math.degrees(final.course) % 360.0:.0f}°"
+    where = f"from the destination to the final on {round(math.degrees(final.course)) % 360}°"
     if not nearest.tried:
         return None, f"no way {where} is long enough for its turns and {high - goal:.0f} m of descent"
     remedy = "a higher destination (height_m) or another strip may have one"

@@ -158,7 +158,7 @@ def _launch(requirements: RouteRequirements) -> _Launch:
     )
     if stated is None or stated.course is None:
         return along
-    way = f"on the launch course {math.degrees(stated.course) % 360.0:.0f}°"
+    way = f"on the launch course {round(math.degrees(stated.course)) % 360}°"
     if abs(float(wrap(stated.course - along.course))) <= PLAN_TOLERANCE:
         return along._replace(way=way)
     return _Launch(stated.course, math.inf, 0.0, way)

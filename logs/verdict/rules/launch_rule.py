@@ -18,7 +18,7 @@ from logs.verdict.measures.route_requirements import FlownGround, RouteRequireme
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import Way, entered_by_way, track_way, way_clearance
 from logs.verdict.rule import Margin, Rule, located
-from logs.verdict.tolerances import LAUNCH_ROOM, LAUNCH_RUN, LAUNCH_SINK, RUNWAY_ROOM, TOUCHED
+from logs.verdict.tolerances import CLIMB_ERROR, LAUNCH_ROOM, LAUNCH_RUN, LAUNCH_SINK, RUNWAY_ROOM, TOUCHED
 from logs.verdict.wording import gentle_launch_text, shortened
 
 Floats = NDArray[np.float64]
@@ -61,10 +61,12 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     if entered:
         faults.append(message(f"the climb enters {entered}"))
     known = _described(take_off, track, run, room)
+    if LAUNCH_ROOM <= room < LAUNCH_ROOM + CLIMB_ERROR:
+        known.insert(0, f"{room:.1f} m above ground {where:.0f} m from home, nearer than the law's climb is known")
     return make_finding(
         "launch",
         requirements.waypoint(take_off.waypoint),
-        ok=False if faults else None if math.isnan(room) else True,
+        ok=False if faults else None if math.isnan(room) or room < LAUNCH_ROOM + CLIMB_ERROR else True,
         reason=reason_of(faults, known),
         faults=faults,
         flown=room,
@@ -91,7 +93,8 @@ def _room(requirements: RouteRequirements, way: Way) -> tuple[float, float]:
     take_off = None if requirements.ground is None else requirements.ground.ways.take_off
     if take_off is not None and take_off.launch.method == "runway":
         standing = float(position[0, 2] - take_off.home[2])
-        over = position[:, 2] - terrain.height(position[:, 0], position[:, 1]) > standing + LAUNCH_ROOM
+        above = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+        over = above > standing + LAUNCH_ROOM + CLIMB_ERROR
         first = max(first, float(run[int(np.argmax(over))]) if over.any() else float(run[-1]))
     if run[-1] <= first:
         return math.inf, math.nan
@@ -111,15 +114,15 @@ def _runway_left(requirements: RouteRequirements, take_off: TakeOff, position: F
 
 def _described(take_off: TakeOff, track: Track, run: Floats, room: float) -> list[str]:
     """The take-off in words."""
-    course, method = math.degrees(take_off.course) % 360.0, take_off.launch.method
-    known = [f"launched on a runway on {course:.0f}°"]
+    course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
+    known = [f"launched on a runway on {course}°"]
     if method != "runway":
         how = "from a catapult" if method == "catapult" else "by hand"
-        known = [f"launched {how} on {course:.0f}° at {take_off.speed:.1f} m/s, {take_off.acceleration:.1f} m/s²"]
+        known = [f"launched {how} on {course}° at {take_off.speed:.1f} m/s, {take_off.acceleration:.1f} m/s²"]
     if run[-1] > 1.0:
         rise = float(track.position[-1, 2] - track.position[0, 2])
-        course = math.degrees(math.atan2(*track.velocity[-1, :2].tolist())) % 360.0
-        known.append(f"climbs at {rise / run[-1]:.2f}, at last on {course:.0f}°")
+        course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
+        known.append(f"climbs at {rise / run[-1]:.2f}, at last on {course}°")
     if math.isnan(room):
         known.append("the ground below the climb is not known")
     elif math.isfinite(room):
@@ -132,7 +135,7 @@ RULE = Rule(
     title="launch",
     asks="Does the launch start the motor, leave its runway in time, lose no height, and climb out free of obstacles?",
     margin=Margin("height above ground", "m", 10.0),
-    tolerances=("LAUNCH_RUN", "LAUNCH_ROOM", "LAUNCH_SINK", "RUNWAY_ROOM", "TOUCHED", "ROUNDING"),
+    tolerances=("LAUNCH_RUN", "LAUNCH_ROOM", "CLIMB_ERROR", "LAUNCH_SINK", "RUNWAY_ROOM", "TOUCHED", "ROUNDING"),
     judge=launch_findings,
     phrase=lambda item: located("launch", item, shortened(item.brief)),
     unjudged="launch",

@@ -68,7 +68,7 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
         shape = (
             f"{leg}",
             number(float(runs[leg]), digits=0),
-            f"{courses[leg] % 360.0:05.1f}",
+            f"{round(float(courses[leg]), 1) % 360.0:05.1f}",
             number(float(slopes[leg]), signed=True, digits=2),
             number(float(waypoints[leg, 2]), digits=1),
             number(float(waypoints[leg + 1, 2]), digits=1),
@@ -172,7 +172,7 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     def angle(value: float | str) -> str:
         return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
 
-    wind_text = f"{quantity(wind.speed, 'm/s')} from {math.degrees(wind.from_course) % 360.0:03.0f}°"
+    wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
     if wind.gradient:
         gain = number(100.0 * wind.gradient, signed=True)
         wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gain} m/s per 100 m of height"
