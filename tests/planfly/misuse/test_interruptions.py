@@ -45,6 +45,7 @@ PLANNER = 'algorithm = "umda-smooth"\nwaypoints = 10\npopulation = 2000\ngenerat
 PAPER = ("paper", "--problems", "7", "--runs", "3", "--jobs", "2", "--out", "out")
 FLY = ("fly", "long.waypoints", "--scenario", "field.toml", "--log", "f.mcap")
 CAMPAIGN = ("campaign", "round.waypoints", "--scenario", "field.toml", "--workers", "2", "--out", "out")
+WINDS = ("winds", *CAMPAIGN[1:])
 SERVE = ("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")
 
 
@@ -76,7 +77,7 @@ FEW = (
     # Its table is there, which is what an interruption leaves: on a loaded machine it comes late.
     Case(CAMPAIGN, "flying", 3.0, signal.SIGINT, grown="out/campaign.sqlite", size=0),
     # They end as a campaign does.
-    *((Case(("winds", *CAMPAIGN[1:]), "flying", 3.0, signal.SIGINT, grown="out/winds.sqlite", size=0),) if SOAK else ()),
+    *((Case(WINDS, "flying", 3.0, signal.SIGINT, grown="out/winds.sqlite", size=0),) if SOAK else ()),
     *((Case(PAPER, "planning", 1.5, signal.SIGINT),) if SOAK else ()),
     # Kernels are compiled meanwhile.
     Case(("run", "jacksboro", "--out", "out"), "", 4.0, signal.SIGTERM, cold=True),
@@ -98,7 +99,7 @@ EVERY = (
     (*PAPER,),
     (*SERVE,),
     (*CAMPAIGN,),
-    ("winds", *CAMPAIGN[1:]),
+    WINDS,
 )
 
 
