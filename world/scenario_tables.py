@@ -4,7 +4,7 @@ The models mirror the TOML key for key.  `world.scenario_file` reads a file into
 into a `Scenario`.
 """
 
-from typing import Annotated, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
@@ -476,6 +476,8 @@ class HomeTable(PositionTable):
 
 
 LaunchMethod = Literal["catapult", "hand", "runway"]
+# Degrees above level: steeper ground than any strip that is landed on (`world.airfield.STEEPEST_STRIP`) is no runway.
+STEEPEST_RUNWAY = 5.0
 
 
 class LaunchTable(ScenarioTable):
@@ -488,7 +490,7 @@ class LaunchTable(ScenarioTable):
 
     method: LaunchMethod
     course_deg: Course | None = None
-    speed_mps: Annotated[float, within(0.0, 60.0)] | None = None
+    speed_mps: Annotated[float, within(1.0, 60.0)] | None = None
     length_m: Annotated[float, within(0.1, 3000.0)] | None = None
     incline_deg: Annotated[float, within(0.0, 45.0)] | None = None
 
@@ -496,6 +498,8 @@ class LaunchTable(ScenarioTable):
     def _pushed(self) -> "LaunchTable":
         if self.method == "runway" and self.speed_mps is not None:
             raise ValueError(f"speed_mps: {self.speed_mps:g}: not of a runway, where the aircraft's own motor pulls")
+        if self.method == "runway" and (self.incline_deg or 0.0) > STEEPEST_RUNWAY:
+            raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{STEEPEST_RUNWAY:g} of a runway")
         return self
 
 
@@ -531,6 +535,13 @@ class RallyTable(PointTable):
         return self
 
 
+def _autoland(value: Any) -> Any:
+    """A value of RTL_AUTOLAND: true and 1.0 are none, though either equals 1."""
+    if type(value) is not int or value not in (1, 2, 3):
+        raise ValueError("allowed 1, 2 or 3")
+    return value
+
+
 # What a scenario may ask of the way home from everywhere: that RTL is safe; that a glide without the engine leads
 # somewhere; that a landing may be aborted.
 ReturnDemand = Literal["rtl", "glide", "go_around"]
@@ -548,12 +559,12 @@ class ReturnsTable(ScenarioTable):
 
     require: list[ReturnDemand] | None = None
     rtl_altitude_m: Annotated[float, within(1.0, 9000.0)] | None = None
-    rtl_autoland: Literal[1, 2, 3] | None = None
+    rtl_autoland: Annotated[Literal[1, 2, 3], BeforeValidator(_autoland)] | None = None
     rally: Annotated[list[RallyTable], Field(min_length=1, max_length=100)] | None = None
 
     @model_validator(mode="after")
     def _says_something(self) -> "ReturnsTable":
-        if all(one is None for one in (self.require, self.rtl_altitude_m, self.rtl_autoland, self.rally)):
+        if not self.require and all(one is None for one in (self.rtl_altitude_m, self.rtl_autoland, self.rally)):
             raise ValueError("require: missing; give require, rtl_altitude_m, rtl_autoland or rally")
         if self.require is not None and len(set(self.require)) < len(self.require):
             raise ValueError(f"require: {', '.join(self.require)}: each is expected once")

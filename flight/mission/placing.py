@@ -65,7 +65,8 @@ class PlacedMission:
     landing_ground: height of the place to land at, m, NaN where it is not known or nothing lands.
     return_places: home, at the height that heights over home count from, and then the rally points; empty where the
         mission does not end with a return.
-    landings: the landing sequences that such a return may go on to.
+    landings: the landing sequences that such a return may go on to, and is flown on to.
+    landing_starts: where all landing sequences begin, those that no return is flown on to among them.
     """
 
     mission: Mission
@@ -77,6 +78,7 @@ class PlacedMission:
     landing_ground: float
     return_places: tuple[ReturnPlace, ...] = ()
     landings: tuple[PlacedLanding, ...] = ()
+    landing_starts: tuple[LandingStart, ...] = ()
 
 
 def place_stops(
@@ -111,9 +113,19 @@ def place_stops(
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
     landing_ground = heights.touchdown(itinerary)
     places = _return_places(mission, itinerary.home, origin, heights) if itinerary.returns else ()
-    landings = _landings(mission, origin, heights) if itinerary.returns else ()
+    marked = tuple(_marked_starts(mission, origin, heights)) if itinerary.returns else ()
+    landings = _landings(mission, origin, heights, marked)
     return PlacedMission(
-        mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground, places, landings
+        mission,
+        origin,
+        itinerary,
+        tuple(stops),
+        notes.lines(),
+        takeoff_ground,
+        landing_ground,
+        places,
+        landings,
+        tuple(start for _, start in marked),
     )
 
 
@@ -172,10 +184,12 @@ def _marked_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> 
         yield k, place._replace(mark=counted, onward=onward)
 
 
-def _landings(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> tuple[PlacedLanding, ...]:
+def _landings(
+    mission: Mission, origin: GeoOrigin, heights: "_Heights", marked: Sequence[tuple[int, LandingStart]]
+) -> tuple[PlacedLanding, ...]:
     """The landing sequences of a mission; those that begin with the landing, or cannot be placed, are none."""
     found = []
-    for k, start in _marked_starts(mission, origin, heights):
+    for k, start in marked:
         if start.lands:
             continue
         try:

@@ -84,6 +84,8 @@ def nearest_landing(here: Place, landings: Sequence[LandingStart]) -> LandingSta
     return min(landings, key=lambda one: math.dist(here, one.mark), default=None)
 
 
+# What is noted of a return that the autopilot flies on to a landing sequence, and its route does not.
+RETURN_NOT_FLOWN_ON = "the return is not flown on to it"
 # A turn whose tangent is shorter than this (m) is none.
 _NO_TURN = 1.0
 # A return goes on from its circle within so much of its height, m.

@@ -25,6 +25,7 @@ from flight.mission.loiter_circles import (
 )
 from flight.mission.placing import HIGHEST, LOWEST, SAME_PLACE, PlacedLanding, PlacedMission, place_stops
 from flight.mission.return_path import (
+    RETURN_NOT_FLOWN_ON,
     USUAL_RULES,
     ReturnAbility,
     ReturnCircle,
@@ -398,24 +399,32 @@ def _straight_to_land(
     placed: PlacedMission, kept: list[PlacedStop], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
     """The landing sequence that a return flies to at once; None where it does not.  kept: the stops before it."""
-    if rules.lands != "straight" or not placed.landings or not kept:
+    if rules.lands != "straight" or not kept:
         return None
     east, north, up = kept[-1].position.tolist()
-    landing = _nearest(placed, (east, north, up))
+    landing = _nearest(placed, (east, north, up), notes)
+    if landing is None:
+        return None
     away, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
     text = f"at once to the landing sequence at item {landing.start.item}, {away / 1000.0:.1f} km away"
     notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_of_several(placed)}", seq)
     return landing
 
 
-def _nearest(placed: PlacedMission, here: tuple[float, float, float]) -> PlacedLanding:
-    """The landing sequence that a return goes to from a place, m."""
-    start = nearest_landing(here, [one.start for one in placed.landings])
-    return next(one for one in placed.landings if one.start == start)
+def _nearest(placed: PlacedMission, here: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
+    """The landing sequence that a return goes to from a place, m; None where it is not flown there, which is noted."""
+    start = nearest_landing(here, placed.landing_starts)
+    landing = next((one for one in placed.landings if one.start == start), None)
+    if start is not None and landing is None:
+        why = "begins with the landing itself" if start.lands else "does not lead to a landing"
+        text = f"the landing sequence at item {start.item} {why}: {RETURN_NOT_FLOWN_ON}"
+        notes.add(text, placed.itinerary.stops[-1].item)
+    return landing
 
 
 def _of_several(placed: PlacedMission) -> str:
-    return f" (the nearest of {len(placed.landings)}, height counted)" if len(placed.landings) > 1 else ""
+    count = len(placed.landing_starts)
+    return f" (the nearest of {count}, height counted)" if count > 1 else ""
 
 
 def _note_circles(itinerary: Itinerary, kept: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
@@ -462,7 +471,7 @@ def _lay_return(
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
     )
-    landing = _nearest(placed, target.position) if rules.lands == "circle" and placed.landings else None
+    landing = _nearest(placed, target.position, notes) if rules.lands == "circle" else None
     onward = "" if landing is None else f"the landing sequence at item {landing.start.item}{_of_several(placed)}"
     notes.add(described_return(target, rules, here[2], onward), stop.item)
     if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):

@@ -12,7 +12,7 @@ from planfly.terminal.command_parser import coloured
 # Findings of a rule that are named, beside the worst of those that fail.
 _LISTED = 6
 # Sources of a limit that are named beside it; any other limit is a check of planfly's own.
-_LIMIT_SOURCES = ("scenario", "aircraft", "autopilot", "mission")
+_LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "mission")
 # Width of the column of rules.
 _TITLES = 2 + max(len(rule.title) for rule in RULES.values())
 

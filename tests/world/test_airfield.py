@@ -128,7 +128,12 @@ CASES = {
     "home outside": ("[home]\neast_m = 5001\nnorth_m = 0", "home: east 5001 m: outside the area -5000..5000"),
     "a launch by rocket": (HOME + '[launch]\nmethod = "rocket"', 'launch.method: "rocket": Input should be'),
     "a launch without a method": (HOME + "[launch]\nspeed_mps = 20", "launch.method: Field required"),
-    "a launch too fast": (HOME + '[launch]\nmethod = "hand"\nspeed_mps = 61', "launch.speed_mps: 61: allowed 0..60"),
+    "a launch too fast": (HOME + '[launch]\nmethod = "hand"\nspeed_mps = 61', "launch.speed_mps: 61: allowed 1..60"),
+    "a launch without speed": (HOME + '[launch]\nmethod = "hand"\nspeed_mps = 0', "launch.speed_mps: 0: allowed 1..60"),
+    "a runway up a wall": (
+        HOME + '[launch]\nmethod = "runway"\nincline_deg = 5.1',
+        "launch: incline_deg: 5.1: allowed 0..5 of a runway",
+    ),
     "a runway that pushes": (
         HOME + '[launch]\nmethod = "runway"\nspeed_mps = 20',
         "launch: speed_mps: 20: not of a runway, where the aircraft's own motor pulls",
@@ -145,7 +150,10 @@ CASES = {
     "returns that ask nothing": (
         "[returns]", "returns: require: missing; give require, rtl_altitude_m, rtl_autoland or rally",
     ),
-    "a return that does not arm": ("[returns]\nrtl_autoland = 0", "returns.rtl_autoland: 0: Input should be 1, 2 or 3"),
+    "returns that require nothing": ("[returns]\nrequire = []", "returns: require: missing; give require"),
+    "a return that does not arm": ("[returns]\nrtl_autoland = 0", "returns.rtl_autoland: 0: allowed 1, 2 or 3"),
+    "a true number": ("[returns]\nrtl_autoland = true", "returns.rtl_autoland: true: allowed 1, 2 or 3"),
+    "a number that is not whole": ("[returns]\nrtl_autoland = 2.0", "returns.rtl_autoland: 2.0: allowed 1, 2 or 3"),
     "a return underground": ("[returns]\nrtl_altitude_m = -1", "returns.rtl_altitude_m: -1: allowed 1..9000"),
     "rally without a height": (
         "[returns]\nrally = [{east_m = 0, north_m = 0}]",

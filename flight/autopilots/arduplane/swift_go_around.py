@@ -130,7 +130,7 @@ def fly_go_arounds(
         )  # fmt: skip
         return way[: int(flown[k]["rows"])].copy()
 
-    ways, chosen = [], []
+    found = []
     for k in range(len(starts)):
         way, landing = fly(k, landings[0]), landings[0]
         # Until its climb is over it flies to none of them.
@@ -138,9 +138,8 @@ def fly_go_arounds(
         nearest = nearest_landing((float(over[0]), float(over[1]), float(over[2])), landings)
         if nearest is not None and nearest != landing:
             way, landing = fly(k, nearest), nearest
-        ways.append(way)
-        chosen.append(landing)
-    return GoArounds(flown, tuple(ways), tuple(chosen))
+        found.append((way, landing))
+    return GoArounds(flown, tuple(way for way, _ in found), tuple(landing for _, landing in found))
 
 
 def _climbing(parameters: ArduPilotParameters, pitch: float) -> Record:

@@ -87,7 +87,8 @@ class _Asked(NamedTuple):
 def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
     """Homes and landing points, m, by the legs that lead away from a take-off that is flown, and to a landing.
 
-    To a landing lead those from DO_LAND_START on, or else the last two.
+    To a landing lead those from DO_LAND_START on, or else the last two; of them the final, and those from the last
+    waypoint on that is as high above ground as the limit asks.
     """
     setup, ground = requirements.setup, requirements.ground
     ways = setup.ground_ways if ground is None else ground.ways
@@ -102,9 +103,24 @@ def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float
             after = np.flatnonzero(setup.route.items > begun)
             first = max(0, int(after[0]) - 1) if after.size else first
         point = (float(ways.approach.point[0]), float(ways.approach.point[1]))
-        for leg in range(first, ways.approach.leg + 1):
+        for leg in range(max(first, _last_high(requirements, ways.approach.leg)), ways.approach.leg + 1):
             near[leg] = (*near.get(leg, ()), point)
     return near
+
+
+def _last_high(requirements: RouteRequirements, final: int) -> int:
+    """The last waypoint up to where a final begins that is as high above ground as the limit asks; that for none."""
+    terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.waypoints[: final + 1]
+    if terrain is None:
+        return final
+    over = waypoints[:, 2] - terrain.height(waypoints[:, 0], waypoints[:, 1])
+    high = np.flatnonzero(over >= requirements.limits.min_clearance - CLEARANCE_TOLERANCE)
+    return int(high[-1]) if high.size else final
+
+
+def _source(requirements: RouteRequirements, limit: float) -> str:
+    """Whose a limit (m) is."""
+    return "near the field" if limit < requirements.limits.min_clearance else requirements.limits_source
 
 
 def _less_error(clearance: float, limit: float, error: float | None) -> str:
@@ -130,7 +146,7 @@ def _planned_clearance(
         reason=reason + _less_error(planned, limit, error),
         planned=planned,
         limit=limit,
-        source=requirements.limits_source,
+        source=_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE,
         margin=planned - limit,
         unit="m",
@@ -179,7 +195,7 @@ def _flown_clearance(
         planned=planned,
         flown=least,
         limit=limit,
-        source=requirements.limits_source,
+        source=_source(requirements, limit),
         tolerance=CLEARANCE_TOLERANCE,
         margin=least - limit,
         unit="m",

@@ -15,8 +15,9 @@ import numpy as np
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Command
 from flight.mission.itinerary import UNLIMITED
+from flight.mission.return_path import RETURN_NOT_FLOWN_ON
 from flight.simulation.tick import AT_HEIGHT, NEAR, WIDER
-from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding
+from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -168,13 +169,22 @@ def _finding(requirements: RouteRequirements, ok: bool | None, outcome: str) -> 
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     told = next((note.partition(name)[2] for note in route.notes if name in note), "")
+    reason = f"by {requirements.setup.autopilot.title}'s law: {told}; {outcome}"
+    other = next((note.partition(": ")[2] for note in route.notes if RETURN_NOT_FLOWN_ON in note), "")
+    faults = []
+    if other and requirements.setup.source is None:
+        # What was flown instead says nothing of where the autopilot goes.
+        faults, ok = [message("where the return leads to is not known", f": {other}")], None
+        reason = f"{faults[0].text}; {reason}"
     return [
         make_finding(
             "return",
             requirements.waypoint(route.return_from + 1),
             ok=ok,
-            reason=f"by {requirements.setup.autopilot.title}'s law: {told}; {outcome}",
+            reason=reason,
+            faults=faults,
             method="the autopilot's own way back",
+            check=UNKNOWN_RETURN if faults else "",
         )
     ]
 

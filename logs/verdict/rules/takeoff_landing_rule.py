@@ -8,6 +8,7 @@ is not judged: a climb-out of 30 degrees is what QGroundControl draws (its Takeo
 import math
 
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
+from flight.mission.return_path import RETURN_NOT_FLOWN_ON
 from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -92,6 +93,8 @@ def landing_findings(
         if not items:
             return []
         reason = f"{command_name(items[-1].command)} has no place of its own on the route"
+        if requirements.setup.route.return_from >= 0:
+            reason = RETURN_NOT_FLOWN_ON
         return [make_finding("landing", requirements.waypoint(requirements.legs), ok=None, reason=reason, unit="deg")]
     at, ground = found[-1], requirements.setup.route.landing_ground
     return [_slope(requirements, "landing", at - 1, at, float(requirements.points[at - 1, 2]), ground)]

@@ -13,9 +13,12 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
+from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.places import FLIGHT
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
+from tests.logs.verdict.rules.test_ground_ways_rule import with_arduplane
+from tests.mission_lines import setup_of, wp
 from tests.synthetic import (
     bump,
     edited,
@@ -23,6 +26,7 @@ from tests.synthetic import (
     make_scenario,
     make_setup,
 )
+from world.airfield import LandingStrip
 from world.errors import ScenarioError
 from world.scenario_file import parse_scenario
 
@@ -159,3 +163,23 @@ def test_where_a_flight_leaves_the_known_terrain_is_told(high: float, ok: bool |
     assert north == pytest.approx(int(np.flatnonzero(np.isnan(known))[0]), abs=2.0)
     planned = of(judge_geometry(cut), "clearance", leg(0))
     assert (planned.ok, planned.planned) == (None, None)
+
+
+def test_less_height_is_asked_for_near_a_field_only_after_the_last_high_waypoint() -> None:
+    """100 m are required: of a landing sequence at 30 m only the final has 20 m, and what follows a place at 100 m."""
+    mark = "3 189 0 0 0 0 0 0 0"
+
+    def judged(*heights: float) -> dict[int, Finding]:
+        ways = [wp(0, 2000 - 400 * k, up) for k, up in enumerate(heights)]
+        lines = (wp(0, 5000, 30), mark, *ways, wp(0, 300, 0, command=21))
+        setup = setup_of(*lines, home="36.5 -84.2 100", limits={"min_clearance_m": 100.0})
+        field = replace(setup.scenario, landing=LandingStrip(0.0, 300.0, math.pi, 400.0))
+        verdict = judge_geometry(with_arduplane(replace(setup, scenario=field)))
+        return {one.place.index: one for one in verdict.findings if one.rule == "clearance"}
+
+    low = judged(30.0, 30.0, 30.0)
+    assert [low[k].ok for k in sorted(low)] == [False, False, False, True]
+    assert [low[k].limit for k in (0, 2, 3)] == [100.0, 100.0, 20.0]
+    assert (low[2].limit_source, low[3].limit_source) == ("default", "near the field")
+    high = judged(100.0, 60.0, 30.0)
+    assert [high[k].limit for k in sorted(high)] == [100.0, 20.0, 20.0, 20.0]

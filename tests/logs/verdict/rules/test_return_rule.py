@@ -165,6 +165,23 @@ def test_a_planned_return_is_told_and_not_judged() -> None:
     assert "not flown yet" in found.reason
 
 
+@pytest.mark.parametrize("autoland", [1, 2])
+def test_a_return_that_goes_on_to_what_is_not_flown_is_left_open(autoland: int) -> None:
+    """A landing sequence that begins with the landing: no other is flown in its place, however far that is."""
+    lands = ("3 189 0 0 0 0 0 0 0", wp(0, 1500, 0, command=21))
+    flown_on = ("3 189 0 0 0 0 0 0 0", wp(5300, 1500, 60), wp(5300, 0, 0, command=21))
+    for after in (lands, (*lands, *flown_on)):
+        setup = by_arduplane(setup_of(*WAY, *after, home=HOME), RTL_AUTOLAND=autoland)
+        verdict = judge_geometry(setup)
+        assert verdict.undecided
+        assert verdict.headline == "not judged in full: where the return leads to is not known"
+        assert "item 5 begins with the landing itself" in of(verdict, "return").reason
+        assert of(verdict, "landing").reason == "the return is not flown on to it"
+    # As without RTL_AUTOLAND, and as to a sequence that can be flown, nothing is open.
+    assert not judge_geometry(by_arduplane(setup_of(*WAY, *lands, home=HOME), RTL_AUTOLAND=0)).undecided
+    assert not judge_geometry(by_arduplane(setup_of(*WAY, *flown_on, home=HOME), RTL_AUTOLAND=autoland)).undecided
+
+
 def test_a_return_to_a_wide_circle_comes_to_its_end() -> None:
     """Once around takes 6 minutes, and it comes to its circle before where that is drawn to begin."""
     verdict, ended = flown(by_arduplane(setup_of(*WAY, home=HOME), RTL_RADIUS=1500.0))
