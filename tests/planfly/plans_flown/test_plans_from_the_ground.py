@@ -200,7 +200,7 @@ def harm_of_flight(scenario: Scenario, point: Floats, flown: Floats) -> tuple[st
     gone = np.hypot(*(flown[:, :2] - flown[0, :2]).T) > 150.0
     on_way = room[(away > 150.0) & (np.cumsum(gone) > 0)]
     faults = []
-    if on_way.min(initial=math.inf) < 1.0:
+    if on_way.min(initial=math.inf) < 3.0:
         faults.append(f"{on_way.min():.1f} m above ground on its way")
     if room.min() < -0.5:
         faults.append("in the ground")
