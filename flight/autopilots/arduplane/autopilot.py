@@ -162,7 +162,7 @@ class ArduPlane(Autopilot):
 
         >>> made = ArduPlane(default_parameters()).as_asked(180.0, None, lands=True, lower=50.0)
         >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland, round(made.parameters.landing_pitch_max, 4)
-        (180.0, 1.0, 0.0175)
+        (180.0, 1.0, -0.0175)
         """
         values = {} if rtl_altitude is None else {"RTL_ALTITUDE": rtl_altitude}
         stated = self.parameters.by_origin("file")
@@ -344,7 +344,7 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
 
 
 # A field that is lower than home by more than this (m) has a flare that rises; so high (degrees) the nose may be in it.
-_LOWER, _NOSE_DOWN = 3.0, 1.0
+_LOWER, _NOSE_DOWN = 3.0, -1.0
 # Faster than this share of its slowest flight no aircraft touches the ground with its nose, its tail or a wing.
 _TURNOVER_SHARE = 0.75
 # Faster over the ground than this ArduPlane knows its course, m/s.

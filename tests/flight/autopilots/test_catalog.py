@@ -77,7 +77,7 @@ def test_what_a_scenario_asks_of_its_returns_and_a_file_denies_is_refused(tmp_pa
             load_autopilot(scenario, AEROSONDE)
 
 
-@pytest.mark.parametrize(("lower", "file", "most"), [(3.5, "", 1.0), (2.5, "", 10.0), (3.5, "TECS_LAND_PMAX 7", 7.0)])
+@pytest.mark.parametrize(("lower", "file", "most"), [(3.5, "", -1.0), (2.5, "", 10.0), (3.5, "TECS_LAND_PMAX 7", 7.0)])
 def test_on_a_lower_field_the_nose_is_held_down_in_the_flare(lower: float, file: str, most: float) -> None:
     made = ArduPlane(parameters_of(f"RTL_AUTOLAND 2\n{file}\n", "mine.parm"))
     asked = made.as_asked(None, None, lands=True, lower=lower)
@@ -96,7 +96,7 @@ def test_a_field_is_as_much_lower_as_the_ground_is_there() -> None:
     home = np.array([*there, float(scenario.terrain.height(*there))])
     strip = replace(scenario.landing, east=float(scenario.home[0]), north=float(scenario.home[1]))
     back = arduplane(replace(scenario, home=home, landing=strip))
-    assert back.parameters.landing_pitch_max == pytest.approx(math.radians(1.0))
+    assert back.parameters.landing_pitch_max == pytest.approx(math.radians(-1.0))
 
 
 def test_a_name_that_is_not_listed_is_one_line() -> None:
