@@ -77,7 +77,7 @@ STALL_SHARE = (0.35, 0.87)  # stall by cruise
 TOP_SHARE = (1.05, 2.5)  # top by cruise
 LIFT_RANGE = (0.5, 2.4)  # lift coefficient at the stall
 ASPECT_RANGE = (2.5, 25.0)  # span^2 / area
-MOST_BATTERY = 300.0 * 3600.0  # J by the aircraft's mass, kg: no cell that is sold holds more by its own
+MAX_BATTERY = 300.0 * 3600.0  # J by the aircraft's mass, kg: no cell that is sold holds more by its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +158,7 @@ WINDMILL = 0.5
 # The Aerosonde's motor by its power and volts at full throttle in cruise: R P / V^2 and i0 V / P.
 _RESISTANCE_SHARE, _IDLE_SHARE = 0.026, 0.055
 # Of a propeller: least diameter, m, and largest by the span.
-_LEAST_DIAMETER, _DIAMETER_SHARE = 0.06, 0.6
+_MIN_DIAMETER, _DIAMETER_SHARE = 0.06, 0.6
 # An engine's propeller by the span, at most.
 _USUAL_SHARE = 0.18
 # An engine's friction by its largest torque.
@@ -201,8 +201,8 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         raise _refused("fuel", sheet.fuel, "goes without --battery and --motor", "kg")
     if sheet.fuel > 0.6 * sheet.mass:
         raise _refused("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
-    if not sheet.fuelled and sheet.energy > MOST_BATTERY * sheet.mass:
-        most = MOST_BATTERY / 3600.0
+    if not sheet.fuelled and sheet.energy > MAX_BATTERY * sheet.mass:
+        most = MAX_BATTERY / 3600.0
         allowed = f"allowed up to {most * sheet.mass:g} Wh with a mass of {sheet.mass:g} kg, {most:g} Wh/kg"
         raise _refused("battery", sheet.energy / 3600.0, allowed, "Wh")
     return sheet
@@ -449,7 +449,7 @@ def _solved(stated: DataSheet, sheet: DataSheet, drag: Drag, wanted: list[str]) 
         return [_amiss(motor, sheet, drag, name) for name in wanted]
 
     motor = made(_meet(amiss, len(wanted), sheet))
-    if not _LEAST_DIAMETER <= motor.propeller.diameter <= _DIAMETER_SHARE * sheet.span:
+    if not _MIN_DIAMETER <= motor.propeller.diameter <= _DIAMETER_SHARE * sheet.span:
         raise _no_propeller(sheet)
     return motor, _flown(sheet, motor, drag)
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from planfly.targets import MOST_BY_PROGRAM
+from planfly.targets import MAX_BY_PROGRAM
 from world.errors import ArgumentError
 
 
@@ -68,7 +68,7 @@ RANGES: Mapping[str, Range] = {
     "flights": Range(1, 10_000_000, "a whole number from 1 to 10,000,000 is expected", integer=True),
     "index": Range(0, 10**9 - 1, "a flight's index is expected, from 0", integer=True),
     "directions": Range(4, 72, "4 to 72 is expected", integer=True),
-    "points": Range(1, MOST_BY_PROGRAM, f"1 to {MOST_BY_PROGRAM} returns are expected", integer=True),
+    "points": Range(1, MAX_BY_PROGRAM, f"1 to {MAX_BY_PROGRAM} returns are expected", integer=True),
     "every": Range(0.1, 3600.0, "seconds from 0.1 to 3,600 are expected"),
     "most": Range(1.0, 40.0, "m/s from 1 to 40 are expected"),
     "margin": Range(0.0, 100.0, "km, from 0 to 100, are expected"),

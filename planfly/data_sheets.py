@@ -48,7 +48,7 @@ _TAKEN = (
     *("AIRSPEED_CRUISE", "AIRSPEED_MIN", "AIRSPEED_MAX", "TRIM_THROTTLE"),
     *("TECS_CLMB_MAX", "TECS_SINK_MIN", "ROLL_LIMIT_DEG"),
 )
-_STALL_BY_LEAST = 1.2
+_MIN_BY_STALL = 1.2
 
 
 def stated_parameters(file: Path) -> dict[str, float]:
@@ -84,7 +84,7 @@ def with_parameters(sheet: DataSheet, stated: Mapping[str, float]) -> DataSheet:
     made = replace(
         sheet,
         cruise=sheet.cruise or stated.get("AIRSPEED_CRUISE", 0.0),
-        stall=sheet.stall or stated.get("AIRSPEED_MIN", 0.0) / _STALL_BY_LEAST,
+        stall=sheet.stall or stated.get("AIRSPEED_MIN", 0.0) / _MIN_BY_STALL,
         bank=sheet.bank or math.radians(stated.get("ROLL_LIMIT_DEG", 0.0)),
         trim_throttle=sheet.trim_throttle or 0.01 * stated.get("TRIM_THROTTLE", 0.0),
         sink=sheet.sink or stated.get("TECS_SINK_MIN", 0.0),
@@ -254,7 +254,7 @@ def change_of(more: Floats, less: Floats, middle: Floats) -> Floats:
 # The folder.
 
 # Least airspeed that guidance may use, by the stall's, and the largest by level flight's fastest.
-LEAST_SPEED, MOST_SPEED = 1.12, 0.95
+MIN_SPEED, MAX_SPEED = 1.12, 0.95
 _MAX_PITCH_DEG = 25.0
 
 
@@ -311,8 +311,8 @@ def _files(made: SizedAircraft, name: str, place: Path, stated: Mapping[str, flo
     flown = performance_of(Fdm(aircraft, tried=True), aircraft)
     # The propeller carries a little at the stall; the sheet's counts where the model could fly slower.
     slow = max(sheet.stall, math.ceil(10.0 * flown.slowest.airspeed * math.sqrt(SHEET_DENSITY / SEA_LEVEL)) / 10.0)
-    least = min(max(slow, LEAST_SPEED * slow), sheet.cruise)
-    most = max(sheet.cruise, MOST_SPEED * flown.fastest.airspeed)
+    least = min(max(slow, MIN_SPEED * slow), sheet.cruise)
+    most = max(sheet.cruise, MAX_SPEED * flown.fastest.airspeed)
     metadata = _metadata(made, slow, round(least, 1), math.floor(10.0 * most) / 10.0)
     (draft / f"{name}.toml").write_text(metadata, encoding="utf-8")
     aircraft = read_aircraft(draft)

@@ -41,13 +41,13 @@ SURVEY_FILES = (
     "parameter.param",
 )
 # Returns that a program may fly, at the most.
-MOST_BY_PROGRAM = 20
+MAX_BY_PROGRAM = 20
 # What `planfly.returns` may write.
 RETURN_FILES = (
     *(f"{name}.png" for name in ("returns", "worst-returns", "return-heights", "glide")),
     "returns.kml",
     "returns.mcap",
-    *(f"worst-return-{k}{suffix}" for k in range(1, MOST_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
+    *(f"worst-return-{k}{suffix}" for k in range(1, MAX_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
 )
 # Stretches of a flight that are flown again, and what is written of each: of those after the first with its number.
 REFLOWN = 9

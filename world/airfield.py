@@ -36,7 +36,7 @@ _INCLINE: dict[LaunchMethod, float] = {
 }
 # Steepest ground (m per m) along and across a strip; and this much of it at least is looked at on either, m.
 STEEPEST_STRIP = 0.10
-_LEAST_LOOKED_AT = 60.0
+_MIN_LOOKED_AT = 60.0
 # A catapult leaves so much of the slowest level flight, as catapults are set; an arm throws at this speed, m/s.
 _CATAPULT_SHARE, _THROW = 1.2, 10.0
 
@@ -133,7 +133,7 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
     NaN where the ground is not known to the ends.
     """
     found = []
-    for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_LEAST_LOOKED_AT, strip.width))):
+    for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_LOOKED_AT, strip.width))):
         away = 0.5 * length * np.array([-1.0, 1.0])
         ends = ground.height(strip.east + away * math.sin(heading), strip.north + away * math.cos(heading))
         found.append(float(ends[1] - ends[0]) / length)

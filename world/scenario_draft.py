@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 # Terrain on either side of the straight line, for detours: as a share of the line's length, and its limits, m;
 # less of it where there is no data further away.
-_MARGIN_SHARE, _MARGIN_LEAST, _MARGIN_MOST = 0.3, 1500.0, 15_000.0
+_MARGIN_SHARE, _MIN_MARGIN, _MAX_MARGIN = 0.3, 1500.0, 15_000.0
 _SMALLER = (1.0, 0.5, 0.25, 0.12)
 # Least distance of an end from the edge of the elevation file, and least and greatest distance between the ends, m.
 _EDGE, _NEAREST, _FURTHEST = 100.0, 100.0, 300_000.0
@@ -98,7 +98,7 @@ def make_draft(
         allowed = f"a way that stays within {_HIGHEST:g} degrees of latitude is expected"
         raise ArgumentError.of_argument("destination", destination, allowed, shown=_shown(destination))
     ends = np.array([to_map(origin, *place) for place in (start, destination)])
-    widest = min(max(_MARGIN_SHARE * length, _MARGIN_LEAST), _MARGIN_MOST)
+    widest = min(max(_MARGIN_SHARE * length, _MIN_MARGIN), _MAX_MARGIN)
     highest, box = 0.0, _about(ends, widest)
     if raster is not None:
         box, highest = _ground_about(raster, origin, {"start": start, "destination": destination}, ends, widest)

@@ -18,7 +18,7 @@ from aircraft.identification.regression import fit_with_prior
 Floats = NDArray[np.float64]
 
 # Standard deviation of a sensor's factor as it comes, and of what the method leaves at best.
-SCALE_SD, _LEAST_SD = 0.02, 0.002
+SCALE_SD, _MIN_SD = 0.02, 0.002
 # Nor is the heading known, rad.
 _HEADING_SD = float(np.radians(3.0))
 # Over how long a gust is forgotten, s (MIL-F-8785C, 3.7.3: 290 m at 150 m above ground, at 25 m/s), and the standard
@@ -78,7 +78,7 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     sds = np.concatenate([[SCALE_SD, _HEADING_SD], np.full(2 * len(stretches), _WIND_SD)])
     blocks = np.concatenate([thin.block, thin.block + thin.block.max() + 1])
     fit = fit_with_prior(table, measured, np.zeros(len(sds)), sds, blocks)
-    return 1.0 + float(fit.estimate[0]), float(np.hypot(_LEAST_SD, np.sqrt(fit.covariance[0, 0])))
+    return 1.0 + float(fit.estimate[0]), float(np.hypot(_MIN_SD, np.sqrt(fit.covariance[0, 0])))
 
 
 def _through_air(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:

@@ -44,7 +44,7 @@ FORCE_FLOOR, _CURRENT_FLOOR, FLOOR_SECONDS = 0.015, 0.3, 25.0
 _OWN = np.array([parameter.group == "drag" for parameter in PARAMETERS])
 _STEP = 1e-3
 # Steps of a search at most, and how short the last is, as a share of the prior's standard deviations.
-_MOST_STEPS, _CLOSE = 12, 0.01
+_MAX_STEPS, _CLOSE = 12, 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +171,7 @@ class _Goal:
 def _search(forces: ForwardForces, goal: _Goal, means: Floats, sds: Floats, start: Floats | None = None) -> Fit:
     """Steps of Gauss and Newton from a start, none longer than a standard deviation of the prior."""
     now = means.copy() if start is None else start.copy()
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         force, current = forces.predicted(now)
         rows, second = forces.slopes(now)
         left, blocks = goal.force - force, goal.block

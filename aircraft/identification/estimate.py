@@ -37,7 +37,7 @@ _ROUNDS = 2
 # Share of an interval below which the logs say next to nothing of a parameter.
 SILENT = 0.2
 # An axis whose fit explains less of what is measured keeps its prior.
-LEAST_EXPLAINED = 0.6
+MIN_EXPLAINED = 0.6
 # How much wider than computed the interval of a fast motion is.
 FAST_WIDENING = 2.0
 # Title, unit and samples a second of each equation.
@@ -147,7 +147,7 @@ def _hidden_by_noise(nominal: Estimate, noisier: Estimate) -> Floats:
     made = np.zeros(len(PARAMETERS))
     explained = {one.name: one.explained for one in noisier.equations}
     for axis in AXES if nominal.dynamics else ():
-        if explained[_EQUATIONS[axis][0]] >= LEAST_EXPLAINED:
+        if explained[_EQUATIONS[axis][0]] >= MIN_EXPLAINED:
             own = np.array([parameter.group == axis for parameter in PARAMETERS])
             made[own] = noisier.values[own] - nominal.values[own]
     return made
@@ -236,7 +236,7 @@ def fit_all(
     moments = fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values)) if dynamics else {}
     for axis, fit in moments.items():
         fits[axis] = fit
-        if fit.explained < LEAST_EXPLAINED:
+        if fit.explained < MIN_EXPLAINED:
             # Sensors too noisy, or a structure that the model lacks: the prior stays.
             continue
         count = sum(parameter.group == axis for parameter in PARAMETERS)

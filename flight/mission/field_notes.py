@@ -28,7 +28,7 @@ CALM = 0.05
 # m.  A mission's home this far from the scenario's is another one.
 HOME_APART = 50.0
 # m.  A return circles home this far out at least: with WP_LOITER_RAD 60, circles of up to 260 m were flown.
-LEAST_CIRCLE = 260.0
+MIN_CIRCLE = 260.0
 # Rings and directions that the ground about home is looked at on.
 _RINGS, _DIRECTIONS = 13, 72
 
@@ -110,7 +110,7 @@ def _low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: Return
     """A return to home whose height is below the ground where it circles."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
-    radius = max(LEAST_CIRCLE, abs(rules.radius))
+    radius = max(MIN_CIRCLE, abs(rules.radius))
     angle = np.linspace(0.0, 2.0 * math.pi, _DIRECTIONS, endpoint=False)
     reach = np.linspace(0.0, radius, _RINGS)[:, None]
     ground = scenario.terrain.height(home[0].east + reach * np.sin(angle), home[0].north + reach * np.cos(angle))

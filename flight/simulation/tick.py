@@ -186,7 +186,7 @@ FAR = 100.0
 NEAR, WIDER, AT_HEIGHT = 300.0, 1.3, 20.0
 # However its circles are flown, it is over after so many times the time that it is to circle, and that once around
 # takes, at this ground speed, m/s.
-MOST_CIRCLES, _SLOW = 5.0, 10.0
+MAX_CIRCLES, _SLOW = 5.0, 10.0
 # A mission that ends in a circle about its last waypoint is flown until the course has turned by this, rad: a quarter
 # of a turn onto the circle, and once around.
 AROUND_END = 2.5 * math.pi
@@ -332,7 +332,7 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:  # pragma: no
 @compiled
 def longest_circling(radius: float) -> float:  # pragma: no cover - compiled
     """After how long in its circle (m) a return is over, however that was flown, s."""
-    longest: float = MOST_CIRCLES * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _SLOW)
+    longest: float = MAX_CIRCLES * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _SLOW)
     return longest
 
 

@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 _NUMBERS = ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng", "Alt")
 # Items that a mission can have, and the largest number of one: 16 bits (ArduPilot's log documentation, CMD).
-_MOST = 65535.0
+_MAX_ITEMS = 65535.0
 # ORGN.Type of home; the other is where the estimator's map has its origin.
 _HOME = 1
 
@@ -52,12 +52,12 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
     for row, (stamp, total, frame) in enumerate(zip(time.tolist(), totals, frames, strict=True)):
         number, command, p1, p2, p3, p4, lat, lon, up = (column[row] for column in table)
         # Garbage that looks like a message, or a hostile log: nothing is made for millions of items that are not there.
-        if not (0.0 <= number <= _MOST and math.isfinite(command) and math.isfinite(frame)):
+        if not (0.0 <= number <= _MAX_ITEMS and math.isfinite(command) and math.isfinite(frame)):
             continue
         # A float32 has seven digits; a mission file has six behind the point.
         place = (on_grid(lat), on_grid(lon), round(up, 6))
         item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *place)
-        rows.append(Item(stamp, int(total) if 0.0 <= total <= _MOST else 0, item))
+        rows.append(Item(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
     notes = () if framed else ("the log states no frames: heights are taken as above home",)
     for logged in gather_items(rows):
         made = logged_mission(logged, source, "CMD")

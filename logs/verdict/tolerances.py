@@ -110,7 +110,7 @@ THROUGHOUT = 0.8
 FULL, IDLE, NO_CURRENT = 0.99, 0.01, 0.02
 # Throttle 0..1.  An aircraft's ability is seen at its whole throttle alone: 1 % of the Aerosonde's is 0.6 degrees of
 # climb.
-WHOLE_THROTTLE = 0.999
+FULL_THROTTLE = 0.999
 # s.  Least time over which an ability is measured; how long after the throttle came to its limit; after how long
 # numbers are independent.
 SHOWN_OVER, SETTLED_AFTER, INDEPENDENT = 1.5, 0.5, 0.5
@@ -189,7 +189,7 @@ PHOTO_ASIDE = 0.25
 PHOTO_BANK = math.radians(10.0)
 # Share of the planned height over ground, and m.  So far a photo may be above or below it: what a photo shows, and
 # how much it overlaps, goes with the height.
-PHOTO_HEIGHT, PHOTO_HEIGHT_LEAST = 0.1, 5.0
+PHOTO_HEIGHT, MIN_PHOTO_HEIGHT = 0.1, 5.0
 # rad.  Whoever flies along a line flies on a course within this of the line's.
 PHOTO_COURSE = math.radians(30.0)
 # m.  Steps that a photo line is looked at in.
@@ -211,7 +211,7 @@ LAUNCH_RUN = 50.0
 FIRST_CLIMB = 20.0
 # Share of the steepest climb at the commanded airspeed.  A take-off climbs no less: ArduPlane's of an Aerosonde came to
 # 0.76 of it and more.
-LEAST_CLIMB = 0.7
+MIN_CLIMB = 0.7
 # m.  An aircraft that meets the ground so near before its landing point has landed: on ground that rises by 5 to 8 %
 # ArduPlane touched down 28 to 47 m early.
 EARLY_TOUCH = 60.0

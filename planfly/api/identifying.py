@@ -19,8 +19,8 @@ from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
 from planfly.identification.records import (
-    LEAST_HZ,
     LEFT,
+    MIN_HZ,
     PLENTY_HZ,
     flight_records,
     log_outputs,
@@ -130,7 +130,7 @@ def identify_aircraft(
     records = [record for _, stretches, _ in read for record in stretches]
     log, _, outputs = read[-1]
     with stage("estimating"):
-        fast = all(slowest_rows(one) >= LEAST_HZ for one, _, _ in read)
+        fast = all(slowest_rows(one) >= MIN_HZ for one, _, _ in read)
         estimate = estimate_model(records, numbers, dynamics=fast)
         check_estimate(estimate, numbers, _own_outputs(log, prior), log.source)
         found = make_identified(prior, numbers, estimate, [one for one, _, _ in read], outputs)

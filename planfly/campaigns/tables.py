@@ -93,7 +93,7 @@ def same_flight(one: FlightRow, other: FlightRow) -> bool:
 # The file: made or opened to go on, locked by one process, and refused where it holds something else.
 
 # Flights of a table whose settings do not say how many it may have, and of a broken one beyond what they say.
-_MOST = 100_000
+_MAX_FLIGHTS = 100_000
 
 
 class StoreError(PlanflyError):
@@ -213,7 +213,7 @@ class LockedTable:
     def _mend(self, known: dict[str, str]) -> None:
         """Keep the flights that are whole, and say which are not; the file is made anew then."""
         # A search may have been asked for fewer flights than are there: those beyond are kept, too.
-        asked = json.loads(known["settings"]).get("flights", _MOST)
+        asked = json.loads(known["settings"]).get("flights", _MAX_FLIGHTS)
         examined = examine(self._connection, tuple(self._kind.columns), asked, max(asked, self._last() + 1))
         if examined.sound and not examined.damaged:
             return
@@ -234,7 +234,7 @@ class LockedTable:
             with suppress(sqlite3.Error, UnicodeDecodeError):
                 for (number,) in self._connection.execute(f"SELECT flight FROM flights ORDER BY flight{order}"):
                     # That of a damaged page may be any.
-                    if isinstance(number, int) and number < _MOST:
+                    if isinstance(number, int) and number < _MAX_FLIGHTS:
                         last = max(last, number)
                         if order:
                             break

@@ -17,9 +17,9 @@ Flags = NDArray[np.bool_]
 
 # Rows a second that inertial sensors and outputs need for an estimate of the moments: 10 Hz are a little more or less
 # in a log.  With fewer than `PLENTY_HZ` the setting that records more is named.
-LEAST_HZ, PLENTY_HZ = 9.5, 20.0
+MIN_HZ, PLENTY_HZ = 9.5, 20.0
 # Flight that a log must have after what cannot be used is cut, s; and a stretch, s.
-LEAST_SECONDS, LEAST_STRETCH = 180.0, 30.0
+MIN_SECONDS, MIN_STRETCH = 180.0, 30.0
 # A pause between rows that parts two stretches, s; of airspeed and wind, which come more slowly: PX4's wind once a
 # second, more or less.
 _GAP, _AIR_GAP, _SLOW_WIND_GAP = 0.5, 1.0, 2.5
@@ -103,10 +103,10 @@ def flight_records(
             )
         )
     seconds = sum(record.seconds for record in made)
-    if seconds < LEAST_SECONDS:
+    if seconds < MIN_SECONDS:
         cut = "; flight on its lifting motors is cut" if _vtol_rows(log, grid, pulses).any() else ""
         message = f"{seconds / 60.0:.1f} min of it are flight on the wing that can be used{cut}"
-        raise LogError(f"{log.source}: {message}: at least {LEAST_SECONDS / 60.0:g} min are needed", file=log.source)
+        raise LogError(f"{log.source}: {message}: at least {MIN_SECONDS / 60.0:g} min are needed", file=log.source)
     return made
 
 
@@ -315,7 +315,7 @@ def _usable(log: MotionLog, grid: Floats, equivalent: Floats, pulses: Floats) ->
     return made
 
 
-def _stretches(flags: Flags, least: float = LEAST_STRETCH) -> list[tuple[int, int]]:
+def _stretches(flags: Flags, least: float = MIN_STRETCH) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(first, last) for first, last in pairs if last - first >= least * GRID_HZ]

@@ -24,7 +24,7 @@ _LONGEST_HEAD, _PATIENCE, _AT_ONCE, _PIECE = 16_384, 10.0, 64, 65_536
 # s.  What is under way when the gate closes has this long to arrive.
 _CLOSING = 0.5
 # How many refusals are reported, and how many characters of each.
-_MOST_TOLD, _LONGEST_TOLD = 16, 80
+_MAX_REPORTED, _MAX_REPORTED_LENGTH = 16, 80
 
 
 def refusal(head: bytes, port: int, allowed: Collection[str]) -> str:
@@ -51,7 +51,7 @@ def refusal(head: bytes, port: int, allowed: Collection[str]) -> str:
 
 def _shown(values: list[str]) -> str:
     """Values of a header, for a terminal: nothing in them moves its cursor."""
-    return ascii(", ".join(values))[1:-1][:_LONGEST_TOLD] or "no host"
+    return ascii(", ".join(values))[1:-1][:_MAX_REPORTED_LENGTH] or "no host"
 
 
 class OriginGate:
@@ -130,7 +130,7 @@ class OriginGate:
             await asyncio.gather(_pass_on(reader, outward), _pass_on(inward, writer))
 
     def _tell(self, why: str) -> None:
-        if why not in self._told and len(self._told) < _MOST_TOLD:
+        if why not in self._told and len(self._told) < _MAX_REPORTED:
             self._told.add(why)
             self._on_refused(why)
 

@@ -173,7 +173,7 @@ def _say(line: str) -> None:
 
 # s.  Where no terminal is, an estimate is told this long after the first report, and again when four times as long has
 # passed, at least once a minute; and a stage that reports nothing is named after the first second, and once a minute.
-_FIRST_TOLD, _TOLD_AGAIN, _TOLD_EVERY = 2.0, 4.0, 60.0
+_FIRST_REPORT, _REPORT_AGAIN, _REPORT_EVERY = 2.0, 4.0, 60.0
 _LOOKS_EVERY = 1.0
 # Stages that have begun in this process: one within another makes the outer one's time none that comes again.
 _begun = itertools.count()
@@ -190,7 +190,7 @@ class _TimeLeft:
         self._kind, self._number = kind, next(_begun)
         self._started = time.monotonic()
         self._first: tuple[float, float] | None = None
-        self._done, self._due = 0.0, _FIRST_TOLD
+        self._done, self._due = 0.0, _FIRST_REPORT
 
     def estimate(self, done: float, total: float) -> str:
         """In words; "" where nothing has been done since the first report, or all, or where the total is not known."""
@@ -215,7 +215,7 @@ class _TimeLeft:
         passed = self._passed()
         if passed < self._due:
             return False
-        self._due = min(_TOLD_AGAIN * passed, passed + _TOLD_EVERY)
+        self._due = min(_REPORT_AGAIN * passed, passed + _REPORT_EVERY)
         return True
 
     def elapsed(self) -> float:
@@ -373,7 +373,7 @@ class _Lines:
                 return
             if not self._begun:
                 self._begin(self._left.at_first(0.0))
-            elif self._left.elapsed() - self._told >= _TOLD_EVERY:
+            elif self._left.elapsed() - self._told >= _REPORT_EVERY:
                 self._tell(f"{self._title}: {_joined(self._remark, f'{self._left.elapsed():.0f} s so far')}")
 
     def _begin(self, estimate: str) -> None:

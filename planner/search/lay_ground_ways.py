@@ -25,7 +25,7 @@ from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.pose_chains import (
     LAP_SIDE,
-    MOST_LAPS,
+    MAX_LAPS,
     Spot,
     TurnLengths,
     arc_lengths,
@@ -42,14 +42,14 @@ from world.terrain import Terrain
 Floats = NDArray[np.float64]
 
 # Share of the aircraft's steepest climb, and of its steepest dive, at the cruise airspeed that a way takes: a take-off
-# climbs no less (the verdict's LEAST_CLIMB).
+# climbs no less (the verdict's MIN_CLIMB).
 SHARE = 0.7
 # Share of the steepest dive at the landing's airspeed that a glide takes.
 GLIDE_SHARE = 0.85
 # Shares of these slopes that are tried: the arc of a turn is steeper than its legs, by a quarter at a right angle.
 _GENTLER = (1.0, 0.75, 0.6)
 # m.  So much higher than the certificate asks for a take-off ends, and no lower than this over home.
-_OVER_CLEARANCE, _LEAST_TAKEOFF = 2.0, 40.0
+_OVER_CLEARANCE, _MIN_TAKEOFF = 2.0, 40.0
 # The first leg is so much longer than the climb to the take-off's height: a share and m; and tried longer by these.
 _AFTER_TAKEOFF, _LONGER = (1.05, 30.0), (1.0, 1.7)
 # m.  So far from home no ground stands in the way (the verdict's LAUNCH_RUN); beyond, this share of the height that was
@@ -66,7 +66,7 @@ _APPROACHES = (500.0, 600.0, 700.0, 800.0, 900.0, 1000.0, 1200.0, 1500.0, 2000.0
 _SLOPES = tuple(math.radians(slope) for slope in (3.5, 4.0, 4.5, 4.9, 5.5, 6.0, 7.0))
 _PX4_SLOPE = math.radians(5.0)
 # Length of the line-up, in radii of the tightest turn, and m.
-_LINE_UP, _LEAST_LINE_UP = 4.0, 500.0
+_LINE_UP, _MIN_LINE_UP = 4.0, 500.0
 # The glide: so near (m) before the point the ground may be met; above ground before, by this share of its height over
 # the point, up to so much (m).
 _EARLY, _GLIDE_SHARE, _GLIDE_ROOM = 60.0, 0.4, 10.0
@@ -251,7 +251,7 @@ def _climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     """The shortest way from home that counts; None and why not where none does."""
     data, target = site.problem.certified, site.plan.waypoints[0]
     ground, goal = float(site.home[2]), float(target[2])
-    over = max(_LEAST_TAKEOFF, data.clearance + data.buffer + _OVER_CLEARANCE)
+    over = max(_MIN_TAKEOFF, data.clearance + data.buffer + _OVER_CLEARANCE)
     up = ground + over
     launches, why = _launches(site, launch, over, max(up, goal))
     if not launches:
@@ -351,7 +351,7 @@ def _ways_up(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tup
 def _lap_counts(site: _Site, rise: float, side: int) -> list[int]:
     """How many laps to try for a height to gain, or to lose, m, fewest first; side: 0 for a climb, 1 for a descent."""
     most = math.ceil(site.least_length(rise, side) / _GENTLER[-1] / (4.0 * LAP_SIDE * site.radius))
-    return list(range(min(MOST_LAPS, most) + 1))
+    return list(range(min(MAX_LAPS, most) + 1))
 
 
 # ----------------------------------------------------------------------
@@ -435,7 +435,7 @@ def _finals(site: _Site, strip: LandingStrip, course: float, point: Floats, law:
 
 
 def _line_up(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
-    away = np.array([length + max(_LEAST_LINE_UP, _LINE_UP * site.radius), length])
+    away = np.array([length + max(_MIN_LINE_UP, _LINE_UP * site.radius), length])
     east, north = point[0] - away * math.sin(course), point[1] - away * math.cos(course)
     return np.column_stack([east, north, np.full(2, point[2] + height)])
 

@@ -31,7 +31,7 @@ _SHARP_COST = 250.0
 _LAST, _FIRST, _BASE = (3.0, 4.0, 5.5, 8.0), (3.0, 5.0, 8.0, 14.0), (4.5, 8.0)
 _DIRECTIONS, _ACROSS = 16, tuple(math.radians(side * turn) for side in (-1, 1) for turn in (60.0, 90.0, 120.0))
 # Length of a lap's side, in radii, and how many laps there are at most.
-LAP_SIDE, MOST_LAPS = 5.5, 8
+LAP_SIDE, MAX_LAPS = 5.5, 8
 
 
 def chains(begin: Spot, course: float, end: Spot, end_course: float, radius: float, laps: int) -> Iterator[list[Spot]]:

@@ -183,7 +183,7 @@ def interpreters() -> dict[str, Path]:
 
 # What the base may take, MB, with the bytecode that pip compiles of it all, and without pip and setuptools themselves,
 # which an environment brings.
-MOST = 500
+MAX_MEGABYTES = 500
 # A command of each extra, by which it is missed.
 MISSED = {
     "campaigns": "campaign paper-07",
@@ -225,7 +225,7 @@ def test_the_base_installs_flies_and_misses_each_extra_on(version: str, wheel: P
     done = run(python, folder, "-m", "pip", "install", "--quiet", *constraints, str(wheel))
     assert done.returncode == 0, done.stderr
     taken = megabytes(place)
-    assert 100.0 < taken < MOST, f"{taken:.0f} MB"
+    assert 100.0 < taken < MAX_MEGABYTES, f"{taken:.0f} MB"
     done = run(python, folder, "-m", "planfly", "run", "paper-07", "--seed", "1", "--out", "out")
     assert done.returncode == 0, done.stderr
     there = json.loads((folder / "out" / "verdict.json").read_text())

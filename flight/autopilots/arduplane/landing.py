@@ -13,7 +13,7 @@ from flight.autopilots.autopilot import LandingGlide
 # The flare begins on the second half of the way at the earliest.
 _LATEST_HALF = 0.5
 # Slower over the ground than this it does not count itself, and slower than this it does not sink in its flare, m/s.
-_SLOWEST, _LEAST_SINK = 0.5, 0.1
+_SLOWEST, _MIN_SINK = 0.5, 0.1
 # Height over home that a go-around climbs to where neither the landing item nor a take-off says one, m.
 _GO_AROUND = 30.0
 
@@ -59,7 +59,7 @@ def landing_glide(height: float, run: float, ground_speed: float, parameters: Ar
     if parameters.flare_height > 0.0:
         aim = min(aim, 2.0 * parameters.flare_height)
     mean = parameters.flare_weight * parameters.landing_sink + (1.0 - parameters.flare_weight) * sink
-    away = min(speed * aim / max(_LEAST_SINK, mean), _LATEST_HALF * run)
+    away = min(speed * aim / max(_MIN_SINK, mean), _LATEST_HALF * run)
     return LandingGlide((height - aim) / (run - away), aim, away)
 
 

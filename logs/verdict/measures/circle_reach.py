@@ -24,7 +24,7 @@ from world.threats import threat_label
 Floats = NDArray[np.float64]
 
 # Rings that a disc is looked at along: one in a step of the ground's raster, so many at the least and at the most.
-_FEWEST, _MOST = 24, 120
+_MIN_RINGS, _MAX_RINGS = 24, 120
 # Heights between which a spiral climbs are looked at in steps of this, m, at most so many of them.
 _STEP, _LEVELS = 20.0, 12
 
@@ -116,7 +116,7 @@ def _edges(requirements: RouteRequirements, middle: Floats, reach: float) -> lis
 
 def _rings(middle: Floats, reach: float, spacing: float) -> Floats:
     """Points (n, 2) m along rings about a middle out to its reach, a raster's spacing apart."""
-    count = min(_MOST, max(_FEWEST, math.ceil(reach / spacing) if spacing > 0.0 else _FEWEST))
+    count = min(_MAX_RINGS, max(_MIN_RINGS, math.ceil(reach / spacing) if spacing > 0.0 else _MIN_RINGS))
     # A polygon outside its circle leaves nothing between the last ring and the reach.
     last = Cylinder(float(middle[0]), float(middle[1]), reach / math.cos(math.pi / CIRCLE_CORNERS))
     return np.linspace(middle, zone_rings(Zone("", "exclusion", last))[0], count + 1).reshape(-1, 2)

@@ -15,11 +15,11 @@ from logs.verdict.measures.acceptance import position_error, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.tolerances import (
+    MIN_PHOTO_HEIGHT,
     PHOTO_ASIDE,
     PHOTO_BANK,
     PHOTO_COURSE,
     PHOTO_HEIGHT,
-    PHOTO_HEIGHT_LEAST,
     PHOTO_STEP,
 )
 
@@ -154,7 +154,7 @@ def _heights_off(
 ) -> tuple[Floats, Floats]:
     """By how much each row is off the planned height over ground, m, and by how much it may be."""
     asked = over_ground(requirements, axis.at(along))
-    allowed = np.maximum(PHOTO_HEIGHT_LEAST, PHOTO_HEIGHT * asked)
+    allowed = np.maximum(MIN_PHOTO_HEIGHT, PHOTO_HEIGHT * asked)
     return over_ground(requirements, position) - asked, allowed
 
 

@@ -16,6 +16,7 @@ from logs.verdict.tolerances import (
     CLEAR_OF_TURN,
     COURSE_FLOOR,
     FULL,
+    FULL_THROTTLE,
     IDLE,
     INDEPENDENT,
     KNOWN_TO,
@@ -36,7 +37,6 @@ from logs.verdict.tolerances import (
     SURE,
     THROUGHOUT,
     UNSURE,
-    WHOLE_THROTTLE,
 )
 from world.kernels import compiled
 
@@ -278,7 +278,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     if rows.stop - rows.start < 3:
         return None
     full, idle = _at_limits(requirements, aligned, rows)
-    full &= track.controls[rows, THROTTLE] >= WHOLE_THROTTLE
+    full &= track.controls[rows, THROTTLE] >= FULL_THROTTLE
     along, _ = along_across(requirements, leg, track.position[rows])
     low, high = straight_span(requirements, leg, 0.0)
     use = _held_for(full if sign > 0.0 else idle, round(SETTLED_AFTER / aligned.tick))

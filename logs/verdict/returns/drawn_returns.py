@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 # Ways that are drawn.
-MOST_WAYS = 3
+MAX_WAYS = 3
 # The least height is looked for from so many places at the most, so far below and above the flight (m), in steps that
 # are halved at the end.
 _PLACES, _STEP, _STEPS, _HALVINGS = 40, 80.0, 15, 3
@@ -131,7 +131,7 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
     firsts = {one.worst.kind: one for one in reversed(wrong)}
     order = [one for one in wrong if firsts[one.worst.kind] is one]
     order += [one for one in wrong if firsts[one.worst.kind] is not one]
-    chosen = order[:MOST_WAYS] or list(returns.ranges[:1])
+    chosen = order[:MAX_WAYS] or list(returns.ranges[:1])
     rows = np.array([int(np.argmin(np.abs(starts.time - one.worst.time))) for one in chosen], dtype=np.intp)
     if not chosen:
         return ()

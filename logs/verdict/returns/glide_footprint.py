@@ -25,7 +25,7 @@ BANDS = (150.0, 300.0, 600.0)
 BAND_ROLES = dict(zip(BANDS, ("glide-near", "glide-middle", "glide-far"), strict=True))
 _ALL = (-math.inf, math.inf)
 # Cells along the longer side of what is shown, at most: larger ones are as bad as the worst cell in them.
-_MOST = 200
+_MAX_CELLS = 200
 
 
 class Band(NamedTuple):
@@ -90,7 +90,7 @@ class _Cells(NamedTuple):
         low = [math.floor(max(0.0, (edge[0] - origin) / made.cell)) for edge, origin, _ in sides]
         high = [math.ceil(min(count - 1.0, (edge[1] - origin) / made.cell)) + 1 for edge, origin, count in sides]
         spans = [max(0, end - begin) for begin, end in zip(low, high, strict=True)]
-        block = max(1, math.ceil(max(spans) / _MOST))
+        block = max(1, math.ceil(max(spans) / _MAX_CELLS))
         west, south = made.west + (low[1] - 0.5) * made.cell, made.south + (low[0] - 0.5) * made.cell
         return cls(west, south, block * made.cell, block, (low[0], low[1]), (spans[0] // block, spans[1] // block))
 

@@ -39,10 +39,10 @@ Cells = NDArray[np.int64]
 # The map: cells with their least heights.
 
 # Cells that a map has at most, and their least size, m.
-MOST_CELLS, _LEAST_CELL = 700_000, 20.0
+MAX_CELLS, _MIN_CELL = 700_000, 20.0
 # The largest, m, or the pixels of the elevation file that its side is long: a larger one is as high as its highest
 # ground where most of it is valley.
-_LARGEST_CELL, _MOST_PIXELS = 240.0, 8
+_LARGEST_CELL, _MAX_PIXELS = 240.0, 8
 # So far around the places and the flight the map goes, m.
 AROUND = 3000.0
 
@@ -91,8 +91,8 @@ def glide_map(
     """
     (west, south), (east, north) = places.min(axis=0) - around, places.max(axis=0) + around
     spacing = max(1.0, terrain.spacing)
-    cell = max(_LEAST_CELL, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MOST_CELLS))
-    if cell > max(_LARGEST_CELL, _MOST_PIXELS * spacing):
+    cell = max(_MIN_CELL, min(0.5 * spacing, 100.0), math.sqrt((east - west) * (north - south) / MAX_CELLS))
+    if cell > max(_LARGEST_CELL, _MAX_PIXELS * spacing):
         return None
     columns, rows = math.ceil((east - west) / cell) + 1, math.ceil((north - south) / cell) + 1
     highest = highest_in_cells(terrain, west - 0.5 * cell, south - 0.5 * cell, cell, rows, columns)

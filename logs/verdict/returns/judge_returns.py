@@ -399,11 +399,11 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
 # cannot be flown.
 FlyAgain = Callable[[ReturnWorld, Record], tuple[float, float] | None]
 # Returns that are flown again, at most.
-MOST_AGAIN = 4
+MAX_AGAIN = 4
 
 
 def judge_returns(
-    world: ReturnWorld, starts: ReturnStarts, every: float, fly_again: FlyAgain | None = None, most: int = MOST_AGAIN
+    world: ReturnWorld, starts: ReturnStarts, every: float, fly_again: FlyAgain | None = None, most: int = MAX_AGAIN
 ) -> Returns:
     """Fly and judge the return from each start.
 

@@ -201,7 +201,7 @@ _FLOWN_TO, _FAR = 60, 4500.0
 # The ground is looked at so far around a candidate, m: as wide as ArduPlane's smallest circles are flown.
 _CIRCLE = 280.0
 # Rally points of a set; times that a search begins again with what it left unsafe, and with finer candidates there.
-_MOST, _ROUNDS, _FINER = 10, 4, 3
+_MAX_POINTS, _ROUNDS, _FINER = 10, 4, 3
 # Of the best single points, so many are tried with every other one.
 _PAIRS = 30
 
@@ -322,7 +322,7 @@ class _Search:
     def find(self, asked: NDArray[np.intp], chosen: list[int]) -> list[int]:
         """Candidates that are good for the starts asked, as many as can be; chosen: to begin with."""
         self._fly(asked[~self._known[asked]])
-        while len(chosen) < _MOST and self._count(asked, chosen) < len(asked):
+        while len(chosen) < _MAX_POINTS and self._count(asked, chosen) < len(asked):
             more = self._longer(asked, chosen)
             if self._count(asked, more) <= self._count(asked, chosen):
                 break

@@ -41,7 +41,7 @@ Floats = NDArray[np.float64]
 # Heights over home that a go-around is tried with, m.
 _HEIGHT_STEP, _HIGHEST = 5.0, 1000.0
 # Places of a glide that it is aborted at: so far apart (m), and this many at the most.
-_APART, _MOST_PLACES = 50.0, 12
+_APART, _MAX_PLACES = 50.0, 12
 _NONE_DO = "no height would do"
 # Pitch of the climb where the mission has no take-off, rad (`Plane::do_land`, ArduPlane/commands_logic.cpp).
 _PITCH = math.radians(10.0)
@@ -240,7 +240,7 @@ def _finding(requirements: RouteRequirements, ground: Terrain, landing: _Landing
 def _places(landing: _Landing) -> Floats:
     """Where on the glide it is aborted: (n,) m before the landing point, to where the flare begins or it lands."""
     last = min(landing.run, max(landing.glide.flare_distance, EARLY_TOUCH))
-    count = min(_MOST_PLACES, max(2, math.ceil((landing.run - last) / _APART) + 1))
+    count = min(_MAX_PLACES, max(2, math.ceil((landing.run - last) / _APART) + 1))
     return np.linspace(landing.run, last, count)
 
 

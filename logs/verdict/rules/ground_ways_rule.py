@@ -6,7 +6,7 @@ judged against ground, missile spheres and zones, whether the mission was flown 
 
 Where a mission takes off, the aircraft climbs from the ground at home towards the next place, or on the course that the
 scenario's `[launch]` states.  What it hits at its
-steepest climb fails; what it would hit at `LEAST_CLIMB` of it is left open.  Where it does not take off, somebody flies
+steepest climb fails; what it would hit at `MIN_CLIMB` of it is left open.  Where it does not take off, somebody flies
 the aircraft to its first waypoint, perhaps by another way: what is hit on the straight one is left open.
 
 The approach is the glide that the autopilot lays out (`Autopilot.landing_glide`).
@@ -42,7 +42,7 @@ from logs.verdict.tolerances import (
     FIRST_CLIMB,
     GLIDE_ERROR,
     LAUNCH_RUN,
-    LEAST_CLIMB,
+    MIN_CLIMB,
     ON_THE_SPOT,
     PLAN_TOLERANCE,
     POINT_ERROR,
@@ -136,7 +136,7 @@ def climbout_findings(
         return [make_finding("climbout", place, ok=None, reason=reason, unit="m")]
     met, least = (
         _look(requirements, straight_way(begin, course, _take_off(low, up, run, slope, climb)))
-        for climb in (steepest, max(1e-3, LEAST_CLIMB * certain))
+        for climb in (steepest, max(1e-3, MIN_CLIMB * certain))
     )
     return [_launched(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
 
@@ -235,7 +235,7 @@ def _launched(
         other = _other_courses(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other)
         return _finding("climbout", place, met, False if is_known else None, fault, "" if is_known else GROUND_WAY)
-    at_least = f"{subject}, at {100.0 * LEAST_CLIMB:.0f} % of the steepest,"
+    at_least = f"{subject}, at {100.0 * MIN_CLIMB:.0f} % of the steepest,"
     if math.isnan(least.clearance) and not least.entered:
         return _finding("climbout", place, met, None, message(f"{at_least} leads to where the ground is not known"))
     if not least.free:
@@ -366,7 +366,7 @@ CLIMBOUT = Rule(
     noun="climb-out",
     asks="Is the way up from home to the mission's first place free of ground, missiles and zones?",
     margin=Margin("height above ground", "m", 10.0),
-    tolerances=("LAUNCH_RUN", "FIRST_CLIMB", "LEAST_CLIMB", "PLAN_TOLERANCE", "ROUNDING"),
+    tolerances=("LAUNCH_RUN", "FIRST_CLIMB", "MIN_CLIMB", "PLAN_TOLERANCE", "ROUNDING"),
     judge=climbout_findings,
     phrase=lambda item: located("climb-out", item, shortened(item.brief)),
     unjudged="climb-out",

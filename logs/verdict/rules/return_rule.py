@@ -31,7 +31,7 @@ from world.errors import MissionError
 from world.scenario_tables import ReturnDemand
 
 # Returns that are flown where all are required to be safe: one a second, and no more than this, 2 ms each.
-_MOST = 3000
+_MAX_RETURNS = 3000
 # A log's rows begin and end up to a second before and after its circle does, rad: 26 m/s on 260 m.
 _PART_OF_A_TICK = 0.1
 # Rules that hold a flight to its legs.
@@ -81,7 +81,7 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
     demands = [] if asked is None else [_DEMANDS[name] for name in asked.require if name in _DEMANDS]
     if asked is None or not demands:
         return []
-    every = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MOST)))
+    every = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MAX_RETURNS)))
     try:
         world, begun = return_world(setup), starts(every)
         found = [judge(world, begun, every) for judge in demands]

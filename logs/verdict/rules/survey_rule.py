@@ -255,7 +255,7 @@ RULE = Rule(
     asks="How much of each photo line of a survey is flown so that its photos can be used?",
     margin=Margin("share of the photo line", "%", 5.0),
     tolerances=(
-        *("PHOTO_SHARE", "PHOTO_ASIDE", "PHOTO_BANK", "PHOTO_HEIGHT", "PHOTO_HEIGHT_LEAST", "PHOTO_COURSE"),
+        *("PHOTO_SHARE", "PHOTO_ASIDE", "PHOTO_BANK", "PHOTO_HEIGHT", "MIN_PHOTO_HEIGHT", "PHOTO_COURSE"),
         *("PHOTO_STEP", "PHOTO_OVERLAP", "TURN_AROUND_RADII"),
     ),
     judge=survey_findings,

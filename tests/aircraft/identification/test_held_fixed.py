@@ -15,7 +15,7 @@ from tests.aircraft.identification.flown_truth import flown_truth
 from tests.aircraft.identification.made_signals import steady
 
 # Half, or all, of what Beard and McLain have for the Aerosonde (table E.2).
-LEAST = {
+MIN_SHIFTS = {
     "side force of the rudder": ("side_rudder", 0.5 * 0.19),
     "side force of the ailerons": ("side_aileron", 0.075),
     "roll of the rudder": ("roll_rudder", 0.0024),
@@ -28,9 +28,9 @@ def changed(title: str, base: BaseModel) -> BaseModel:
     return held.change(signals, base)[1]
 
 
-@pytest.mark.parametrize("title", LEAST)
+@pytest.mark.parametrize("title", MIN_SHIFTS)
 def test_a_coefficient_of_0_is_in_doubt(title: str) -> None:
-    name, least = LEAST[title]
+    name, least = MIN_SHIFTS[title]
     base = base_model(load_aircraft("aerosonde"))
     for value, expected in ((0.0, least), (1e-6, 1e-6 + least)):
         flat = replace(base, coefficients=replace(base.coefficients, **{name: value}))

@@ -18,7 +18,7 @@ from logs.views.report import identification
 from planfly.api import identifying
 from planfly.api.identifying import slow_logs, without_current
 from planfly.cli import main
-from planfly.identification.records import LEAST_HZ, slowest_rows
+from planfly.identification.records import MIN_HZ, slowest_rows
 from tests.aircraft.identification.flown_truth import TRUTH, flown_truth
 from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_motion, write_px4
 from world.errors import LogError
@@ -172,12 +172,12 @@ def test_logs_with_few_rows_are_named_with_what_records_more() -> None:
     (slow,) = slow_logs([log, px4])
     assert (slow.source, slow.setting) == ("b.ulg", "SDLOG_PROFILE 17")
     assert slow.hertz == pytest.approx(9.97, abs=0.01)
-    assert slow.hertz >= LEAST_HZ
+    assert slow.hertz >= MIN_HZ
     thin = replace(log, outputs=Samples(log.outputs.time[::4], log.outputs.values[::4]))
     (slow,) = slow_logs([thin])
     assert slow.setting == "LOG_BITMASK 65535"
     assert slow.hertz == pytest.approx(6.25)
-    assert slowest_rows(thin) < LEAST_HZ
+    assert slowest_rows(thin) < MIN_HZ
 
 
 @pytest.mark.parametrize(("hertz", "dynamics"), [(50.0, True), (10.0, True), (9.6, True), (9.4, False)])
