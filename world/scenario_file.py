@@ -111,6 +111,10 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     keys = [str(part) for part in (first["loc"] if data is None else _keys_found(first["loc"], data))]
     # Of a check of ours the message is that of the error that it raised.
     message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
+    if first["type"] == "model_type":
+        message = "a table is expected"
+    elif first["type"] == "too_short":
+        message = f"at least {first['ctx']['min_length']} expected"
     value = first.get("input")
     if isinstance(value, dict | list):
         value = None
@@ -123,7 +127,9 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
         keys = [str(part) for part in first["loc"]]
     more = f" (and {len(found) - 1} more)" if len({item["loc"][:2] for item in found}) > 1 else ""
     named = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
-    return Fault(named, value, message, f"{named or 'file'}{shown}: {message}{more}")
+    # A check of the whole file names its key itself.
+    begin = "" if not named and first["type"] == "value_error" else f"{named or 'file'}{shown}: "
+    return Fault(named, value, message, f"{begin}{message}{more}")
 
 
 def _near(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:

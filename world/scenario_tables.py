@@ -466,11 +466,22 @@ class HomeTable(PositionTable):
 
     place: Literal["start"] | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _on_ground(cls, data: Any) -> Any:
+        for key in ("amsl_m", "height_m"):
+            if isinstance(data, dict) and key in data:
+                raise ValueError(f"{key}: home stands on the scenario's ground: its position is enough")
+        return data
+
     @model_validator(mode="after")
     def _one_place(self) -> "HomeTable":
+        stated = (self.east_m, self.north_m, self.lat_deg, self.lon_deg)
+        if self.place is None and all(value is None for value in stated):
+            raise ValueError('position: missing; give place = "start", east_m and north_m, or lat_deg and lon_deg')
         if self.place is None:
             _one_position(self)
-        elif any(value is not None for value in (self.east_m, self.north_m, self.lat_deg, self.lon_deg)):
+        elif any(value is not None for value in stated):
             raise ValueError('place: give place = "start" or a position, not both')
         return self
 
@@ -494,6 +505,13 @@ class LaunchTable(ScenarioTable):
     length_m: Annotated[float, within(0.1, 3000.0)] | None = None
     incline_deg: Annotated[float, within(0.0, 45.0)] | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _has_method(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "method" not in data:
+            raise ValueError('method: missing; give "catapult", "hand" or "runway"')
+        return data
+
     @model_validator(mode="after")
     def _pushed(self) -> "LaunchTable":
         if self.method == "runway" and self.speed_mps is not None:
@@ -501,6 +519,15 @@ class LaunchTable(ScenarioTable):
         if self.method == "runway" and (self.incline_deg or 0.0) > STEEPEST_RUNWAY:
             raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{STEEPEST_RUNWAY:g} of a runway")
         return self
+
+
+_OR_WIND = ', or "wind"'
+
+
+def _course_or_wind(value: Any) -> Any:
+    if value != "wind" and (isinstance(value, bool) or not isinstance(value, int | float)):
+        raise ValueError(f"allowed -360..360{_OR_WIND}")
+    return value
 
 
 class LandingTable(PositionTable):
@@ -513,7 +540,9 @@ class LandingTable(PositionTable):
     Where these two are not given, a plan takes what the autopilot and the aircraft can fly.
     """
 
-    course_deg: Annotated[float, within(-360.0, 360.0, also=', or "wind"')] | Literal["wind"] = "wind"
+    course_deg: Annotated[
+        Annotated[float, within(-360.0, 360.0, also=_OR_WIND)] | Literal["wind"], BeforeValidator(_course_or_wind)
+    ] = "wind"
     length_m: Annotated[float, within(20.0, 5000.0)] = 200.0
     width_m: Annotated[float, within(5.0, 500.0)] = 40.0
     approach_m: Annotated[float, within(200.0, 5000.0)] | None = None

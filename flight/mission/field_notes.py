@@ -129,6 +129,15 @@ def _not_armed(mission: Mission, parameters: Mapping[str, float]) -> Iterator[st
         yield f"item {marks[0]}: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"
 
 
+_LEVEL = "is level"
+
+
+def _sloping(slope: float) -> str:
+    """How the ground slopes (m per m), in words."""
+    shown = f"{abs(slope):.1%}"
+    return _LEVEL if shown == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {shown}"
+
+
 def _landed_on(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
     """What is known of the ground where a mission lands whose scenario states no strip."""
     last = int(route.items[-1])
@@ -147,8 +156,10 @@ def _landed_on(mission: Mission, route: Route, scenario: Scenario) -> Iterator[s
     if scenario.terrain is not None:
         slopes = strip_slopes(scenario.terrain, strip, course)
     if not any(math.isnan(one) for one in slopes):
-        along, across = (f"{'rises' if one >= 0.0 else 'falls'} by {abs(one):.1%}" for one in slopes)
+        along, across = (_sloping(one) for one in slopes)
         ground = f"over {strip.length:.0f} m about its point the ground {along} along it, and {across} to the right"
+        if along == across == _LEVEL:
+            ground = f"over {strip.length:.0f} m about its point the ground {_LEVEL}"
         if max(abs(one) for one in slopes) > STEEPEST_STRIP:
             ground += f" ({STEEPEST_STRIP:.0%} is the most that a plan lands on)"
     unknown = "no [landing] states its strip: touch-down and way to rest are not judged"

@@ -211,7 +211,7 @@ def _coordinate(item: dict[str, Any], key: str, source: str, place: str) -> list
     value = item.get(key)
     if value is None:
         return None
-    if not isinstance(value, list) or len(value) != 3:
+    if not isinstance(value, list) or len(value) != 3 or None in value:
         raise MissionError.at(source, f"{place}.{key}", value, _COORDINATE, shown=json.dumps(value)[:40])
     return value
 

@@ -480,7 +480,8 @@ def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turn
     speed = float(route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
     for i in range(1, len(points) - 1):
         steps = [abs(rise[i] - rise[i - 1])]
-        arc = turning.radius[i] * abs(turning.turns[i])
+        turn = abs(float(turning.turns[i]))
+        arc = float(turning.radius[i]) * turn if turn > 0.0 else 0.0
         if 0.0 < arc < math.inf and math.isfinite(turning.after[i]) and not setup.route.fly_over[i]:
             # The arc is shorter than its two tangents, so that its slope is steeper than the legs'.
             on_arc = (rise[i - 1] + rise[i]) * turning.after[i] / arc

@@ -257,7 +257,7 @@ def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], 
     courses = list(range(0, 360, _COURSE_STEP))
     free = [is_free(math.radians(course)) for course in courses]
     if not any(free):
-        return "; launched on no course would it climb free"
+        return "; no launch course climbs free"
     # Begin behind a course that is not free, so that no range is cut at north.
     start = free.index(False) if False in free else 0
     turned = [(courses[k % len(courses)], free[k % len(courses)]) for k in range(start, start + len(courses))]

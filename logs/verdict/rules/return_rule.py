@@ -90,6 +90,8 @@ def _required(requirements: RouteRequirements, starts: Callable[[float], ReturnS
         found = [_Answer(False if "rtl" in asked.require else None, str(error), _METHOD)]
     results = {one.ok for one in found}
     ok = False if False in results else None if None in results else True
+    # What fails, or else what is not known, is said first.
+    found.sort(key=lambda one: (one.ok is not False, one.ok is not None))
     reason, method = "; ".join(one.reason for one in found), "; ".join(one.method for one in found)
     method = f"from every {every:.0f} s of the way, {method}"
     # A verdict that asks for them is not given without them.

@@ -65,10 +65,11 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """One finding of a landing that was flown, at the landing point; none before the flight."""
+    """One finding of a landing that was flown, at the landing point; before the flight of a strip that is too short."""
     ground = requirements.ground
     if ground is None or ground.ways.approach is None:
-        return []
+        planned = requirements.setup.ground_ways.approach if geometric else None
+        return [] if planned is None else _foreseen(requirements.waypoint(planned.leg + 1), planned)
     approach = ground.ways.approach
     place = ground.whole.waypoint(approach.leg + 1)
     track, terrain = ground.landing, requirements.setup.scenario.terrain
@@ -88,6 +89,13 @@ def touchdown_findings(
     if entered := entered_by_way(requirements, track_way(track)):
         faults.append(message(f"the final enters {entered}"))
     return [_finding(place, approach, landing, faults)]
+
+
+def _foreseen(place: Place, approach: Approach) -> list[Finding]:
+    """What is known of a landing before it is flown: that its strip is too short for its touch-down to be judged."""
+    found = _too_short(approach)
+    reason = reason_of(found)
+    return [make_finding("touchdown", place, ok=None, reason=reason, faults=found, check=GROUND_WAY)] if found else []
 
 
 def _measured(requirements: RouteRequirements, track: Track, terrain: Terrain, approach: Approach, k: int) -> _Landing:
@@ -189,16 +197,18 @@ def _final_room(requirements: RouteRequirements, position: Floats, terrain: Terr
 def _amiss(approach: Approach, landing: _Landing) -> list[Message]:
     """What of the landing is not on the strip, or not on the ground."""
     half, side = 0.5 * approach.strip.length, 0.5 * approach.strip.width
+    # On a strip that leaves nothing of it, only what is off the strip by more than the error is known.
+    inside = half - TOUCH_ERROR if half > TOUCH_ERROR else half + TOUCH_ERROR
     touch, stop = landing.touch, landing.stop
     faults = []
     if -landing.over > POINT_ERROR:
         brief = f"the landing point of {_place_of(approach)} is {-landing.over:.0f} m below the ground"
         faults.append(message(brief, ": the aircraft meets it before it flares"))
-    if abs(touch[0]) > half - TOUCH_ERROR:
+    if abs(touch[0]) > inside:
         where = "before" if touch[0] < 0.0 else "beyond"
         brief = f"touches down {abs(touch[0]):.0f} m {where} the strip's middle"
         faults.append(message(brief, f"; {max(0.0, half - TOUCH_ERROR):.0f} m are allowed on this strip"))
-    if stop[0] > half - TOUCH_ERROR:
+    if stop[0] > inside:
         brief = f"comes to rest {half - stop[0]:.0f} m before the strip's end"
         if stop[0] > half:
             brief = f"runs {stop[0] - half:.0f} m beyond the strip's end"
@@ -209,9 +219,17 @@ def _amiss(approach: Approach, landing: _Landing) -> list[Message]:
     return faults
 
 
+def _too_short(approach: Approach) -> list[Message]:
+    """That a strip is shorter than what the law's error allows."""
+    if approach.strip.length > 2.0 * TOUCH_ERROR:
+        return []
+    brief = f"the strip is {approach.strip.length:.0f} m long"
+    return [message(brief, f"; a touch-down is known within {TOUCH_ERROR:.0f} m either way, which takes more")]
+
+
 def _left_open(approach: Approach, landing: _Landing) -> list[Message]:
     """What may be amiss with the landing, by what the law does not know so well."""
-    found = []
+    found = _too_short(approach)
     if landing.over > POINT_ERROR:
         brief = f"the landing point of {_place_of(approach)} is {landing.over:.0f} m above the ground"
         found.append(message(brief, ": it flares too early, and falls"))

@@ -18,6 +18,7 @@ from logs.verdict.tolerances import (
     CLOSER,
     CLOSER_SHARE,
     GUST_OFFSET,
+    LARGEST_OFFSET,
     NAVIGATION_SIGMAS,
     ON_THE_SPOT,
     OVERSHOOT,
@@ -143,7 +144,7 @@ def _too_sharp(requirements: RouteRequirements, i: int, planned: float, limit: f
             " these courses in this wind",
         )
     takes = "no length of leg is enough"
-    if math.isfinite(requirements.after[i]):
+    if requirements.after[i] < LARGEST_OFFSET * radius:
         takes = f"that takes {requirements.after[i]:.0f} m of each leg"
         if requirements.setup.route.fly_over[i]:
             takes = f"flying over it takes {requirements.after[i]:.0f} m of the next leg"

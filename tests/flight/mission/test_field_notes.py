@@ -67,6 +67,11 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
         "item 4: lands on 90°, against 4.0 m/s of wind; over 200 m about its point the ground rises by 3.0% along it, "
         "and falls by 2.0% to the right; no [landing] states its strip: touch-down and way to rest are not judged"
     )
+    assert "about its point the ground is level; no [landing]" in landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0))[0]
+    assert (
+        "the ground rises by 3.0% along it, and is level to the right"
+        in landed_on(sloped(0.03, 0.0), Wind(0.0, 0.0))[0]
+    )
     (said,) = landed_on(None, Wind(4.0, math.radians(270.0)))
     assert "with 4.0 m/s of wind from behind; the ground there is not known; no [landing]" in said
     assert landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0), LandingStrip(2500.0, 2000.0)) == []

@@ -135,6 +135,7 @@ def test_a_landing_pattern_is_three_items(clockwise: bool, spiral: bool) -> None
     [
         ({"complexItemType": "StructureScan"}, "'StructureScan'"),
         ({"complexItemType": "fwLandingPattern", "landCoordinate": [1, 2]}, "landCoordinate: \\[1, 2\\]"),
+        ({"complexItemType": "fwLandingPattern", "landCoordinate": [46.0, None, 0]}, "landCoordinate: \\[46.0, null"),
         (
             {
                 "complexItemType": "fwLandingPattern", "landCoordinate": [91, 2, 3],

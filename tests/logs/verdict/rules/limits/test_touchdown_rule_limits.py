@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from logs.verdict.findings import GROUND_WAY, Finding
+from logs.verdict.judge_geometry import judge_geometry
+from logs.verdict.rules.touchdown_rule import _amiss, _Landing, _left_open
 from tests.flight.autopilots.arduplane.flown_grounds import circuit
 from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
 
@@ -26,6 +28,28 @@ def test_thirty_metres_of_the_strip_are_left(more: float, ok: bool) -> None:
     """The strip's half, less 30 m, against where the aircraft stops or touches down, whatever is farther."""
     farther = max(abs(known("along")), 300.0 - known("strip left"))
     assert on_strip(length=2.0 * (farther + 30.0 + more)) is ok
+
+
+@pytest.mark.parametrize(("length", "stop", "faults", "open_"), [
+    (60.0, 59.9, 0, 1), (60.0, 60.1, 1, 1), (60.1, 0.2, 1, 0), (60.1, 0.0, 0, 0),
+])  # fmt: skip
+def test_a_strip_that_the_error_leaves_nothing_of_is_left_open(
+    length: float, stop: float, faults: int, open_: int
+) -> None:
+    """On 60 m and less only a stop more than 30 m off the strip's end is known to be off it."""
+    approach = flown_circuit().setup.ground_ways.approach
+    assert approach is not None
+    short = replace(approach, strip=replace(approach.strip, length=length))
+    at = _Landing(0.0, 0.0, (0.0, 0.0), (stop, 0.0), 0.5 * length - stop, 1.0, 1.0, 10.0, 0.0)
+    assert (len(_amiss(short, at)), len(_left_open(short, at))) == (faults, open_)
+
+
+@pytest.mark.parametrize(("length", "open_"), [(60.0, True), (60.1, False)])
+def test_a_strip_that_is_too_short_is_said_before_the_flight(length: float, open_: bool) -> None:
+    flown = flown_circuit()
+    setup = flown.setup.in_scenario(replace(flown.setup.scenario, landing=replace(STRIP, length=length)))
+    said = [one for one in judge_geometry(setup).findings if one.rule == "touchdown"]
+    assert [one.check for one in said] == ([GROUND_WAY] if open_ else [])
 
 
 @pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
