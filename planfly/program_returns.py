@@ -101,7 +101,7 @@ class ProgramReturns:
         same = sum(one.agrees for one in self.flown)
         worse = sum(one.worse for one in self.flown)
         told = "all of them as by the law" if same == len(self.flown) else f"{same} of them as by the law"
-        told += f"; {worse} worse than by the law, WHICH IS NOT TO BE TRUSTED there" if worse else ""
+        told += f"; {worse} worse than by the law, which errs there" if worse else ""
         return f"by {self.program} itself: {len(self.flown)} of the worst flown, {told}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:

@@ -350,7 +350,7 @@ BAD_FILES = {
     "name.geojson": (json.dumps(LAKE).replace('"lake"', "7").encode(), "feature: name: 7: Input should be a valid str"),
     "band.geojson": (
         json.dumps(LAKE).replace('"name"', '"floor_agl_m": 90, "name"').encode(),
-        "feature (lake): file: ceiling_agl_m: 90: must be above floor_agl_m 90",
+        "feature (lake): ceiling_agl_m: 90: must be above floor_agl_m 90",
     ),
     "bow.geojson": (
         json.dumps(LAKE).replace("[8.01, 46.01], [8.01, 46.02]", "[8.01, 46.02], [8.01, 46.01], [8.0, 46.02]").encode(),

@@ -60,16 +60,16 @@ def test_beyond_fifty_metres_of_way_two_metres_are_left_and_two_and_a_half_more_
     assert found(flown.setup, low, "launch").ok is ok
 
 
-@pytest.mark.parametrize(("up", "ok"), [(20.0 - 0.08, True), (20.0 - 0.12, False)])
-@pytest.mark.parametrize("leg", [0, 2])
-def test_the_legs_near_the_ground_need_twenty_metres(leg: int, up: float, ok: bool) -> None:
-    """Of a scenario that asks for 60 m: the leg after the take-off, and the last two of a landing."""
+@pytest.mark.parametrize(("below", "ok"), [(0.08, True), (0.12, False)])
+@pytest.mark.parametrize(("leg", "limit"), [(0, 20.0), (2, 30.0)])
+def test_the_leg_after_a_take_off_needs_twenty_metres(leg: int, limit: float, below: float, ok: bool) -> None:
+    """Of a scenario that asks for 30 m, which one to a landing needs, too, between waypoints that are higher."""
     flown = flown_circuit()
     track = flown.track
     ends = judge_flight(flown.setup, track, "completed").leg_ends
     when = {0: ends[0] - 8.0, 2: ends[1] + 6.0}[leg]
     row = int(np.searchsorted(track.time, when))
-    low = moved(track, slice(row, row + 1), up=up - float(track.position[row, 2]))
+    low = moved(track, slice(row, row + 1), up=limit - below - float(track.position[row, 2]))
     verdict = judge_flight(flown.setup, low, "completed")
     assert of(verdict, "clearance", Place("leg", leg)).ok is ok
 
