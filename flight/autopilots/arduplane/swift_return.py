@@ -287,19 +287,17 @@ def fly_stages(
     climb: whether the first stage is a climb, and how far.  staged: the parameters of that climb.
     """
     # A circle is flown until the return is over: no leg comes after it.  A waypoint is left for one like it.
-    waypoints = np.zeros(3, WAYPOINT)
-    b = waypoints[1]
-    estimated, state = np.zeros(1, MOTION)[0], np.zeros(1, STATE)[0]
-    own = np.zeros(1, ARDUPILOT_MEMORY)[0]
+    waypoints, turns = np.zeros(3, WAYPOINT), np.zeros(1, _CIRCLING)
+    b, circling = waypoints[1], turns[0]
+    motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
+    estimated, state, own = motions[0], states[0], memories[0]
     _begin(start, estimated, known, out)
     _fly_to(stages, 0, waypoints, estimated, own)
     _take_over(start, parameters, aircraft, excess, state, own)
-    pitch, angle = state.pitch, state.pitch - state.alpha
-    dt = NAVIGATION_TICK
+    pitch, angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK
     roll_share = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
     pitch_share = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
     path_share = 1.0 - math.exp(-dt / _PATH_LAG)
-    circling = np.zeros(1, _CIRCLING)[0]
     stage, used = 0, 0.0
     for tick in range(int(most / dt)):
         time = tick * dt
@@ -336,7 +334,9 @@ def fly_stages(
         used += dt * move_on(estimated, state, angle, throttle, aircraft, excess, power, dt)
     if out.clearance <= 0.0:
         out.ended = HIT
-    out.energy = used / 3600.0 if aircraft.has_power else math.nan
+    # Compiled code frees an array after its last use, and a record of it does not count as one.
+    held = motions.size + states.size + memories.size + turns.size == 4
+    out.energy = used / 3600.0 if aircraft.has_power and held else math.nan
 
 
 @inner

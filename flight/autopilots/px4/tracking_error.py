@@ -122,7 +122,8 @@ def _fly_corner(
 
     The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
     """
-    estimated, own = np.zeros(1, MOTION)[0], np.zeros(1, PX4_MEMORY)[0]
+    motions, memories = np.zeros(1, MOTION), np.zeros(1, PX4_MEMORY)
+    estimated, own = motions[0], memories[0]
     east, north = math.sin(turn), math.cos(turn)
     waypoints[0].north = -_LEG
     waypoints[2].east, waypoints[2].north = _LEG * east, _LEG * north
@@ -152,4 +153,7 @@ def _fly_corner(
             settled = max(0.0, along)
         if own.leg == 1 and along > settled + _STAYS * speed:
             break
+    # Compiled code frees an array after its last use, and a record of it does not count as one.
+    if motions.size + memories.size != 2:
+        return math.nan, math.nan
     return furthest, settled

@@ -68,7 +68,8 @@ def _look_ahead(
     moves: Records, glider: Record, aircraft: Record, excess: Floats, left: Floats, reached: Codes,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Fill what is left and what is reached, for each start the better of both turns."""
-    here = np.zeros(1, _TURNING)[0]
+    turnings = np.zeros(1, _TURNING)
+    here = turnings[0]
     fastest = aircraft.slowest + (excess.shape[1] - 1) * aircraft.speed_step
     for n in range(starts.shape[0]):
         start = starts[n]
@@ -110,6 +111,9 @@ def _look_ahead(
                 here.north += lasts * over_north
                 here.up -= lasts * sink
                 yaw += side * _PART
+    # Compiled code frees an array after its last use, and a record of it does not count as one.
+    if turnings.size != 1:
+        left[:] = math.nan
 
 
 @inner
