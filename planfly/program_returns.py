@@ -100,9 +100,9 @@ class ProgramReturns:
             return "by the program: no return could be flown"
         same = sum(one.agrees for one in self.flown)
         worse = sum(one.worse for one in self.flown)
-        told = "all of them as by the law" if same == len(self.flown) else f"{same} of them as by the law"
-        told += f"; {worse} worse than by the law, which errs there" if worse else ""
-        return f"by {self.program} itself: {len(self.flown)} of the worst flown, {told}"
+        compared = "all of them as by the law" if same == len(self.flown) else f"{same} of them as by the law"
+        compared += f"; {worse} worse than by the law, which errs there" if worse else ""
+        return f"by {self.program} itself: {len(self.flown)} of the worst flown, {compared}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
         """Each in a line: where it begins, what it comes to by the law and by the program, and whether they agree."""

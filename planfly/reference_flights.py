@@ -154,7 +154,7 @@ STRAY_SHARE, HEIGHT_ERROR = 0.1, 1.2
 
 
 def has_room(flown: Sequence[Finding], failed: Sequence[Finding]) -> bool:
-    """Whether what failed passes with the room that the law's own error asks for.
+    """Whether what failed passes with the margin that the law's own error asks for.
 
     flown: findings of a flight with another value of a parameter.  failed: of the one before.  Both are compared where
     that failed: beside the legs, and low above ground.
