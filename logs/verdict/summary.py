@@ -176,6 +176,7 @@ def summary_lines(
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
     lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
     lines += _parameter_lines(setup) if level == "flown" else []
+    lines += _unheeded_lines(setup)
     silent: dict[str, str] = {}
     for item in findings:
         if item.ok is None and RULES[item.rule].explained:
@@ -240,6 +241,14 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
     ]
 
 
+def _unheeded_lines(setup: FlightSetup) -> list[str]:
+    """What the scenario asks of returns and this autopilot has no parameter for."""
+    returns, parameters = setup.scenario.returns, setup.autopilot.parameters
+    if returns is None or returns.rtl_autoland is None or parameters is None or hasattr(parameters, "rtl_autoland"):
+        return []
+    return [f"Not used: rtl_autoland of [returns], for which {setup.autopilot.title} has no parameter"]
+
+
 def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
     """The lowest clearance less the terrain's stated error, where one is stated."""
     error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
@@ -261,7 +270,8 @@ def _agreement(other: LevelAnswer) -> str:
     """Where the verdict and another level differ, in words."""
     differing = other.disagreements
     if not differing:
-        return "flight and geometry agree on every finding" if other.name == "geometry" else "both flights agree"
+        geometry = other.name == "geometry"
+        return "flight and geometry agree on every finding that both have" if geometry else "both flights agree"
     more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
     return "; ".join(map(disagreement_text, differing[:_NAMED])) + more
 

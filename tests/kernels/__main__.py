@@ -7,6 +7,7 @@ that they were compiled for: with the same sources nothing is done a second time
 parts, that no command has, they compile themselves: such files come first (conftest.py).
 """
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from planfly.first_start import compile_units
 from planfly.kernel_units.ready_kernels import MISSION
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING
 from planfly.process_setup import prepare_process, with_large_stack
+from world.kernel_cache import PACKAGES
 from world.kernels import cache_folder
 
 # Over which the climb and the corner of MISSION lead.
@@ -81,7 +83,7 @@ PROCESSES = (
         ("report", "path.mcap", "--out", "report"),
     ),
 )
-TESTS_FOLDER = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PYTEST = (sys.executable, "-m", "pytest", "-q")
 
 
@@ -89,7 +91,7 @@ def main() -> int:
     """Run them; 1 where a command fails otherwise than by its verdict."""
     if len(sys.argv) > 1:
         return _run(PROCESSES[int(sys.argv[1])])
-    done = cache_folder() / f"compiled-for-tests-{code_hash()}"
+    done = cache_folder() / f"compiled-for-tests-{_of_this_checkout()}"
     if done.exists():
         return 0
     with tempfile.TemporaryDirectory(prefix="planfly-kernels-") as name:
@@ -100,12 +102,18 @@ def main() -> int:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = [sys.executable, "-m", "tests.kernels"]
         started = [subprocess.Popen([*command, str(k)], cwd=folder, env=environment) for k in range(len(PROCESSES))]
-        reading = subprocess.Popen([*PYTEST, "-n", "0", "--collect-only"], cwd=TESTS_FOLDER.parent)
+        reading = subprocess.Popen([*PYTEST, "-n", "0", "--collect-only"], cwd=ROOT)
         failed = max(one.wait() for one in started)
         reading.wait()
     if not failed:
         done.touch()
     return failed
+
+
+def _of_this_checkout() -> str:
+    """A digest of planfly's sources, their paths and their times: numba keeps its kernels by all three."""
+    stamps = [(str(file), file.stat().st_mtime_ns) for name in PACKAGES for file in (ROOT / name).rglob("*.py")]
+    return hashlib.sha256(f"{code_hash()} {sorted(stamps)}".encode()).hexdigest()[:16]
 
 
 def _run(commands: tuple[tuple[str, ...], ...]) -> int:

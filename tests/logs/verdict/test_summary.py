@@ -3,8 +3,12 @@
 from dataclasses import replace
 from xml.etree import ElementTree
 
+import numpy as np
+
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_parameters, parameters_of
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import default_parameters as px4_parameters
 from logs.verdict.conditions import setup_conditions
 from logs.verdict.findings import Finding, Verdict, make_finding, message
 from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
@@ -12,6 +16,7 @@ from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines, verdict_html
 from tests.logs.verdict.judging import leg, missile, waypoint
 from tests.synthetic import make_setup
+from world.airfield import AskedReturns
 
 
 def failed(rule: str, place: Place, margin: float, **numbers: float) -> Finding:
@@ -97,6 +102,18 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     returns = parameters_of("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
     lines = lines_by(returns)
     assert any(line.endswith("defaults; read, not flown: TERRAIN_FOLLOW") for line in lines)
+
+
+def test_what_px4_has_no_parameter_for_is_not_used() -> None:
+    setup = make_setup(((0.0, 0.0, 100.0), (900.0, 0.0, 100.0)))
+    asked = replace(setup.scenario, returns=AskedReturns(("rtl",), None, np.zeros((0, 3)), 2))
+    levels = (LevelAnswer("autopilot", True, "flyable"),)
+    not_used = []
+    for autopilot in (ArduPlane(default_parameters()), Px4(px4_parameters())):
+        by = replace(setup, scenario=asked, autopilot=autopilot)
+        lines = summary_lines([], by, "flown", levels, setup_conditions(by))
+        not_used += [line for line in lines if line.startswith("Not used")]
+    assert not_used == ["Not used: rtl_autoland of [returns], for which PX4 has no parameter"]
 
 
 # ----------------------------------------------------------------------
