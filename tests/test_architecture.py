@@ -2,6 +2,7 @@
 
 import ast
 import re
+import string
 import subprocess
 import sys
 from collections import Counter
@@ -199,6 +200,62 @@ def test_kernels_name_what_they_read() -> None:
         for column in columns(function)
     ]
     assert numbered == []
+
+
+def assigned(function: Function) -> Iterator[tuple[str, ast.expr]]:
+    """Names that a function assigns to, and what each is given."""
+    for node in ast.walk(function):
+        for target in node.targets if isinstance(node, ast.Assign) else ():
+            assert isinstance(node, ast.Assign)
+            if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                pairs = zip(target.elts, node.value.elts, strict=True)
+                yield from ((name.id, value) for name, value in pairs if isinstance(name, ast.Name))
+            elif isinstance(target, ast.Name):
+                yield target.id, node.value
+
+
+def freed_early(function: Function) -> set[str]:
+    """Records of a function's own arrays that it uses after the last use of their array: numba frees that before."""
+
+    def is_new(value: ast.AST) -> bool:
+        name = value.func.attr if isinstance(value, ast.Call) and isinstance(value.func, ast.Attribute) else ""
+        return name in ("zeros", "empty") and ast.unparse(value).rstrip(")").endswith(tuple(string.ascii_uppercase))
+
+    used: dict[str, int] = {}
+    for node in ast.walk(function):
+        if isinstance(node, ast.Name):
+            used[node.id] = max(node.lineno, used.get(node.id, 0))
+    given = list(assigned(function))
+    arrays = {name for name, value in given if is_new(value)}
+    taken = [(name, value.value) for name, value in given if isinstance(value, ast.Subscript)]
+    kept = {name: source.id for name, source in taken if isinstance(source, ast.Name) and source.id in arrays}
+    return {name for name, array in kept.items() if used[name] > used[array]} | {
+        name for name, source in taken if is_new(source)
+    }
+
+
+FREED = """
+def kernel(out):
+    own, other, kept = np.zeros(2, MOTION), np.zeros(1, dtype=STATE), np.zeros(3, MOTION)
+    here, there, third = own[0], other[0], kept[k]
+    last = np.empty(1, MOTION)[0]
+    out.east = here.east + third.east
+    return kept.size + own.size + there.up
+"""
+
+
+def test_kernels_keep_the_arrays_of_their_records() -> None:
+    """Compiled code frees an array after its last use, and a record of it does not count as one."""
+    (example,) = (node for node in ast.walk(ast.parse(FREED)) if isinstance(node, ast.FunctionDef))
+    assert freed_early(example) == {"there", "last"}
+    found = {
+        f"{name_of(file)}:{function.name}: {name}"
+        for file in OURS
+        for function in functions(file)
+        if is_kernel(function)
+        for name in freed_early(function)
+    }
+    assert found == set()
 
 
 def test_docstrings_and_comments_lean_on_no_other_text() -> None:
