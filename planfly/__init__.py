@@ -22,6 +22,7 @@ returns                              will it come home, from everywhere on its w
 survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely it is to fly; the largest wind from each direction
 serve                                a MAVLink vehicle for ground stations
+open_studio                          a page on which a mission is dragged, judged, flown and saved
 scenarios, aircraft                  what is embedded
 terrain                              the ground of an area as a file, from tiles or from the Copernicus DEM's server
 new_scenario                         a commented scenario of one's own, from here to there over this ground
@@ -112,6 +113,7 @@ if TYPE_CHECKING:
     from planfly.paper import paper_tables as paper_tables
     from planfly.pipeline import PlanThenFly as PlanThenFly
     from planfly.stages import progress as progress
+    from planfly.studio.open_studio import open_studio as open_studio
     from planner.plan import Plan as Plan
     from world.errors import ArgumentError as ArgumentError
     from world.errors import FlightError as FlightError
@@ -214,6 +216,7 @@ _HOMES = {
             "SurveyFound",
             "survey",
         ),
+        "planfly.studio.open_studio": ("open_studio",),
         "planfly.campaigns.campaign_result": ("CampaignResult",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
         "planfly.campaigns.find_winds": ("WindsFound",),

@@ -45,6 +45,7 @@ EXTRAS = {
             "`planfly serve`, `replay --to IP:PORT`, ArduPlane itself (`--autopilot PATH`), `.tlog` files",
             ("pymavlink",),
         ),
+        Extra("studio", "the studio needs", "`planfly studio`", ("starlette", "uvicorn", "websockets")),
         Extra("foxglove", "Foxglove needs", "`replay --foxglove`", ("cryptography", "foxglove")),
         Extra("films", "an .mp4 needs", "`replay --movie FILE.mp4` where ffmpeg is not installed", ("imageio_ffmpeg",)),
         Extra(

@@ -20,7 +20,17 @@ _ORDER = (
         "report",
     ),
     *("compare", "export", "foxglove_layout", "timeline", "instruments", "movie", "play_to_foxglove"),
-    *("play_to_stations", "import_log", "refly", "recover", "campaign", "campaign_flight", "winds", "serve"),
+    *(
+        "play_to_stations",
+        "import_log",
+        "refly",
+        "recover",
+        "campaign",
+        "campaign_flight",
+        "winds",
+        "serve",
+        "open_studio",
+    ),
     *("scenarios", "aircraft", "describe_aircraft", "new_aircraft", "paper_tables", "optimise", "progress"),
 )
 _TITLES = {"function": "Functions", "class": "Classes", "error": "Errors"}

@@ -13,6 +13,7 @@ from planner.ground_ways import GroundWays
 from planner.plan import Plan
 from world.frames import GeoOrigin, to_geo
 from world.geometry import leg_courses, turning_angles, wrap
+from world.scenario import Scenario
 from world.wind import W20
 
 Floats = NDArray[np.float64]
@@ -57,9 +58,7 @@ def plan_mission(
     """
     ways = plan.ways or GroundWays()
     points = _way(plan, ways)
-    radii = _acceptance(plan, points, airspeed, max_bank)
-    if tracking is not None:
-        radii = _turn_distances(plan, points, airspeed, tracking)
+    radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
     home = _home(plan)
     builder = _Items(plan.scenario.origin)
     if ways.climb is not None:
@@ -124,14 +123,21 @@ def _rally(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[MissionIte
         yield MissionItem(number, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, *place)
 
 
-def _acceptance(plan: Plan, points: Floats, airspeed: float, max_bank: float) -> Floats:
-    """(w,) m, whole."""
-    wind = max(math.hypot(*plan.scenario.wind.at(float(amsl))) for amsl in points[:, 2])
+def acceptance_radii(
+    scenario: Scenario, points: Floats, airspeed: float, max_bank: float, tracking: TrackingError | None
+) -> Floats:
+    """The acceptance radius at each place that a planned mission flies to, (w,) m, whole; as of `plan_mission`.
+
+    points: (w, 3) m, in flying order.
+    """
+    if tracking is not None:
+        return _turn_distances(scenario, points, airspeed, tracking)
+    wind = max(math.hypot(*scenario.wind.at(float(amsl))) for amsl in points[:, 2])
     turns, pull = turning_angles(points), GRAVITY * math.tan(max_bank)
     radii = np.full(len(points), ACCEPTANCE_TOLERANCE)
     radii[1:-1] += _offsets(np.minimum(turns, _SHARPEST), (airspeed + wind) ** 2 / pull)
     # Arcs are drawn with room for a gust; one sharper than these passes where it passes, and a U-turn's at infinity.
-    gust = 0.1 * W20[plan.scenario.wind.turbulence]
+    gust = 0.1 * W20[scenario.wind.turbulence]
     arcs = _offsets(np.minimum(turns, _U_TURN), (airspeed + wind + gust) ** 2 / pull)
     radii[1:-1] = np.maximum(radii[1:-1], arcs)
     return np.ceil(radii - 1e-6)
@@ -142,13 +148,13 @@ def _offsets(turns: Floats, radius: float) -> Floats:
     return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
 
 
-def _turn_distances(plan: Plan, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
+def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
     """(w,) m, whole: for each corner at the highest ground speed on the way from one course to the other."""
     turns, courses = turning_angles(points), leg_courses(points)
     radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
     for i, turn in enumerate(turns, 1):
         up = float(points[i, 2])
-        east, north = plan.scenario.wind.at(up)
+        east, north = scenario.wind.at(up)
         speed = airspeed * air_density_factor(up)
         between = courses[i - 1] + wrap(courses[i] - courses[i - 1]) * np.linspace(0.0, 1.0, 5)
         over_ground = [

@@ -15,6 +15,7 @@ from logs import theme
 from logs.views.charts import Floats, legend_entries, nice_step, shorten
 from logs.views.drawing import WIDTH, clean_style, draw_layers, draw_legend, legend_handle, new_figure, write_labels
 from logs.views.map import MapChart, NamedWind
+from logs.views.relief import relief
 from world.terrain import Terrain
 
 # Inches: the map's own width, what stands around it, its legend, and the column beside it.
@@ -88,7 +89,7 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
     colours = LinearSegmentedColormap.from_list("ground", theme.GROUND)
     norm = Normalize(low - 0.5, high + 0.5) if flat else Normalize(low, high)
     picture = colours(norm(heights))
-    picture[..., :3] *= 1.0 if flat else _shade(heights, float(north[1] - north[0]), high - low)[..., None]
+    picture[..., :3] *= 1.0 if flat else relief(heights, float(north[1] - north[0]), high - low)[..., None]
     picture[np.isnan(heights)] = theme.rgba("unknown")
     extent = (*east_range, *north_range)
     axes.imshow(picture, extent=extent, origin="lower", interpolation="bilinear", zorder=1, aspect="equal")
@@ -105,17 +106,6 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
     )
     _colour_bar(figure, colours, norm, levels, column, top)
     return [Line2D([], [], color=theme.colour("contour"), linewidth=0.8, label=f"contours every {step:g} m AMSL")]
-
-
-def _shade(heights: Floats, pitch: float, span: float) -> Floats:
-    """Brightness under light from the north-west, about 0.75 to 1.1 clipped at 1; level ground where unknown."""
-    filled = np.where(np.isfinite(heights), heights, np.nanmean(heights))
-    up_north, up_east = np.gradient(filled, pitch)
-    # Gentle country is exaggerated, so that its ridges show.
-    gain = float(np.clip(600.0 / span, 0.5, 4.0))
-    slope_e, slope_n = gain * up_east, gain * up_north
-    lit = (0.5 * slope_e - 0.5 * slope_n + 0.707) / np.sqrt(1.0 + slope_e**2 + slope_n**2)
-    return np.asarray(np.clip(0.96 + 0.42 * (lit - 0.707), 0.55, 1.0))
 
 
 def _colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:

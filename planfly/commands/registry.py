@@ -46,6 +46,7 @@ COMMANDS = (
     Command("plan", _FLY, "PlanAnswer"),
     Command("export", _FLY, "ExportAnswer"),
     Command("fly", _FLY, "FlyAnswer"),
+    Command("studio", _FLY),
     Command("serve", _FLY),
     Command("check", _LOOK, "verdict_answers.CheckDocument"),
     Command("returns", _LOOK, "returns_answers.ReturnsAnswer"),

@@ -188,6 +188,7 @@ MAX_MEGABYTES = 500
 MISSED = {
     "campaigns": "campaign paper-07",
     "live": "serve",
+    "studio": "studio",
     "foxglove": "replay out/flight.mcap --foxglove",
     "films": "replay out/flight.mcap --movie a.mp4",
     "tables": "export out/flight.mcap a.parquet",

@@ -98,6 +98,7 @@ MISSED = {
     "campaign paper-07": ("campaigns", "campaigns need"),
     "campaign paper-07 --out c --refly 3": ("campaigns", "campaigns need"),
     "winds paper-07": ("campaigns", "campaigns need"),
+    "studio": ("studio", "the studio needs"),
     "serve": ("live", "serve needs"),
     "replay flight.mcap --to 127.0.0.1:9": ("live", "playing to ground stations needs"),
     "fly mission.waypoints --terrain dem.tif --autopilot ./arduplane --log l.mcap": ("live", "--autopilot needs"),

@@ -16,6 +16,7 @@ FUNCTIONS = {
     "plan": ("plan", "replan"),
     "export": ("export",),
     "fly": ("fly",),
+    "studio": ("open_studio",),
     "serve": ("serve",),
     "check": ("judge", "fly_by_each"),
     "returns": ("returns",),

@@ -32,7 +32,17 @@ VERBS = {
         "report",
     ),
     *("compare", "export", "foxglove_layout", "replay", "timeline", "instruments", "movie", "play_to_foxglove"),
-    *("play_to_stations", "import_log", "refly", "recover", "campaign", "campaign_flight", "winds", "serve"),
+    *(
+        "play_to_stations",
+        "import_log",
+        "refly",
+        "recover",
+        "campaign",
+        "campaign_flight",
+        "winds",
+        "serve",
+        "open_studio",
+    ),
     *(
         "scenarios",
         "aircraft",

@@ -55,6 +55,9 @@ EVERY = {
         Given(("plan", "tight", "--out", "new.json"), target="new.json"),
         Given(("export", "plan.json", "new.plan"), target="new.plan"),
         Given(("fly", "short.waypoints", "--scenario", "field.toml", "--log", "new.mcap"), (0, 4), "new.mcap"),
+        Given(
+            ("studio", "short.waypoints", "--scenario", "field.toml", "--no-browser", "--port", "0", "--keep", "kept")
+        ),
         Given(("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")),
         Given(("check", "flight.mcap", "--json", "new.json"), (0, 4), "new.json"),
         Given(("returns", "plan.json", "--every", "20", "--json", "new.json"), (0, 4), "new.json"),
@@ -80,6 +83,8 @@ EVERY = {
         Given(("completion", "bash")),
     )
 }
+# What those say when they are there that serve until they are stopped.
+READY = {"serve": " ready", "studio": "#t="}
 assert list(EVERY) == [command.name for command in COMMANDS]
 
 
@@ -139,9 +144,9 @@ def give(
             start_new_session=True, preexec_fn=change,
         )  # fmt: skip
     try:
-        if given.name == "serve" and serves:
+        if given.name in READY and serves:
             until = time.monotonic() + limit
-            while process.poll() is None and " ready" not in said.read_text(encoding="utf-8"):
+            while process.poll() is None and READY[given.name] not in said.read_text(encoding="utf-8"):
                 assert time.monotonic() < until, said.read_text(encoding="utf-8")
                 time.sleep(0.05)
             if process.poll() is None:

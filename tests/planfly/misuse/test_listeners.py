@@ -37,6 +37,7 @@ HOLD = {
     "planfly/campaigns/worker_pool.py": "`campaign`, `winds`",
     "planfly/replays/foxglove_server.py": "`replay --foxglove`",
     "planfly/replays/origin_gate.py": "`replay --foxglove`",
+    "planfly/studio/open_studio.py": "`studio`",
 }
 
 
@@ -93,6 +94,20 @@ def test_a_replay(tmp_path: Path, command: str) -> None:
             assert listening(process.pid) == wanted
         finally:
             process.kill()
+
+
+def test_the_studio(tmp_path: Path) -> None:
+    keep = str(tmp_path / "kept")
+    how = [sys.executable, "-m", "planfly", "studio", "--no-browser", "--port", "0", "--keep", keep]
+    with subprocess.Popen(how, stdout=subprocess.PIPE) as process:
+        try:
+            assert process.stdout is not None
+            while b"#t=" not in process.stdout.readline():
+                assert process.poll() is None
+            assert listening(process.pid) == table()["`studio`"]
+        finally:
+            process.terminate()
+            process.wait(30)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,64 @@
+"""``planfly studio``: a page of this machine on which a mission is dragged, judged while it is dragged, and flown."""
+
+import argparse
+
+import planfly
+from planfly.terminal.arguments import IMPORTED_LOGS, MISSIONS, completed, files, number
+from planfly.terminal.command_parser import LineParser
+from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.options import (
+    call,
+    flown_by_options,
+    pilot_options,
+    print_at_once,
+    stop_signals,
+    world_options,
+)
+
+_HANDS = """
+Waypoints are dragged on the map, heights on the profile below it; a diamond on a leg inserts one.  While it is dragged
+the geometry is judged; when it is let go the mission is flown by the autopilot's law.  Keys: arrows move a waypoint by
+10 m (with Shift 100 m), Page Up and Page Down by 5 m of height, Delete deletes it, Ctrl+Z and Ctrl+Shift+Z undo and
+redo, Escape takes a drag back.  Only this machine reaches the page, by the address that is printed."""
+
+
+def studio_options(line: LineParser) -> None:
+    """The parser of ``planfly studio``."""
+    parser = line.command(
+        "studio",
+        "a page on which a mission is dragged, judged while it is dragged, flown, and saved",
+        "planfly studio jacksboro",
+        "planfly studio mission.waypoints --terrain jacksboro --no-browser",
+        extra="studio",
+        more=_HANDS,
+    )
+    completed(
+        parser.add_argument(
+            "what", metavar="SCENARIO|MISSION|PLAN", nargs="?",
+            help="a scenario, by name or .toml, whose path is planned; plan.json, .waypoints, .plan; or a "
+            "log's mission (default: jacksboro)",
+        ),
+        files("toml", "mcap", *MISSIONS, *IMPORTED_LOGS),
+    )  # fmt: skip
+    parser.add_argument(
+        "--port", metavar="PORT", type=number("port"), help="where it listens (default: 8790, or any free one)"
+    )
+    parser.add_argument(
+        "--no-browser", dest="browser", action="store_const", const=False, help="print the address, and open nothing"
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=number("seed"), help="of planner and turbulence (default: the scenario's, or 1)"
+    )
+    parser.add_argument(
+        "--keep", metavar="DIR", help="folder in which what was done is kept for the next start (default: runs/studio)"
+    )
+    world_options(parser)
+    flown_by_options(parser)
+    pilot_options(parser)
+
+
+def studio(args: argparse.Namespace) -> int:
+    """Serve until SIGINT or SIGTERM."""
+    with stop_signals() as stop:
+        call(planfly.open_studio, args, stop=stop, on_message=print_at_once)
+    return FLYABLE

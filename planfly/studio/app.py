@@ -1,0 +1,48 @@
+"""The studio's addresses: the page's own files from a fixed table, and one websocket.  No path is made of a request."""
+
+from importlib import resources
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route, WebSocketRoute
+
+from logs.theme import css_variables
+from planfly.studio.guard import App, Guard
+from planfly.studio.server import Server
+
+_TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+FILES = (
+    *("studio.html", "studio.css", "studio.js", "link.js", "axes.js", "map.js", "profile.js", "hands.js", "panel.js"),
+    *("scene.js", "icon.svg"),
+)
+
+
+def page_files() -> dict[str, tuple[bytes, str]]:
+    """Bytes and type of each file of the page, by its address.
+
+    >>> page_files()["/"][1]
+    'text/html; charset=utf-8'
+    """
+    folder = resources.files("planfly.studio") / "page"
+    found = {f"/{name}": ((folder / name).read_bytes(), _type(name)) for name in FILES}
+    found["/"] = found.pop("/studio.html")
+    found["/theme.css"] = (css_variables().encode(), _type("theme.css"))
+    return found
+
+
+def _type(name: str) -> str:
+    return f"{_TYPES[name[name.rindex('.') :]]}; charset=utf-8"
+
+
+def make_app(server: Server, port: int) -> App:
+    """The whole application, behind its guard."""
+    files = page_files()
+
+    def answer(request: Request) -> Response:
+        data, media_type = files[request.url.path]
+        return Response(data, media_type=media_type)
+
+    routes: list[Route | WebSocketRoute] = [Route(path, answer, methods=["GET"]) for path in files]
+    routes.append(WebSocketRoute("/session", server.serve))
+    return Guard(Starlette(routes=routes), port)

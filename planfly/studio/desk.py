@@ -1,0 +1,181 @@
+"""A mission under edit in its world: where its items lie, the route that it comes to, and its geometric verdict.
+
+World and aircraft are loaded once.  A mission that was not changed is judged as it was opened, a plan with its
+certificate; a changed one as a mission file is.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.from_plan import acceptance_radii
+from flight.mission.implied_scenario import implied_scenario
+from flight.mission.items import LANDINGS, Command, Mission
+from flight.mission.placing import PlacedMission, place_stops
+from flight.mission.route import Route, lay_route, with_end_courses
+from flight.simulation.setup import FlightSetup
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_geometry import judge_geometry
+from planfly.airframe import Airframe, load_airframe
+from planfly.open_mission import OpenedMission
+from planfly.pipeline import make_setup
+from planfly.studio.edits import places
+from planner.plan import Plan
+from world.frames import to_geo, to_map
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+# A mission without a scenario gets a new one around it where it comes so near to the edge of its own, m.
+_RIM = 500.0
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A mission, its setup and its geometric verdict."""
+
+    mission: Mission
+    setup: FlightSetup
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Desk:
+    """What a mission under edit is judged with.
+
+    scenario: its world; airframe: loaded of it; seed: of its flight.
+    opened: the setup as it was opened, with its plan if it is of one.
+    terrain: of a mission that came without a scenario, the elevation file named; None for none.
+    planned: whether the acceptance radii are planfly's, and follow the turns.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    seed: int
+    opened: FlightSetup
+    terrain: str | None = None
+    planned: bool = False
+
+    @classmethod
+    def of(cls, opened: OpenedMission, terrain: str | None = None) -> "Desk":
+        """The desk of an opened mission or plan."""
+        setup = opened.setup
+        return cls(setup.scenario, opened.airframe, setup.seed, setup, terrain, planned=setup.plan is not None)
+
+    def flown_as(self, scenario: Scenario) -> "Desk":
+        """The desk with the same mission in another weather, or with another aircraft or autopilot."""
+        airframe = load_airframe(scenario)
+        opened, plan = self.opened, self.opened.plan
+        plan = None if plan is None else replace(plan, scenario=scenario)
+        setup = make_setup(scenario, airframe, opened.mission, self.seed, plan=plan)
+        return replace(self, scenario=scenario, airframe=airframe, opened=setup)
+
+    def of_plan(self, plan: Plan, mission: Mission) -> "Desk":
+        """The desk of a plan that was made here; its mission counts with its certificate until it is changed."""
+        setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
+        return replace(self, opened=setup, planned=True)
+
+    def around(self, mission: Mission) -> "Desk":
+        """The desk, in a new world if the mission has left the one that was made around it."""
+        if not self.scenario.external:
+            return self
+        points = self.points(mission)[:, :2]
+        (west, east), (south, north) = self.scenario.bounds.tolist()
+        low, high = points.min(axis=0), points.max(axis=0)
+        if low[0] > west + _RIM and high[0] < east - _RIM and low[1] > south + _RIM and high[1] < north - _RIM:
+            return self
+        made = implied_scenario(mission, self.terrain, self.scenario.flight, vertical_legs=True).scenario
+        spec = made.spec.model_copy(update={"wind": self.scenario.spec.wind, "limits": self.scenario.spec.limits})
+        made = replace(made, spec=spec, wind=self.scenario.wind, limits=self.scenario.limits)
+        return replace(self, scenario=made)
+
+    # ------------------------------------------------------------------
+    # Places.
+
+    def placed(self, mission: Mission) -> PlacedMission:
+        """A mission's stops on the map, jumps unrolled."""
+        return place_stops(mission, self.scenario.origin, self.scenario.terrain, vertical_legs=True)
+
+    def points(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
+        """East, north and height above mean sea level of each place of `edits.places`, (n, 3) m.
+
+        The height of one that no flight comes to is NaN.
+        """
+        placed = self.placed(mission) if placed is None else placed
+        heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
+        items = [mission.items[k] for k in places(mission)]
+        east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
+        return np.stack([east, north, [heights.get(one.seq, np.nan) for one in items]], axis=1)
+
+    def geographic(self, east: float, north: float) -> tuple[float, float]:
+        """Latitude and longitude of a place on the map, degrees."""
+        lat, lon = to_geo(self.scenario.origin, east, north)
+        return float(lat), float(lon)
+
+    def retuned(self, mission: Mission, index: int) -> Mission:
+        """A planned mission with the acceptance radii that its turns about an item come to; any other as it is."""
+        if not self.planned:
+            return mission
+        own = places(mission)
+        at = int(np.searchsorted(own, index))
+        chain = own[max(0, at - 2) : at + 3]
+        points = self._flat_points(mission, chain)
+        frame = self.airframe
+        radii = acceptance_radii(self.scenario, points, frame.airspeed, frame.max_bank, frame.limits.tracking)
+        items = list(mission.items)
+        for k, radius in zip(chain, radii.tolist(), strict=True):
+            # At the ends of the chain the turn is not known, but at those of the mission there is none.
+            inner = k not in (chain[0], chain[-1]) or k in (own[0], own[-1])
+            if inner and items[k].command == Command.NAV_WAYPOINT:
+                params = items[k].params
+                items[k] = replace(items[k], params=(params[0], radius, *params[2:]))
+        return replace(mission, items=tuple(items))
+
+    def _flat_points(self, mission: Mission, chosen: tuple[int, ...]) -> Floats:
+        """Places of a planned mission, whose heights are above mean sea level; a landing's is that of its line-up."""
+        items = [mission.items[k] for k in chosen]
+        east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
+        up = [one.alt for one in items]
+        for k, item in enumerate(items):
+            if item.command in LANDINGS and k:
+                up[k] = up[k - 1]
+        return np.stack([east, north, up], axis=1)
+
+    # ------------------------------------------------------------------
+    # Verdicts.
+
+    def setup(self, mission: Mission) -> FlightSetup:
+        """Everything that decides the flight of a mission.  Raises MissionError for one that cannot be laid out."""
+        if mission is self.opened.mission and self.scenario is self.opened.scenario:
+            return self.opened
+        return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.placed(mission))
+
+    def judge(self, mission: Mission) -> Judged:
+        """The whole geometric verdict on a mission."""
+        setup = self.setup(mission)
+        return Judged(mission, setup, judge_geometry(setup))
+
+    def route(self, mission: Mission) -> Route:
+        """The route that a mission comes to, without the notes that are made for people."""
+        frame, autopilot = self.airframe, self.airframe.autopilot
+        fly_over = self.scenario.flight.fly_over
+        laws = autopilot.return_rules, autopilot.loiter_rules, autopilot.reads_as_px4
+        laid = lay_route(self.placed(mission), frame.airspeed, fly_over, frame.limits, *laws)
+        return with_end_courses(laid, self.scenario, frame.limits)
+
+    def part(self, mission: Mission, route: Route) -> FlightSetup:
+        """A setup of a part of a mission's route, of which legs and corners are judged and nothing is flown."""
+        frame = self.airframe
+        return FlightSetup(
+            scenario=self.scenario,
+            mission=mission,
+            mission_text="",
+            route=route,
+            limits=frame.limits,
+            aircraft=frame.aircraft.name,
+            battery=frame.battery,
+            seed=self.seed,
+            autopilot=frame.autopilot,
+            nav=self.scenario.flight.steering.nav,
+            guidance_hz=self.scenario.flight.guidance_hz,
+        )

@@ -1,0 +1,245 @@
+"""What is opened in the studio, and what a mission under edit is saved as, with what each form leaves out."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flight.mission.from_plan import plan_mission
+from flight.mission.items import AMSL, Mission
+from flight.mission_files.formats import mission_text, parse_mission
+from logs.importers.open_log import is_imported_log
+from logs.recording.reader import read_log
+from logs.views.exports.map_files import kml_text, map_zones, plan_line
+from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.api.flying import opened_mission
+from planfly.api.imported import read_imported
+from planfly.open_mission import OpenedMission, ScenarioChange, is_log
+from planfly.pipeline import make_setup
+from planfly.studio.desk import Desk, Judged
+from planner.evaluation.certify import certify
+from planner.evaluation.paper_scores import paper_scores
+from planner.evaluation.problem import make_problem
+from planner.plan import Certificate, Plan, plan_json
+from world.elevation_formats import EMBEDDED
+from world.errors import MissionError, PlanflyError
+from world.files import temporary_folder
+from world.scenario import Scenario, embedded_names, load_scenario
+
+# A file that is dropped on the page, bytes.
+MAX_DROPPED = 16 * 2**20
+# What may be dropped: all that `planfly check` reads and that names no other file.
+DROPPED = (".waypoints", ".txt", ".plan", ".json", ".mcap", ".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml", ".kmz")
+KINDS = {"waypoints": ".waypoints", "plan": ".plan", "plan.json": ".json", "kml": ".kml"}
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """An opened mission and where it is from.
+
+    name: for people; stem: of files that are saved.
+    opened: with its setup and airframe.
+    kind: of `KINDS`, "" for what was no mission file; data: its bytes, which an unchanged mission is saved as.
+    path: the file that the command named; None for a scenario, and for a dropped file.
+    to_plan: whether it is a scenario that has no path yet.
+    """
+
+    name: str
+    stem: str
+    opened: OpenedMission
+    kind: str = ""
+    data: bytes = b""
+    path: Path | None = None
+    to_plan: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """In which world a mission is opened, as the command names it; None keeps what it has."""
+
+    scenario: str | None = None
+    terrain: str | None = None
+    fence: tuple[str, ...] = ()
+    seed: int | None = None
+    change: ScenarioChange = lambda scenario: scenario
+
+
+def open_document(target: str, world: World) -> Document:
+    """Open a scenario, a plan, a mission or a log, by name or path.  Raises PlanflyError."""
+    if target in embedded_names() or target.lower().endswith(".toml"):
+        scenario = world.change(load_scenario(target, world.terrain))
+        return _of_scenario(scenario, world.seed)
+    path = Path(target)
+    opened = _open_file(path, world)
+    kind = next((kind for kind, suffix in KINDS.items() if suffix == path.suffix.lower()), "")
+    kind = "waypoints" if path.suffix.lower() == ".txt" else "" if kind == "kml" else kind
+    return Document(path.name, path.stem, opened, kind, path.read_bytes() if kind else b"", path)
+
+
+def open_dropped(name: str, data: bytes, world: World) -> Document:
+    """Open a file that was dropped on the page: its bytes, and of its name the suffix.  Raises PlanflyError."""
+    suffix = Path(name).suffix.lower()
+    shown = "".join(ch if ch.isprintable() and ch not in "/\\" else "_" for ch in name)[-60:] or "dropped"
+    if suffix not in DROPPED:
+        raise MissionError.at(shown, "suffix", suffix, f"allowed {', '.join(DROPPED)}", shown=repr(suffix))
+    if suffix == ".json":
+        _refuse_other_files(shown, data)
+    with temporary_folder("planfly-studio-") as folder:
+        file = folder / f"dropped{suffix}"
+        file.write_bytes(data)
+        try:
+            opened = open_document(str(file), world)
+        except PlanflyError as error:
+            raise PlanflyError(str(error).replace(str(file), shown), file=shown) from None
+    return replace(opened, name=shown, stem=Path(shown).stem, path=None)
+
+
+def _refuse_other_files(name: str, data: bytes) -> None:
+    """Refuse a plan whose scenario names files of this machine: the page may not have any read."""
+    try:
+        scenario = json.loads(data)["scenario"]
+        named = [scenario.get("terrain", {}).get("path"), scenario.get("flight", {}).get("params")]
+        named += [scenario.get("zones_file"), _folder(scenario.get("flight", {}).get("aircraft"))]
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        # What is wrong with it is said where it is read.
+        return
+    for one in named:
+        if one is not None and str(one) not in EMBEDDED:
+            allowed = "a plan that names other files is opened by the command: planfly studio plan.json"
+            raise MissionError.at(name, "scenario", str(one)[:60], allowed)
+
+
+def _folder(aircraft: Any) -> str | None:
+    return aircraft if isinstance(aircraft, str) and ("/" in aircraft or "\\" in aircraft) else None
+
+
+def _open_file(path: Path, world: World) -> OpenedMission:
+    """A plan, a mission, or the mission of a log."""
+    if path.is_file() and is_imported_log(path):
+        found = read_imported(path, scenario=world.scenario, terrain=world.terrain, fence=world.fence)
+        return _unflown(found.setup.scenario, found.setup.mission, found.setup.seed, path.stem)
+    if path.is_file() and is_log(path):
+        setup = read_log(path).setup
+        return _unflown(world.change(setup.scenario), setup.mission, setup.seed, path.stem)
+    return opened_mission(path, world.scenario, world.terrain, world.seed, world.fence, world.change)
+
+
+def _unflown(scenario: Scenario, mission: Mission, seed: int, stem: str) -> OpenedMission:
+    """The mission of a log, to be flown again."""
+    airframe = load_airframe(scenario)
+    return OpenedMission(make_setup(scenario, airframe, mission, seed), airframe, stem)
+
+
+def _of_scenario(scenario: Scenario, seed: int | None) -> Document:
+    """A scenario with the straight line from its start to its destination, until a path is planned."""
+    airframe, number = load_airframe(scenario), choose_seed(scenario, seed)
+    mission = planned_mission(straight_plan(scenario, number), airframe)
+    opened = OpenedMission(make_setup(scenario, airframe, mission, number), airframe, scenario.name)
+    return Document(scenario.name, scenario.name, opened, to_plan=True)
+
+
+def straight_plan(scenario: Scenario, seed: int) -> Plan:
+    """The straight line as a plan that nobody has certified."""
+    line = np.stack([scenario.start, scenario.destination])
+    certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ("not planned yet",))
+    return Plan(scenario, line, np.zeros(4, dtype=np.int64), np.zeros(4), certificate, seed, "", 0, np.zeros((0, 3)))
+
+
+def planned_mission(plan: Plan, airframe: Airframe) -> Mission:
+    """The mission of a plan."""
+    tracking = airframe.limits.tracking
+    return plan_mission(plan, airframe.airspeed, airframe.max_bank, source=plan.scenario.name, tracking=tracking)
+
+
+# ----------------------------------------------------------------------
+# Saved.
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """A file's name and bytes, and what it leaves out of what is shown, a line each."""
+
+    name: str
+    data: bytes
+    losses: tuple[str, ...] = ()
+
+
+def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> Saved:
+    """The mission under edit in one of `KINDS`.  Raises PlanflyError where it cannot be.
+
+    An unchanged mission in the form that it was opened in is the file that was opened.
+    """
+    mission, name = judged.mission, f"{document.stem}{KINDS[kind]}"
+    if kind == document.kind and mission is document.opened.setup.mission:
+        return Saved(name, document.data)
+    if kind == "plan.json":
+        return _saved_plan(name, desk, judged)
+    if kind == "kml":
+        text = kml_text(desk.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
+        return Saved(name, _bytes(text), ("a map only: the commands, speeds and frames of the items are not in it",))
+    text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
+    return Saved(name, text.encode(), _losses(desk, mission, text, name, kind))
+
+
+def _bytes(text: str | bytes) -> bytes:
+    return text.encode() if isinstance(text, str) else text
+
+
+def _losses(desk: Desk, mission: Mission, text: str, name: str, kind: str) -> tuple[str, ...]:
+    """What a ground station's file does not hold of a mission and its world."""
+    kept, found = parse_mission(text, name), []
+    apart: Mapping[str, tuple[int, str]] = {
+        "fence items": (len(mission.fences) - len(kept.fences), ".plan holds them"),
+        "rally points": (len(mission.rally) - len(kept.rally), ".plan holds them"),
+        "survey plans": (len(mission.survey_plans), "their items stay, what the ground station keeps beside them goes"),
+    }
+    found += [f"{count} {what}: {how}" for what, (count, how) in apart.items() if count > 0]
+    if kind == "waypoints" and mission.cruise_speed != kept.cruise_speed and mission.cruise_speed is not None:
+        found.append("the ground station's cruise speed")
+    threats, zones = len(desk.scenario.threats), len(desk.scenario.zones)
+    world = [f"{count} {what}" for count, what in ((threats, "threats"), (zones, "zones")) if count]
+    if world:
+        found.append(f"the scenario's {' and '.join(world)}: planfly export writes them as a fence")
+    return tuple(found)
+
+
+def _saved_plan(name: str, desk: Desk, judged: Judged) -> Saved:
+    """The mission as a plan of its scenario, with the certificate that its path has now."""
+    plan = judged.setup.plan
+    if plan is not None:
+        return Saved(name, plan_json(plan).encode())
+    made = certified_plan(desk, judged)
+    losses = ["the items: a plan holds places alone, and its mission is made of them anew"] if not desk.planned else []
+    if not made.feasible:
+        problem = (made.certificate.problems or ("violations are counted",))[0]
+        losses.append(f"it is a plan that is not feasible: {problem}")
+    return Saved(name, plan_json(made).encode(), tuple(losses))
+
+
+def certified_plan(desk: Desk, judged: Judged) -> Plan:
+    """A plan of the route's waypoints, scored and certified as the planner's are.
+
+    Raises MissionError for a mission that no plan can hold: without a scenario, or with more than plain waypoints.
+    """
+    mission, route, scenario = judged.mission, judged.setup.route, desk.scenario
+    name = mission.source
+    if scenario.external:
+        raise MissionError(
+            f"{name}: a plan needs a scenario, and this mission came without one (--scenario)", file=name
+        )
+    plain = not route.arcs.any() and len(set(route.items[route.items >= 0].tolist())) == (route.items >= 0).sum()
+    if (
+        not plain
+        or route.return_to is not None
+        or any(one.frame not in AMSL and one.has_position for one in mission.items)
+    ):
+        raise MissionError(f"{name}: a plan holds plain waypoints above mean sea level, once each", file=name)
+    waypoints = np.array(route.waypoints)[route.items >= 0]
+    limits = desk.airframe.limits.surely()
+    problem = make_problem(scenario, limits)
+    certificate = certify(problem, waypoints)
+    counts, objectives = paper_scores(problem.certified, waypoints[None])
+    return Plan(*(scenario, waypoints, counts[0], objectives[0], certificate, desk.seed, "edited", 0, np.zeros((0, 3))))

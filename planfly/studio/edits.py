@@ -1,0 +1,182 @@
+"""Changes of a mission's items, each a new mission: moved, raised, inserted, deleted, at another speed.
+
+An item keeps its frame and all that is not changed of it, so that a mission of which nothing was moved is the one that
+was opened.  Items are named by their place in the list; numbers and targets of jumps follow what is inserted.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+from flight.mission.items import (
+    LANDINGS,
+    PLACES,
+    TAKEOFFS,
+    Command,
+    Frame,
+    Mission,
+    MissionItem,
+    item_problem,
+    on_grid,
+)
+from world.errors import MissionError
+
+# Items of a mission under edit at most: a drag is judged in time for the hand, and the page draws them all.
+MAX_EDITED = 2_000
+
+
+def is_place(item: MissionItem) -> bool:
+    """Whether an item is a place on the map that can be moved."""
+    return item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position
+
+
+def places(mission: Mission) -> tuple[int, ...]:
+    """The items of a mission that can be moved, by their place in its list.
+
+    >>> way = [MissionItem(k, c, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 178), (3, 16))]
+    >>> places(Mission(None, tuple(way)))
+    (0, 2)
+    """
+    return tuple(k for k, item in enumerate(mission.items) if is_place(item))
+
+
+def checked_place(mission: Mission, index: int) -> MissionItem:
+    """The item that is to be changed.  Raises MissionError for one that is not there or is no place."""
+    if not 0 <= index < len(mission.items):
+        raise MissionError.at(mission.source, "item", index, f"0..{len(mission.items) - 1} is expected")
+    item = mission.items[index]
+    if not is_place(item):
+        raise MissionError.at(mission.source, f"item {item.seq}", item.command, "is no place on the map")
+    return item
+
+
+def moved(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> Mission:
+    """A mission with an item elsewhere, at its height in its frame.
+
+    >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
+    >>> moved(Mission(None, way), 1, 46.01, 8.00000004).items[1].lon_deg
+    8.0
+    """
+    item = checked_place(mission, index)
+    return _with_item(mission, index, replace(item, lat_deg=on_grid(lat_deg), lon_deg=on_grid(lon_deg)))
+
+
+def raised(mission: Mission, indices: Iterable[int], by: float) -> Mission:
+    """A mission with items higher by so many metres, each in its frame; one without a height stays without.
+
+    >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
+    >>> [item.alt for item in raised(Mission(None, way), [1], 12.5).items]
+    [75.0, 87.5]
+    """
+    for index in indices:
+        item = checked_place(mission, index)
+        if math.isfinite(item.alt):
+            mission = _with_item(mission, index, replace(item, alt=_milli(item.alt + by)))
+    return mission
+
+
+def at_height(mission: Mission, index: int, amsl: float, now: float) -> Mission:
+    """A mission with an item at a height above mean sea level, which was ``now``, m.
+
+    One without a height of its own gets one above mean sea level.
+    """
+    item = checked_place(mission, index)
+    if math.isfinite(item.alt):
+        return raised(mission, (index,), amsl - now)
+    return _with_item(mission, index, replace(item, frame=int(Frame.GLOBAL), alt=_milli(amsl)))
+
+
+def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, height: float | None = None) -> Mission:
+    """A mission with a waypoint more behind a place, in the frame of that place.
+
+    height: in that frame, m; None for that of the place.  Raises MissionError where there is no room for one more.
+
+    >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
+    >>> longer = inserted(Mission(None, way), 0, 46.01, 8.0)
+    >>> [(item.seq, item.lat_deg) for item in longer.items]
+    [(1, 46.0), (2, 46.01), (3, 46.0)]
+    """
+    before = checked_place(mission, after)
+    if len(mission.items) >= MAX_EDITED:
+        raise MissionError(f"{mission.source}: {MAX_EDITED} items: no more can be edited here", file=mission.source)
+    radius = before.params[1] if before.command == Command.NAV_WAYPOINT else 0.0
+    new = MissionItem(
+        before.seq + 1,
+        int(Command.NAV_WAYPOINT),
+        before.frame,
+        (0.0, radius, 0.0, 0.0),
+        on_grid(lat_deg),
+        on_grid(lon_deg),
+        before.alt if height is None else _milli(height),
+    )
+    return _with_new(mission, after + 1, new)
+
+
+def deleted(mission: Mission, index: int) -> Mission:
+    """A mission without a place; a jump to it goes to what follows.
+
+    Raises MissionError where fewer than two places would be left.
+    """
+    checked_place(mission, index)
+    if len(places(mission)) <= 2:
+        message = f"{mission.source}: a mission keeps at least two places"
+        raise MissionError(message, file=mission.source, field="items")
+    seq = mission.items[index].seq
+    items = [item for k, item in enumerate(mission.items) if k != index]
+    return replace(mission, items=tuple(_renumbered(item, seq, -1) for item in items))
+
+
+def at_speed(mission: Mission, index: int, airspeed: float, after: float) -> Mission:
+    """A mission whose leg to a place is flown at a speed, m/s, and what follows at that of before.
+
+    A change of speed that stands before the place already is changed itself.
+    """
+    checked_place(mission, index)
+    own = index > 0 and mission.items[index - 1].command == Command.DO_CHANGE_SPEED
+    if own:
+        change = mission.items[index - 1]
+        now = replace(change, params=(change.params[0], _milli(airspeed), *change.params[2:]))
+        mission, at = _with_item(mission, index - 1, now), index
+    else:
+        mission, at = _with_new(mission, index, _speed_item(mission.items[index].seq, airspeed)), index + 1
+    followed = mission.items[at + 1 :]
+    if not any(is_place(item) for item in followed) or followed[0].command == Command.DO_CHANGE_SPEED:
+        return mission
+    return _with_new(mission, at + 1, _speed_item(mission.items[at].seq + 1, after))
+
+
+def _speed_item(seq: int, airspeed: float) -> MissionItem:
+    params = (0.0, _milli(airspeed), -1.0, 0.0)
+    return MissionItem(seq, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), params, 0.0, 0.0, 0.0)
+
+
+def _with_item(mission: Mission, index: int, item: MissionItem) -> Mission:
+    """A mission with another item in place of one.  Raises MissionError for an item that no mission may have."""
+    _check(mission, item)
+    return replace(mission, items=(*mission.items[:index], item, *mission.items[index + 1 :]))
+
+
+def _with_new(mission: Mission, index: int, item: MissionItem) -> Mission:
+    """A mission with an item more, at a place in its list; what follows is counted on."""
+    _check(mission, item)
+    kept = [_renumbered(one, item.seq - 1, 1) for one in mission.items]
+    return replace(mission, items=(*kept[:index], item, *kept[index:]))
+
+
+def _check(mission: Mission, item: MissionItem) -> None:
+    problem = item_problem(item)
+    if problem is not None:
+        raise MissionError(**problem.at(mission.source, f"{mission.source}: item {item.seq}"))
+
+
+def _renumbered(item: MissionItem, beyond: int, by: int) -> MissionItem:
+    """An item whose number, and whose jump's target, are counted on where they lie beyond a number."""
+    params = item.params
+    if item.command == Command.DO_JUMP and params[0] > beyond:
+        params = (params[0] + by, *params[1:])
+    seq = item.seq + by if item.seq > beyond else item.seq
+    return item if seq == item.seq and params is item.params else replace(item, seq=seq, params=params)
+
+
+def _milli(value: float) -> float:
+    return round(value * 1e3) / 1e3

@@ -1,0 +1,99 @@
+"""Who may speak with the studio: pages that it served itself, on this machine, by the address that it printed.
+
+A page of any site may send requests to 127.0.0.1, and a site may point a name of its own there.  Browsers state both,
+as Origin and as Host, and where a request comes from as Sec-Fetch-Site; no page can change what they state.  The guard
+stands before all of the application, websockets included.
+"""
+
+from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from typing import Any
+
+Scope = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+App = Callable[[Scope, Receive, Send], Awaitable[None]]
+Headers = Iterable[tuple[bytes, bytes]]
+
+NAMES = ("127.0.0.1", "localhost", "[::1]")
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' blob: data:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+# Headers of a request that has a body.
+_BODIES = (b"content-length", b"transfer-encoding")
+# With every answer, refusals included.
+HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"x-frame-options", b"DENY"),
+    (b"cache-control", b"no-store"),
+)
+
+
+def refusal(scope: Scope, port: int) -> tuple[int, str]:
+    """The status and the words with which a request is refused; (0, "") for one that is let in.
+
+    >>> asked = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"evil.test:80")]}
+    >>> refusal(asked, 80)
+    (421, 'this host is not served here')
+    """
+    headers = [(name.lower(), value.decode("latin-1").strip().lower()) for name, value in scope["headers"]]
+    hosts, origins, sites = (
+        [value for name, value in headers if name == wanted] for wanted in (b"host", b"origin", b"sec-fetch-site")
+    )
+    own = {f"{name}:{port}" for name in NAMES}
+    if len(hosts) != 1 or hosts[0] not in own:
+        return 421, "this host is not served here"
+    if origins and (len(origins) > 1 or origins[0] != f"http://{hosts[0]}"):
+        return 403, "another page may not ask"
+    if scope["type"] == "websocket":
+        return (0, "") if origins else (403, "a page says where it is from")
+    if scope.get("method") not in ("GET", "HEAD") or any(name in _BODIES and value != "0" for name, value in headers):
+        return 405, "nothing is sent here"
+    if sites and sites != ["same-origin"] and sites != ["none"] and not _walks_in(scope, headers):
+        return 403, "another page may not ask"
+    return 0, ""
+
+
+def _walks_in(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
+    """Whether a person follows a link to the page itself, which holds nothing before a token is given."""
+    found = dict(headers)
+    is_document = found.get(b"sec-fetch-mode") == "navigate" and found.get(b"sec-fetch-dest") == "document"
+    return scope["path"] == "/" and is_document
+
+
+class Guard:
+    """An ASGI application that refuses, or hands on and adds the headers."""
+
+    def __init__(self, app: App, port: int) -> None:
+        """app: what is guarded.  port: where it listens."""
+        self._app, self._port = app, port
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request or websocket."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        status, words = refusal(scope, self._port)
+        if status and scope["type"] == "websocket":
+            await receive()
+            await send({"type": "websocket.close", "code": 1008})
+            return
+
+        async def answer(message: MutableMapping[str, Any]) -> None:
+            if message["type"] == "http.response.start":
+                message["headers"] = [*message.get("headers", []), *HEADERS]
+            await send(message)
+
+        if status:
+            text = words.encode()
+            plain = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(text)).encode())]
+            # What else comes of a refused request is not read.
+            plain.append((b"connection", b"close"))
+            await answer({"type": "http.response.start", "status": status, "headers": plain})
+            await answer({"type": "http.response.body", "body": text})
+            return
+        await self._app(scope, receive, answer)

@@ -1,0 +1,219 @@
+"""What the studio's two processes are asked, and what the pages are shown of it: flights, plans, returns, campaigns."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from aircraft.catalog import aircraft_names
+from planfly.arguments import CHOICES
+from planfly.studio import messages
+from planfly.studio.pilot import Answer, Pilot, Work
+from planfly.studio.session import Session
+from planfly.studio.sheet import Json, rounded
+from planfly.studio.works import PlanAsked
+from planner.plan import Objective, Plan
+from planner.search.algorithms import ALGORITHMS
+from world.errors import MissionError, PlanflyError
+
+# s between two reports of how far a work is.
+_REPORTING = 0.12
+# A seed's plan is a way of its own; so many beyond the first are searched.
+PILOT, LONG = "flight", "long"
+
+
+@dataclass
+class _Asked:
+    """A work under way. rev: of the sheet that it is of."""
+
+    number: int
+    name: str
+    rev: int
+    reported: float = 0.0
+
+
+@dataclass
+class Jobs:
+    """Both processes, what each is at, and the newest flight.
+
+    on_answer: called with the process's name from a thread of its own.
+    """
+
+    on_answer: Callable[[str, Answer], None]
+    _pilots: dict[str, Pilot] = field(default_factory=dict)
+    _asked: dict[str, _Asked] = field(default_factory=dict)
+    _number: int = 0
+    _flown: Json | None = None
+    _before: Json | None = None
+    _others: list[Json] = field(default_factory=list)
+    _at_once: bool = False
+
+    def start(self, session: Session) -> None:
+        """Fly what was opened, or plan it where it is a scenario without a path."""
+        if session.document.to_plan:
+            self._at_once = True
+            self._ask(
+                LONG,
+                "plan",
+                "planfly.studio.works.plan",
+                self._plan_asked(messages.Plan(kind="plan"), session),
+                session.rev,
+            )
+            self._pilot(PILOT).start()
+        else:
+            self.fly(session)
+
+    def close(self) -> None:
+        """End both processes."""
+        for pilot in self._pilots.values():
+            pilot.close()
+
+    def choices(self) -> Json:
+        """What a page offers to choose from."""
+        return {
+            "aircraft": aircraft_names(),
+            "autopilots": list(CHOICES["autopilot_law"]),
+            "turbulence": list(CHOICES["turbulence"]),
+            "algorithms": {name: one.summary for name, one in ALGORITHMS.items()},
+        }
+
+    def shown(self) -> list[Json]:
+        """What a new page is shown of the works."""
+        under_way = [{"kind": "working", "job": one.name, "rev": one.rev} for one in self._asked.values()]
+        return [*([self._flown] if self._flown is not None else []), *self._others, *under_way]
+
+    def forget(self) -> None:
+        """Another mission was opened."""
+        self.stop()
+        self._flown = self._before = None
+        self._others = []
+
+    # ------------------------------------------------------------------
+    # Asked.
+
+    def fly(self, session: Session) -> None:
+        """Fly the mission as it is; a flight under way is cancelled."""
+        if session.document.to_plan and not session.is_changed:
+            return
+        self._ask(PILOT, "fly", "planfly.studio.works.fly", (session.desk, session.mission), session.rev)
+
+    def plan(self, message: messages.Plan, session: Session) -> None:
+        """Plan a path, or several.  Raises PlanflyError for places between which nothing is planned."""
+        asked = self._plan_asked(message, session)
+        self._at_once = False
+        self._ask(LONG, "plan", "planfly.studio.works.plan", asked, session.rev)
+
+    def ask(self, kind: str, session: Session) -> None:
+        """Fly, or begin a long work."""
+        if kind == "fly":
+            self.fly(session)
+            return
+        self._ask(LONG, kind, f"planfly.studio.long_works.{kind}", (session.desk, session.mission), session.rev)
+
+    def stop(self) -> None:
+        """Cancel all that is under way."""
+        for name, pilot in self._pilots.items():
+            if name in self._asked:
+                pilot.cancel()
+
+    def _plan_asked(self, message: messages.Plan, session: Session) -> PlanAsked:
+        scenario, frame = session.desk.scenario, session.desk.airframe
+        if message.algorithm is not None and message.algorithm not in ALGORITHMS:
+            raise PlanflyError.of_argument("algorithm", message.algorithm, f"allowed {', '.join(ALGORITHMS)}")
+        seeds = tuple(message.seed + k for k in range(message.ways))
+        if message.first is None or message.last is None:
+            if scenario.external:
+                raise MissionError(f"{session.document.name}: choose the two items to plan between", field="first")
+            session.plans = ([], None)
+            return PlanAsked(scenario, frame, seeds, message.algorithm)
+        ends = [session.place_of(k) for k in (message.first, message.last)]
+        if message.first >= message.last:
+            raise MissionError(
+                f"{session.document.name}: the second item to plan between comes after the first", field="last"
+            )
+        session.plans = ([], (message.first, message.last))
+        return PlanAsked(scenario, frame, seeds, message.algorithm, (ends[0], ends[1]))
+
+    def _ask(self, pilot: str, name: str, function: str, payload: Any, rev: int) -> None:
+        self._number += 1
+        self._asked[pilot] = _Asked(self._number, name, rev)
+        self._pilot(pilot).ask(Work(self._number, function, payload))
+
+    def _pilot(self, name: str) -> Pilot:
+        if name not in self._pilots:
+            self._pilots[name] = Pilot(f"planfly studio: {name}", lambda answer: self.on_answer(name, answer))
+        return self._pilots[name]
+
+    # ------------------------------------------------------------------
+    # Answered.
+
+    def answered(self, pilot: str, answer: Answer, session: Session) -> list[Json]:
+        """What the pages are shown of an answer; nothing of one to an older question."""
+        asked = self._asked.get(pilot)
+        if asked is None or asked.number != answer.number:
+            return []
+        if answer.kind == "progress":
+            now = time.monotonic()
+            if now - asked.reported < _REPORTING:
+                return []
+            asked.reported = now
+            done, total, remark = answer.value
+            share = min(1.0, done / total) if total > 0.0 else 0.0
+            return [{"kind": "working", "job": asked.name, "rev": asked.rev, "share": round(share, 3), "text": remark}]
+        del self._asked[pilot]
+        if answer.kind == "cancelled":
+            return [{"kind": "stopped", "job": asked.name}]
+        if answer.kind == "fault":
+            return [{"kind": "stopped", "job": asked.name}, {"kind": "fault", "text": str(answer.value)}]
+        return [self._done(asked, answer.value, session)]
+
+    def _done(self, asked: _Asked, value: Any, session: Session) -> Json:
+        if asked.name == "fly":
+            self._before = self._flown
+            self._flown = {"kind": "flown", "rev": asked.rev, **value, "changes": changes(self._before, value)}
+            return self._flown
+        if asked.name == "plan":
+            session.plans = (list(value), session.plans[1])
+            return {"kind": "ways", "ways": [_way(one) for one in value], "at_once": self._at_once}
+        found = {"kind": asked.name, "rev": asked.rev, **value}
+        self._others = [*(one for one in self._others if one["kind"] != asked.name), found]
+        return found
+
+    def chosen_at_once(self, session: Session) -> bool:
+        """Whether the path that the studio planned by itself when it began has come, once."""
+        come = self._at_once and bool(session.plans[0])
+        if come:
+            self._at_once = False
+        return come
+
+
+def changes(before: Json | None, now: Json) -> list[str]:
+    """What a flight has that the one before it had not, in words; nothing for the first.
+
+    >>> changes({"failed": [("slope", "leg 2")], "seconds": 500.0}, {"failed": [], "seconds": 512.0})
+    ['mended: slope on leg 2', '12 s longer']
+    """
+    if before is None:
+        return []
+    old, new = ({tuple(one) for one in flight["failed"]} for flight in (before, now))
+    found = [f"mended: {rule} on {where}" for rule, where in sorted(old - new)]
+    found += [f"fails now: {rule} on {where}" for rule, where in sorted(new - old)]
+    longer = now["seconds"] - before["seconds"]
+    if abs(longer) >= 0.5:
+        found.append(f"{abs(longer):.0f} s {'longer' if longer > 0.0 else 'shorter'}")
+    return found or ["nothing"]
+
+
+def _way(plan: Plan) -> Json:
+    """A planned path to choose."""
+    certificate = plan.certificate
+    return {
+        "seed": plan.seed,
+        "algorithm": plan.algorithm,
+        "state": plan.state,
+        "length": round(float(plan.objectives[Objective.LENGTH_RATIO]), 3),
+        "exposure": round(float(plan.objectives[Objective.KILL_EXPOSURE]), 4),
+        "clearance": rounded([certificate.clearance])[0],
+        "problems": list(certificate.problems[:2]),
+        "points": rounded(plan.waypoints),
+    }

@@ -1,0 +1,72 @@
+"""Longer works of the studio's second process: returns from everywhere, and many flights in this weather."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from flight.mission.items import Mission
+from logs.verdict.returns.judge_returns import judge_returns, return_world
+from logs.verdict.returns.returns_text import headline, no_return_text, range_text
+from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.dispersions import default_dispersions
+from planfly.campaigns.flight_row import fly_one
+from planfly.pipeline import fly_and_judge
+from planfly.returns_beside import return_starts
+from planfly.studio.desk import Desk
+from planfly.studio.pilot import Advance
+from world.errors import MissionError
+from world.extras import need_extra
+
+# Returns that are judged along the way, and ranges of it that are named.
+_RETURNS, _RANGES = 240, 6
+# Flights of a campaign.
+FLIGHTS = 24
+
+
+def returns(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
+    """The mission flown, and a return to launch from everywhere on its way."""
+    desk, mission = payload
+    setup = desk.setup(mission)
+    if mission.home is None or desk.scenario.terrain is None:
+        lacks = "home" if mission.home is None else "terrain"
+        raise MissionError(f"{mission.source}: returns are not judged without a {lacks}", field=lacks)
+    world = return_world(setup)
+    flown = fly_and_judge(
+        setup, desk.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference=False
+    )
+    every = max(1.0, (float(flown.track.time[-1]) if len(flown.track) else 0.0) / _RETURNS)
+    starts = return_starts(setup, flown.track, every)
+    advance(0.5, 1.0, f"flying {len(starts)} returns")
+    found = judge_returns(world, starts, every)
+    lines = [range_text(one, found, desk.scenario) for one in found.ranges[:_RANGES]]
+    return {
+        "state": "ok" if found.safe else "open" if found.undecided else "fail",
+        "headline": headline(found),
+        "lines": [*lines, *filter(None, [no_return_text(found)])],
+    }
+
+
+def campaign(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
+    """The mission flown `FLIGHTS` times, each in its own wind, aircraft, terrain and start."""
+    need_extra("campaigns")
+    from planfly.campaigns.statistics.decision import wilson
+
+    desk, mission = payload
+    setup = desk.setup(mission)
+    base = CampaignBase(
+        *(desk.scenario, desk.airframe, mission, desk.placed(mission), setup.plan, default_dispersions(), desk.seed),
+        name=Path(mission.source).stem,
+    )
+    flyable, fails = 0, Counter[str]()
+    for index in range(FLIGHTS):
+        advance(index, FLIGHTS, f"{flyable} of {index} flyable")
+        row = fly_one(base, index)
+        flyable += row.outcome == "flyable"
+        fails.update({rule for rule, _ in row.failed})
+    low, high = wilson(flyable, FLIGHTS)
+    common = [f"{rule} fails in {count}" for rule, count in fails.most_common(5)]
+    return {
+        "state": "ok" if flyable == FLIGHTS else "open" if flyable else "fail",
+        "headline": f"{flyable} of {FLIGHTS} flights are flyable: {low:.0%} to {high:.0%} at 95 %",
+        "lines": [*common, f"planfly campaign flies more: {FLIGHTS} say little of rare failures"],
+    }

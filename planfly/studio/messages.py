@@ -1,0 +1,187 @@
+"""The messages of the page to the server: strict, bounded, and nothing in them is a path.
+
+Each is one JSON object whose ``kind`` says what it is.  Anything else closes the connection.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+# A dropped file comes as text in a message; all others are small.
+MAX_MESSAGE = 256 * 1024
+MAX_DROPPED_MESSAGE = 24 * 2**20
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+_Metres = Annotated[float, Field(ge=-600_000.0, le=600_000.0)]
+_Up = Annotated[float, Field(ge=-500.0, le=9_000.0)]
+_Index = Annotated[int, Field(ge=0, le=20_000)]
+_Rev = Annotated[int, Field(ge=0, le=2**53)]
+_Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class Hello(_Message):
+    """The first: the token of the address, and which look the page has."""
+
+    kind: Literal["hello"]
+    token: Annotated[str, Field(min_length=1, max_length=100)]
+    dark: bool = False
+
+
+class Look(_Message):
+    """The page's look has changed: it wants the other picture of the ground."""
+
+    kind: Literal["look"]
+    dark: bool
+
+
+class Drag(_Message):
+    """An item is being dragged; nothing is changed yet.
+
+    rev: of the sheet that is dragged.  n: grows with each.  k: the item.  whole: whether all is to be judged.
+    """
+
+    kind: Literal["drag"]
+    rev: _Rev
+    n: _Rev
+    k: _Index
+    east: _Metres
+    north: _Metres
+    up: _Up | None = None
+    whole: bool = False
+
+
+class Move(_Message):
+    """An item is put somewhere: across the map, or to a height above mean sea level, or both."""
+
+    kind: Literal["move"]
+    rev: _Rev
+    k: _Index
+    east: _Metres | None = None
+    north: _Metres | None = None
+    up: _Up | None = None
+
+
+class Insert(_Message):
+    """A waypoint more behind an item, at the height halfway to the next."""
+
+    kind: Literal["insert"]
+    rev: _Rev
+    after: _Index
+    east: _Metres
+    north: _Metres
+
+
+class Delete(_Message):
+    """Items less."""
+
+    kind: Literal["delete"]
+    rev: _Rev
+    ks: Annotated[list[_Index], Field(min_length=1, max_length=2_000)]
+
+
+class Raise(_Message):
+    """Items higher or lower by so many metres; without a list all of them."""
+
+    kind: Literal["raise"]
+    rev: _Rev
+    by: Annotated[float, Field(ge=-9_000.0, le=9_000.0)]
+    ks: Annotated[list[_Index], Field(max_length=2_000)] | None = None
+
+
+class Step(_Message):
+    """One edit back, or forward again, or back to the file as it was opened."""
+
+    kind: Literal["undo", "redo", "revert"]
+
+
+class Apply(_Message):
+    """A suggestion of a finding, made."""
+
+    kind: Literal["apply"]
+    rev: _Rev
+    finding: _Index
+    which: Annotated[int, Field(ge=0, le=20)]
+
+
+class Settings(_Message):
+    """How it is flown; what is not stated stays."""
+
+    kind: Literal["settings"]
+    aircraft: _Name | None = None
+    autopilot: _Name | None = None
+    airspeed: Annotated[float, Field(gt=0.0, le=150.0)] | None = None
+    wind_speed: Annotated[float, Field(ge=0.0, le=50.0)] | None = None
+    wind_from: Annotated[float, Field(ge=-360.0, le=360.0)] | None = None
+    turbulence: Literal["none", "light", "moderate"] | None = None
+    clearance: Annotated[float, Field(ge=0.0, le=2_000.0)] | None = None
+
+
+class Plan(_Message):
+    """A path from here: between the scenario's ends, or two items; ``ways`` paths with the seeds that follow."""
+
+    kind: Literal["plan"]
+    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 1
+    algorithm: _Name | None = None
+    first: _Index | None = None
+    last: _Index | None = None
+    ways: Annotated[int, Field(ge=1, le=5)] = 1
+
+
+class Choose(_Message):
+    """One of the paths that were planned."""
+
+    kind: Literal["choose"]
+    which: Annotated[int, Field(ge=0, le=20)]
+
+
+class Ask(_Message):
+    """Fly it, or have a long work done; or stop what is under way."""
+
+    kind: Literal["fly", "returns", "campaign", "stop"]
+
+
+class Save(_Message):
+    """The mission as a file: to the page, or over the file that the command named."""
+
+    kind: Literal["save"]
+    form: Literal["waypoints", "plan", "plan.json", "kml"]
+    over: bool = False
+
+
+class Open(_Message):
+    """A file that was dropped on the page, its bytes in base 64; or one of those that the server has listed."""
+
+    kind: Literal["open"]
+    name: _Name
+    data: Annotated[str, Field(max_length=MAX_DROPPED_MESSAGE)] | None = None
+
+
+Message = (
+    Hello | Look | Drag | Move | Insert | Delete | Raise | Step | Apply | Settings | Plan | Choose | Ask | Save | Open
+)
+_ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="kind")])
+
+
+def read_message(text: str | bytes) -> Message:
+    """A message.  Raises pydantic's ValidationError, a ValueError, for anything else.
+
+    >>> read_message('{"kind": "undo"}').kind
+    'undo'
+    >>> read_message('{"kind": "undo", "path": "/etc/passwd"}')
+    Traceback (most recent call last):
+        ...
+    pydantic_core._pydantic_core.ValidationError: ...
+    """
+    size = len(text)
+    if size > MAX_MESSAGE and '"open"' not in str(text[:200]):
+        raise ValueError("a message that is too long")
+    return _ADAPTER.validate_json(text)
+
+
+def message_schema() -> dict[str, Any]:
+    """The messages as a JSON schema, for tests that make up their own."""
+    return _ADAPTER.json_schema()

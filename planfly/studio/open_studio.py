@@ -1,0 +1,173 @@
+"""Open the studio: the page's server on this machine, until it is asked to stop."""
+
+import asyncio
+import contextlib
+import hashlib
+import html
+import secrets
+import socket
+import webbrowser
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from planfly.api.flying import FencePaths
+from planfly.api.planning import Wind, changed_scenario
+from planfly.arguments import check_arguments
+from planfly.first_start import with_warm_up
+from planfly.kernel_units.unit_kernels import BOTH
+from planfly.studio.documents import World
+from planfly.studio.session import open_session
+from world.errors import PlanflyError
+from world.extras import needs_extra
+from world.files import temporary_folder
+from world.scenario_tables import Guidance, Navigation
+
+if TYPE_CHECKING:
+    from planfly.studio.server import Server
+
+HOST = "127.0.0.1"
+# Taken where it is free and none is named, so that a page finds its studio again; else any.
+USUAL_PORT = 8790
+# s between looks at whether to stop, and until what is under way is given up.
+_POLL, _CLOSING = 0.1, 2
+
+
+def _never() -> bool:
+    return False
+
+
+@needs_extra("studio")
+@with_warm_up(*BOTH)
+def open_studio(
+    what: str | Path = "jacksboro",
+    *,
+    scenario: str | Path | None = None,
+    terrain: str | Path | None = None,
+    fence: FencePaths = (),
+    seed: int | None = None,
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    at: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
+    nav: Navigation | None = None,
+    port: int | None = None,
+    browser: bool = True,
+    keep: str | Path = "runs/studio",
+    stop: Callable[[], bool] = _never,
+    on_message: Callable[[str], None] = print,
+) -> None:
+    """Serve a page of this machine on which a mission is dragged, judged and flown; needs ``planfly[studio]``.
+
+    what: a scenario, by name or file, whose path is planned; or a plan, a mission or a log, as of `planfly.judge`.
+    scenario, terrain, fence: the world of a mission, as of `planfly.fly`.  seed: of planner and turbulence.
+    wind to nav: how it is flown, as of `planfly.plan`; the page changes most of it.
+    port: where it listens; None for 8790, or any free one where that is taken.
+    browser: whether the page is opened.  keep: the folder in which what was done is kept for the next start.
+    stop: asked all the time.  on_message: called with the page's address, which holds the key to it.
+
+    A script that calls it does so under ``if __name__ == "__main__":``, for the processes that fly import it.
+    Raises a `planfly.PlanflyError` for bad input.
+    """
+    check_arguments(seed=seed, port=port)
+    change = partial(
+        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
+        guidance=guidance, autopilot_law=autopilot_law, nav=nav,
+    )  # fmt: skip
+    named, ground = (None if one is None else str(one) for one in (scenario, terrain))
+    fences = (str(fence),) if isinstance(fence, str | Path) else tuple(str(one) for one in fence)
+    listener = _listen(port)
+    with contextlib.closing(listener):
+        target = str(what)
+        kept = Path(keep) / f"{_stem(target)}.json"
+        session, restored = open_session(target, World(named, ground, fences, seed, change), kept)
+        if restored:
+            on_message(f"what was done before is there again (kept in {kept}); undo takes it back")
+        # Imported here: only who serves needs the extra.
+        from planfly.studio.server import Server
+
+        token = secrets.token_urlsafe(24)
+        path = session.document.path
+        server = Server(session, token, kept, None if path is None else path.parent)
+        address = f"http://{HOST}:{listener.getsockname()[1]}/#t={token}"
+        with _opened_page(address) if browser else contextlib.nullcontext():
+            on_message(f"studio  {address}")
+            asyncio.run(_serve(server, listener, stop))
+
+
+def _stem(target: str) -> str:
+    """A file's name of what is opened; two of one name in different folders have different ones.
+
+    >>> _stem("jacksboro")
+    'jacksboro'
+    """
+    path = Path(target)
+    if not path.exists():
+        return path.stem
+    return f"{path.stem}-{hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:8]}"
+
+
+def _listen(port: int | None) -> socket.socket:
+    """The socket that pages come to.  Raises PlanflyError for a port that is taken."""
+    for one in (USUAL_PORT, 0) if port is None else (port,):
+        try:
+            return socket.create_server((HOST, one))
+        except OSError as error:
+            fault = error
+    raise PlanflyError.of_argument("port", port, f"{HOST}:{port} is not free: {fault.strerror}")
+
+
+@contextlib.contextmanager
+def _opened_page(address: str) -> Iterator[None]:
+    """Have the browser open an address, which no list of processes shows."""
+    with temporary_folder("planfly-studio-") as folder:
+        file = folder / "studio.html"
+        file.touch(0o600)
+        shown = html.escape(address, quote=True)
+        file.write_text(
+            f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0;url={shown}">'
+            f'<title>planfly studio</title><a href="{shown}">planfly studio</a>\n',
+            encoding="utf-8",
+        )
+        with contextlib.suppress(webbrowser.Error):
+            webbrowser.open(file.resolve().as_uri())
+        yield
+
+
+async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], bool]) -> None:
+    """Serve until it is to stop."""
+    import uvicorn
+
+    from planfly.studio.app import make_app
+    from planfly.studio.messages import MAX_DROPPED_MESSAGE, MAX_MESSAGE
+
+    class Quiet(uvicorn.Server):
+        """Signals are the caller's."""
+
+        @contextlib.contextmanager
+        def capture_signals(self) -> Iterator[None]:
+            yield
+
+    app = make_app(server, listener.getsockname()[1])
+    config = uvicorn.Config(
+        app,
+        log_level="critical", access_log=False, server_header=False, date_header=False, lifespan="off",
+        ws="websockets-sansio", ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE, timeout_graceful_shutdown=_CLOSING,
+        h11_max_incomplete_event_size=16_384, http="h11",
+    )  # fmt: skip
+    web = Quiet(config)
+    serving = asyncio.create_task(web.serve(sockets=[listener]))
+    running = asyncio.create_task(server.run())
+    try:
+        while not stop() and not serving.done() and not running.done():
+            await asyncio.sleep(_POLL)
+    finally:
+        web.should_exit = True
+        running.cancel()
+        await asyncio.gather(serving, running, return_exceptions=True)
+        await server.close()

@@ -1,0 +1,99 @@
+// Drawing in SVG, and how lengths become pixels.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+export function svg(name, attributes, parent) {
+  const made = document.createElementNS(SVG, name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  if (parent) parent.append(made);
+  return made;
+}
+
+export function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+    else if (value === true) made.setAttribute(key, "");
+    else if (value !== false && value !== null && value !== undefined) made.setAttribute(key, value);
+  }
+  made.append(...children.filter((one) => one !== null && one !== undefined));
+  return made;
+}
+
+export function clear(parent) {
+  parent.replaceChildren();
+  return parent;
+}
+
+// A map of equal scales, north up: `scale` pixels a metre, east and north at the left upper corner.
+export class View {
+  constructor() {
+    Object.assign(this, { east: 0, north: 0, scale: 0.05, width: 1, height: 1 });
+  }
+  x(east) { return (east - this.east) * this.scale; }
+  y(north) { return (this.north - north) * this.scale; }
+  eastAt(x) { return this.east + x / this.scale; }
+  northAt(y) { return this.north - y / this.scale; }
+  transform() {
+    const { east, north, scale } = this;
+    return `translate(${-east * scale} ${north * scale}) scale(${scale} ${-scale})`;
+  }
+  fit([[west, east], [south, north]], padding = 28) {
+    const wide = Math.max(1, east - west), tall = Math.max(1, north - south);
+    const free = [Math.max(40, this.width - 2 * padding), Math.max(40, this.height - 2 * padding)];
+    this.scale = Math.min(free[0] / wide, free[1] / tall);
+    this.east = (west + east) / 2 - this.width / 2 / this.scale;
+    this.north = (south + north) / 2 + this.height / 2 / this.scale;
+  }
+  zoom(factor, x, y) {
+    const east = this.eastAt(x), north = this.northAt(y);
+    this.scale = Math.min(20, Math.max(0.0005, this.scale * factor));
+    this.east = east - x / this.scale;
+    this.north = north + y / this.scale;
+  }
+  pan(dx, dy) {
+    this.east -= dx / this.scale;
+    this.north += dy / this.scale;
+  }
+}
+
+// Steps of 1, 2 or 5 times a power of ten, at most `parts` of them.
+export function step(span, parts) {
+  const raw = Math.max(span, 1e-9) / parts, power = 10 ** Math.floor(Math.log10(raw));
+  return [1, 2, 5, 10].find((one) => one * power >= raw * (1 - 1e-9)) * power;
+}
+
+export function ticks(low, high, parts) {
+  const by = step(high - low, parts), found = [];
+  for (let k = Math.ceil(low / by - 1e-9); k * by <= high + 1e-9 * by; k++) found.push(k * by);
+  return found;
+}
+
+export function plain(value, digits = 0) {
+  return value.toFixed(digits).replace("-", "\u2212");
+}
+
+// The height of the ground on the grid that the server sent; NaN where it is not known.
+export function groundAt(grid, east, north) {
+  if (!grid) return NaN;
+  const { rows, columns, heights } = grid;
+  const c = ((east - grid.east[0]) / (grid.east[1] - grid.east[0])) * (columns - 1);
+  const r = ((north - grid.north[0]) / (grid.north[1] - grid.north[0])) * (rows - 1);
+  if (!(c >= 0 && r >= 0 && c <= columns - 1 && r <= rows - 1)) return NaN;
+  const c0 = Math.min(columns - 2, Math.floor(c)), r0 = Math.min(rows - 2, Math.floor(r));
+  const at = r0 * columns + c0, x = c - c0, y = r - r0;
+  const low = heights[at] * (1 - x) + heights[at + 1] * x;
+  return low * (1 - y) + (heights[at + columns] * (1 - x) + heights[at + columns + 1] * x) * y;
+}
+
+// Names are written where none stands yet; important ones come first.
+export class Labels {
+  constructor() { this.taken = []; }
+  free(x, y, width, height) {
+    const box = [x, y, x + width, y + height];
+    if (this.taken.some((one) => box[0] < one[2] && one[0] < box[2] && box[1] < one[3] && one[1] < box[3])) return false;
+    this.taken.push(box);
+    return true;
+  }
+  block(x, y, half) { this.taken.push([x - half, y - half, x + half, y + half]); }
+}

@@ -1,0 +1,253 @@
+// Mouse, touch, wheel and keys on the map and on the profile.
+
+import { plain } from "/axes.js";
+import { heightWords, legStates } from "/map.js";
+
+const STEP = 10, FAR = 100, UP = 5;
+
+export class Hands {
+  // app: model(), link, map, profile, grid(), select(k), hint(lines, x, y), commit(message), begin(k), cancel()
+  constructor(app) {
+    this.app = app;
+    this.pointers = new Map();
+    const { root } = app.map;
+    root.addEventListener("pointerdown", (event) => this.down(event));
+    root.addEventListener("pointermove", (event) => this.move(event));
+    root.addEventListener("pointerup", (event) => this.up(event));
+    root.addEventListener("pointercancel", (event) => this.up(event, true));
+    root.addEventListener("pointerleave", () => !this.drag && app.hint(null));
+    root.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
+    root.addEventListener("dblclick", (event) => event.preventDefault());
+    root.addEventListener("focusin", (event) => {
+      const k = event.target.dataset?.k;
+      if (k !== undefined) app.select(Number(k), true);
+    });
+    const side = app.profile.root;
+    side.addEventListener("pointerdown", (event) => this.sideDown(event));
+    side.addEventListener("pointermove", (event) => this.sideMove(event));
+    side.addEventListener("pointerup", (event) => this.sideUp(event));
+    side.addEventListener("pointercancel", (event) => this.sideUp(event, true));
+    addEventListener("keydown", (event) => this.key(event));
+  }
+
+  at(event, root) {
+    const box = root.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  // ---- the map
+
+  down(event) {
+    if (event.button > 0 || !this.app.model()) return;
+    const { map } = this.app, [x, y] = this.at(event, map.root);
+    map.root.setPointerCapture(event.pointerId);
+    this.pointers.set(event.pointerId, [x, y]);
+    if (this.pointers.size === 2) return this.pinch();
+    const hit = map.hit(x, y, event.pointerType === "touch");
+    if (hit && hit.item !== undefined) {
+      this.drag = { k: hit.item, from: [x, y], moved: false };
+      this.app.select(hit.item);
+    } else if (hit) {
+      this.drag = { after: hit.after, from: [x, y], to: [x, y], moved: false };
+    } else {
+      this.drag = { pan: true, last: [x, y], from: [x, y], moved: false };
+    }
+  }
+
+  move(event) {
+    const { app } = this, { map } = app, [x, y] = this.at(event, map.root);
+    if (this.pointers.has(event.pointerId)) this.pointers.set(event.pointerId, [x, y]);
+    if (this.spread && this.pointers.size === 2) return this.pinching();
+    const { drag } = this;
+    if (!drag) return this.hover(x, y, event.pointerType);
+    if (!drag.moved && Math.hypot(x - drag.from[0], y - drag.from[1]) < 3) return;
+    drag.moved = true;
+    if (drag.pan) {
+      map.view.pan(x - drag.last[0], y - drag.last[1]);
+      drag.last = [x, y];
+      map.layOut();
+    } else if (drag.k !== undefined) {
+      this.drop = { k: drag.k, east: map.view.eastAt(x), north: map.view.northAt(y) };
+      app.begin(drag.k);
+      map.dragged(drag.k, this.drop.east, this.drop.north);
+      app.link.drag({ rev: app.rev(), ...this.drop });
+      this.words(drag.k, x, y, this.drop);
+    } else {
+      drag.to = [x, y];
+      app.hint(["insert a waypoint here"], x, y);
+    }
+  }
+
+  up(event, cancelled) {
+    const { app, drag } = this;
+    this.pointers.delete(event.pointerId);
+    if (this.spread) {
+      if (this.pointers.size === 0) this.spread = this.drag = null;
+      return;
+    }
+    this.drag = null;
+    if (!drag) return;
+    if (drag.k !== undefined && drag.moved) {
+      if (cancelled) return app.cancel();
+      app.commit({ kind: "move", ...this.drop });
+    } else if (drag.after !== undefined && !cancelled) {
+      const [x, y] = drag.to;
+      app.selectAfter(drag.after);
+      app.commit({ kind: "insert", after: drag.after, east: app.map.view.eastAt(x), north: app.map.view.northAt(y) });
+    } else if (drag.pan && !drag.moved) {
+      app.select(null);
+    }
+    app.hint(null);
+  }
+
+  pinch() {
+    if (this.drag?.k !== undefined && this.drag.moved) this.app.cancel();
+    this.drag = null;
+    const [a, b] = [...this.pointers.values()];
+    this.spread = { size: Math.hypot(a[0] - b[0], a[1] - b[1]), middle: [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2] };
+  }
+
+  pinching() {
+    const [a, b] = [...this.pointers.values()], { view } = this.app.map;
+    const size = Math.hypot(a[0] - b[0], a[1] - b[1]), middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
+    view.pan(middle[0] - this.spread.middle[0], middle[1] - this.spread.middle[1]);
+    view.zoom(size / Math.max(1, this.spread.size), ...middle);
+    this.spread = { size, middle };
+    this.app.map.layOut();
+  }
+
+  wheel(event) {
+    event.preventDefault();
+    const { map } = this.app, by = event.deltaMode === 1 ? 16 * event.deltaY : event.deltaY;
+    map.view.zoom(Math.exp(-by * 0.0016), ...this.at(event, map.root));
+    map.layOut();
+  }
+
+  hover(x, y, kind) {
+    const { app } = this, model = app.model();
+    if (!model || kind === "touch") return;
+    app.showPlace(app.map.view.eastAt(x), app.map.view.northAt(y));
+    const hit = app.map.hit(x, y, false);
+    app.map.root.classList.toggle("on-item", hit?.item !== undefined);
+    app.map.root.classList.toggle("on-middle", hit?.after !== undefined);
+    if (hit?.item !== undefined) return this.words(hit.item, x, y);
+    if (hit) return app.hint(["insert a waypoint here"], x, y);
+    const leg = app.map.legAt(x, y);
+    if (leg < 0) return app.hint(null);
+    const [state, text] = model.states.legs[leg];
+    app.hint([`leg ${leg}`, text || (state === "ok" ? "passes" : "")], x, y, state);
+  }
+
+  // Numbers beside the pointer: heights, and what of its corner and legs is closest to its limit.
+  words(k, x, y, place) {
+    const { app } = this, model = app.model(), item = model.items.find((one) => one.k === k);
+    if (!item) return;
+    const [east, north] = place ? [place.east, place.north] : item.at;
+    const rows = model.states.corners.filter((_, i) => model.of[i] === k).concat(legStates(model, k));
+    const order = ["fail", "open", "near", "ok"];
+    const worst = rows.reduce((a, b) => (order.indexOf(b[0]) < order.indexOf(a) ? b[0] : a), "ok");
+    const lines = [...new Set(rows.filter((row) => row[1]).sort((a, b) => order.indexOf(a[0]) - order.indexOf(b[0])).map((row) => row[1]))];
+    const fault = app.dragFault();
+    app.hint([`${item.seq}: ${heightWords(app.grid(), east, north, place?.up ?? item.at[2])}`, ...(fault ? [fault] : lines.slice(0, 3))], x, y, fault ? "fail" : worst);
+  }
+
+  // ---- the profile
+
+  sideDown(event) {
+    if (event.button > 0 || !this.app.model()) return;
+    const { profile } = this.app, [x, y] = this.at(event, profile.root);
+    const hit = profile.hit(x, y, event.pointerType === "touch");
+    if (!hit) return;
+    profile.root.setPointerCapture(event.pointerId);
+    this.app.select(hit.k);
+    this.side = { ...hit, from: y, moved: false };
+  }
+
+  sideMove(event) {
+    const { app, side } = this, { profile } = app, [x, y] = this.at(event, profile.root);
+    if (!side) {
+      const hit = app.model() && profile.hit(x, y, false);
+      profile.root.classList.toggle("on-item", Boolean(hit));
+      if (hit) this.words(hit.k, event.clientX - app.map.root.getBoundingClientRect().left, event.clientY - app.map.root.getBoundingClientRect().top);
+      else app.hint(null);
+      return;
+    }
+    if (!side.moved && Math.abs(y - side.from) < 3) return;
+    side.moved = true;
+    const item = app.model().items.find((one) => one.k === side.k);
+    profile.hold(true);
+    side.to = Math.max(-500, Math.min(9000, side.up + (side.from - y) * profile.metresPerPixel()));
+    app.begin(side.k);
+    app.raised(side.k, side.to);
+    const place = { k: side.k, east: item.at[0], north: item.at[1], up: side.to };
+    app.link.drag({ rev: app.rev(), ...place });
+    const box = app.map.root.getBoundingClientRect();
+    this.words(side.k, event.clientX - box.left, event.clientY - box.top, place);
+  }
+
+  sideUp(_event, cancelled) {
+    const { app, side } = this;
+    this.side = null;
+    app.profile.hold(false);
+    app.hint(null);
+    if (!side || !side.moved) return;
+    if (cancelled) app.cancel();
+    else app.commit({ kind: "move", k: side.k, up: side.to });
+  }
+
+  // ---- keys
+
+  key(event) {
+    const { app } = this, control = event.ctrlKey || event.metaKey;
+    const typing = event.target.closest?.("input, select, textarea");
+    if (control && event.key.toLowerCase() === "z" && !typing) {
+      event.preventDefault();
+      return app.link.send({ kind: event.shiftKey ? "redo" : "undo" });
+    }
+    if (control && event.key.toLowerCase() === "y" && !typing) {
+      event.preventDefault();
+      return app.link.send({ kind: "redo" });
+    }
+    if (control && event.key.toLowerCase() === "s") {
+      event.preventDefault();
+      return app.save();
+    }
+    if (event.key === "Escape") {
+      if (this.drag?.moved || this.side?.moved) {
+        this.drag = this.side = null;
+        app.profile.hold(false);
+        app.cancel();
+      }
+      return app.hint(null);
+    }
+    const k = app.selected(), item = app.model()?.items.find((one) => one.k === k);
+    if (typing || control || event.altKey || !item || !event.target.closest?.("svg, body")) return;
+    if (event.target.closest("aside, header")) return;
+    const far = event.shiftKey ? FAR : STEP;
+    const sides = { ArrowUp: [0, far], ArrowDown: [0, -far], ArrowLeft: [-far, 0], ArrowRight: [far, 0] };
+    if (sides[event.key]) {
+      event.preventDefault();
+      const [east, north] = sides[event.key];
+      return app.nudge(k, { east: item.at[0] + east, north: item.at[1] + north });
+    }
+    if (event.key === "PageUp" || event.key === "PageDown") {
+      event.preventDefault();
+      const by = (event.key === "PageUp" ? 1 : -1) * (event.shiftKey ? 50 : UP);
+      return app.nudge(k, { up: item.at[2] + by });
+    }
+    if (event.key === "Delete" || event.key === "Backspace") {
+      event.preventDefault();
+      return app.commit({ kind: "delete", ks: [k] });
+    }
+    if (event.key === "Insert") {
+      event.preventDefault();
+      const { items } = app.model(), i = items.indexOf(item), next = items[i + 1];
+      if (!next) return undefined;
+      app.selectAfter(k);
+      return app.commit({ kind: "insert", after: k, east: (item.at[0] + next.at[0]) / 2, north: (item.at[1] + next.at[1]) / 2 });
+    }
+    return undefined;
+  }
+}
+
+export const words = plain;

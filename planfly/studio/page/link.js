@@ -1,0 +1,112 @@
+// The connection to the server: the token, one drag on its way at a time, and a new connection when one is lost.
+
+const REST = 150;
+const KEY = "planfly-studio-token";
+
+function token() {
+  const given = new URLSearchParams(location.hash.slice(1)).get("t");
+  if (given) {
+    sessionStorage.setItem(KEY, given);
+    history.replaceState(null, "", "/");
+  }
+  return sessionStorage.getItem(KEY) || "";
+}
+
+export class Link {
+  // handlers: by kind of message; "picture" and "heights" of the ground, "open" and "lost" of the connection.
+  constructor(handlers) {
+    this.handlers = handlers;
+    this.token = token();
+    this.number = 0;
+    this.waiting = null;
+    this.next = null;
+    this.tries = 0;
+    this.dark = matchMedia("(prefers-color-scheme: dark)");
+    this.dark.addEventListener("change", () => this.send({ kind: "look", dark: this.dark.matches }));
+    this.connect();
+  }
+
+  connect() {
+    if (!this.token) {
+      this.handlers.lost("Open the address that planfly studio has printed: it holds the key to this page.", true);
+      return;
+    }
+    const socket = new WebSocket(`ws://${location.host}/session`);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onopen = () => socket.send(JSON.stringify({ kind: "hello", token: this.token, dark: this.dark.matches }));
+    socket.onmessage = (event) => this.hear(event.data);
+    socket.onclose = (event) => this.lost(event.code);
+  }
+
+  lost(code) {
+    this.waiting = this.next = null;
+    if (code === 4403) return this.handlers.lost("This key is of another start of the studio: open the address that it has printed.", true);
+    if (code === 4429) return this.handlers.lost("Four pages are open already: close one, then reload this one.", true);
+    this.tries += 1;
+    this.handlers.lost("The studio does not answer. What was done is kept: start it again with the same file.", false);
+    setTimeout(() => this.connect(), Math.min(5000, 300 * this.tries));
+  }
+
+  send(message) {
+    if (this.socket && this.socket.readyState === 1) {
+      this.socket.send(JSON.stringify(message));
+      return true;
+    }
+    return false;
+  }
+
+  hear(data) {
+    if (typeof data !== "string") return this.binary(data);
+    const message = JSON.parse(data);
+    if (message.kind === "world") {
+      this.tries = 0;
+      this.handlers.open();
+    }
+    if (message.kind === "preview") return this.previewed(message);
+    const handler = this.handlers[message.kind];
+    if (handler) handler(message);
+  }
+
+  binary(data) {
+    const bytes = new Uint8Array(data), size = new DataView(data).getUint32(1, true);
+    const head = JSON.parse(new TextDecoder().decode(bytes.subarray(5, 5 + size)));
+    const body = data.slice(5 + size);
+    if (bytes[0] === 71) this.handlers.picture({ ...head, url: URL.createObjectURL(new Blob([body], { type: "image/webp" })) });
+    else this.handlers.heights({ ...head, heights: new Float32Array(body) });
+  }
+
+  // A place that an item is dragged to: sent at once if nothing is on its way, else when that has come; the whole
+  // verdict is asked for when the hand rests.
+  drag(place) {
+    this.number += 1;
+    this.next = { kind: "drag", n: this.number, ...place };
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => this.ask({ ...this.next0, whole: true, n: ++this.number }), REST);
+    this.next0 = this.next;
+    if (!this.waiting) this.ask(this.next);
+  }
+
+  ask(message) {
+    if (!message || !message.kind) return;
+    if (this.waiting) {
+      this.next = message;
+      return;
+    }
+    this.waiting = message.n;
+    this.next = null;
+    this.send(message);
+  }
+
+  previewed(message) {
+    this.waiting = null;
+    if (this.next) this.ask(this.next);
+    if (this.next0) this.handlers.preview(message);
+  }
+
+  // The drag has ended, however it did.
+  settle() {
+    clearTimeout(this.rest);
+    this.next = this.next0 = null;
+  }
+}

@@ -1,0 +1,313 @@
+// The map: ground, zones, threats, the route with the path that the autopilot flies, and the waypoints.
+
+import { Labels, View, clear, groundAt, plain, step, svg } from "/axes.js";
+
+const DENSE = 80;
+
+export class MapView {
+  constructor(root) {
+    this.root = root;
+    this.view = new View();
+    this.world = svg("g", { class: "world" }, root);
+    this.ground = svg("image", { preserveAspectRatio: "none", transform: "scale(1 -1)" }, this.world);
+    this.shapes = svg("g", {}, this.world);
+    this.legsUnder = svg("g", { class: "under" }, this.world);
+    this.ways = svg("g", { class: "ways" }, this.world);
+    this.straight = svg("path", { class: "straight" }, this.world);
+    this.legs = svg("g", { class: "legs" }, this.world);
+    this.track = svg("path", { class: "track" }, this.world);
+    this.names = svg("g", { class: "names", "aria-hidden": "true" }, root);
+    this.diamonds = svg("g", { class: "diamonds" }, root);
+    this.markers = svg("g", { class: "markers" }, root);
+    this.scale = svg("g", { class: "scale", "aria-hidden": "true" }, root);
+    this.legParts = [];
+    this.marks = [];
+    this.model = null;
+  }
+
+  resize(width, height) {
+    Object.assign(this.view, { width, height });
+    this.root.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  }
+
+  setWorld(world) {
+    this.about = world;
+    clear(this.shapes);
+    if (world.bounds) {
+      const [[w, e], [s, n]] = world.bounds;
+      svg("rect", { x: w, y: s, width: e - w, height: n - s, class: "area" }, this.shapes);
+    }
+    this.zoneShapes = world.zones.map((zone) => {
+      const d = zone.rings.map((ring) => `M${ring.map((p) => p.join(" ")).join("L")}Z`).join("");
+      return svg("path", { d, class: `zone ${zone.kind}`, "fill-rule": "evenodd" }, this.shapes);
+    });
+    this.threatShapes = world.threats.map((threat) => {
+      const group = svg("g", { class: "threat" }, this.shapes), [cx, cy] = threat.at;
+      if (threat.detection) svg("circle", { cx, cy, r: threat.detection, class: "radar" }, group);
+      if (threat.kill) svg("circle", { cx, cy, r: threat.kill, class: "missile" }, group);
+      return group;
+    });
+  }
+
+  setPicture(picture) {
+    const [[w, e], [s, n]] = [picture.east, picture.north];
+    for (const [key, value] of Object.entries({ x: w, y: -n, width: e - w, height: n - s, href: picture.url })) {
+      this.ground.setAttribute(key, value);
+    }
+  }
+
+  // The mission as it is drawn: route, path of each leg, states, items.
+  show(model) {
+    const fresh = !this.model || this.model.path.length !== model.path.length || this.model.items.length !== model.items.length;
+    this.model = model;
+    this.at = new Map(model.items.map((item) => [item.k, item.at]));
+    if (fresh) this.build(model);
+    this.colour();
+    this.straight.setAttribute("d", this.straightLine());
+    this.layOut();
+  }
+
+  build(model) {
+    clear(this.legs);
+    clear(this.legsUnder);
+    clear(this.markers);
+    this.legParts = model.path.map(() => [svg("path", {}, this.legsUnder), svg("path", {}, this.legs)]);
+    this.marks = model.items.map((item) => {
+      const group = svg("g", { class: "mark", tabindex: -1, role: "button", "data-k": item.k }, this.markers);
+      svg("circle", { r: 18, class: "hold" }, group);
+      svg("circle", { r: 6.5, class: "dot" }, group);
+      return group;
+    });
+  }
+
+  colour() {
+    const { model } = this;
+    const bad = { threats: new Set(model.violated.threats), zones: new Set(model.violated.zones) };
+    this.legParts.forEach(([under, over], k) => {
+      const flat = model.path[k], parts = [];
+      for (let i = 0; i < flat.length; i += 3) parts.push(`${flat[i]} ${flat[i + 1]}`);
+      const d = parts.length ? `M${parts.join("L")}` : "";
+      const state = model.states.legs[k][0];
+      under.setAttribute("d", d);
+      over.setAttribute("d", d);
+      under.setAttribute("class", `leg-under ${state}`);
+      over.setAttribute("class", `leg ${state}`);
+    });
+    this.threatShapes?.forEach((group, k) => group.classList.toggle("entered", bad.threats.has(k)));
+    this.zoneShapes?.forEach((path, k) => path.classList.toggle("entered", bad.zones.has(k)));
+    const worst = cornerStates(model);
+    this.marks.forEach((group, i) => {
+      const item = model.items[i], state = worst.get(item.k)?.[0] || "ok";
+      group.setAttribute("class", `mark ${state}${item.k === this.selected ? " selected" : ""}`);
+      group.setAttribute("data-k", item.k);
+      group.setAttribute("aria-label", spoken(item, state));
+    });
+  }
+
+  select(k) {
+    this.selected = k;
+    this.marks.forEach((group, i) => {
+      const own = this.model.items[i].k === k;
+      group.classList.toggle("selected", own);
+      group.setAttribute("tabindex", own || (k === null && i === 0) ? 0 : -1);
+    });
+  }
+
+  straightLine() {
+    return `M${this.model.route.map((p) => `${p[0]} ${p[1]}`).join("L")}`;
+  }
+
+  // An item follows the hand before the server has answered.
+  dragged(k, east, north) {
+    const item = this.at.get(k);
+    if (!item) return;
+    this.at.set(k, [east, north, item[2]]);
+    const points = this.model.route.map((p, i) => (this.model.of[i] === k && this.once(k) ? [east, north] : p));
+    this.straight.setAttribute("d", `M${points.map((p) => `${p[0]} ${p[1]}`).join("L")}`);
+    this.placeMarks();
+  }
+
+  once(k) {
+    return this.model.of.filter((one) => one === k).length === 1;
+  }
+
+  setTrack(points, stale) {
+    this.track.setAttribute("d", points && points.length ? `M${points.map((p) => `${p[0]} ${p[1]}`).join("L")}` : "");
+    this.track.classList.toggle("stale", Boolean(stale));
+  }
+
+  setWays(ways, shown) {
+    clear(this.ways);
+    ways.forEach((way, k) => {
+      const d = `M${way.points.map((p) => `${p[0]} ${p[1]}`).join("L")}`;
+      svg("path", { d, class: `way${k === shown ? " shown" : ""}` }, this.ways);
+    });
+  }
+
+  // Everything that depends on the view.
+  layOut() {
+    this.world.setAttribute("transform", this.view.transform());
+    this.placeMarks();
+    this.placeDiamonds();
+    this.placeNames();
+    this.drawScale();
+  }
+
+  placeMarks() {
+    this.marks.forEach((group, i) => {
+      const [east, north] = this.at.get(this.model.items[i].k);
+      group.setAttribute("transform", `translate(${this.view.x(east)} ${this.view.y(north)})`);
+    });
+  }
+
+  // Between two places in a row a diamond inserts one, where the leg is long enough for the hand.
+  placeDiamonds() {
+    clear(this.diamonds);
+    this.middles = [];
+    const { items } = this.model;
+    for (let i = 0; i + 1 < items.length; i++) {
+      const [a, b] = [this.at.get(items[i].k), this.at.get(items[i + 1].k)];
+      const east = (a[0] + b[0]) / 2, north = (a[1] + b[1]) / 2, x = this.view.x(east), y = this.view.y(north);
+      if (Math.hypot(a[0] - b[0], a[1] - b[1]) * this.view.scale < 64 || !this.inside(x, y, 10)) continue;
+      this.middles.push({ x, y, after: items[i].k });
+      svg("path", { d: "M0-5.5 5.5 0 0 5.5-5.5 0Z", transform: `translate(${x} ${y})` }, this.diamonds);
+    }
+  }
+
+  inside(x, y, rim) {
+    return x > rim && y > rim && x < this.view.width - rim && y < this.view.height - rim;
+  }
+
+  placeNames() {
+    clear(this.names);
+    const labels = new Labels(), { items } = this.model;
+    for (const item of items) {
+      const [east, north] = this.at.get(item.k);
+      labels.block(this.view.x(east), this.view.y(north), 7);
+    }
+    labels.taken.push([this.view.width - 150, this.view.height - 34, this.view.width, this.view.height]);
+    const by = items.length > DENSE ? Math.ceil(items.length / 40) : 1;
+    items.forEach((item, i) => {
+      const [east, north] = this.at.get(item.k), state = this.marks[i].classList;
+      if (i % by && item.k !== this.selected && !state.contains("fail")) return;
+      this.name(labels, this.view.x(east), this.view.y(north), String(item.seq), "number", 11);
+    });
+    const about = this.about;
+    if (!about) return;
+    if (about.threats.length <= DENSE) {
+      for (const threat of about.threats) this.name(labels, this.view.x(threat.at[0]), this.view.y(threat.at[1]), threat.name, "threat-name", 0);
+    }
+    if (about.zones.length <= DENSE) {
+      for (const zone of about.zones) {
+        const ring = zone.rings[0], n = ring.length;
+        const east = ring.reduce((sum, p) => sum + p[0], 0) / n, north = ring.reduce((sum, p) => sum + p[1], 0) / n;
+        this.name(labels, this.view.x(east), this.view.y(north), zone.name, "zone-name", 0);
+      }
+    }
+  }
+
+  name(labels, x, y, text, kind, away) {
+    if (!this.inside(x, y, 2)) return;
+    const width = 6.4 * text.length + 4, height = 14;
+    const places = away ? [[away, -height / 2], [-away - width, -height / 2], [-width / 2, -away - height], [-width / 2, away]] : [[-width / 2, -height / 2]];
+    for (const [dx, dy] of places) {
+      if (!this.inside(x + dx, y + dy, 0) || !labels.free(x + dx, y + dy, width, height)) continue;
+      const made = svg("text", { x: x + dx + 2, y: y + dy + 11, class: kind }, this.names);
+      made.textContent = text;
+      return;
+    }
+  }
+
+  drawScale() {
+    clear(this.scale);
+    const { width, height, scale } = this.view, metres = step(110 / scale, 1), length = metres * scale;
+    const bar = length > 170 ? metres / 2 : metres, pixels = bar * scale;
+    const x = width - 16 - pixels, y = height - 14;
+    svg("path", { d: `M${x} ${y - 5}V${y}H${x + pixels}V${y - 5}` }, this.scale);
+    const text = svg("text", { x: x + pixels / 2, y: y - 6, "text-anchor": "middle" }, this.scale);
+    text.textContent = bar >= 1000 ? `${bar / 1000} km` : `${bar} m`;
+  }
+
+  // What lies below the pointer: a waypoint before a diamond, the nearest of each.
+  hit(x, y, touch) {
+    const near = (list, most) => {
+      let best = null, least = most;
+      for (const one of list) {
+        const away = Math.hypot(one.x - x, one.y - y);
+        if (away <= least) [best, least] = [one, away];
+      }
+      return best;
+    };
+    const points = this.model.items.map((item) => {
+      const [east, north] = this.at.get(item.k);
+      return { k: item.k, x: this.view.x(east), y: this.view.y(north) };
+    });
+    const point = near(points, touch ? 26 : 16);
+    if (point) return { item: point.k };
+    const middle = near(this.middles || [], touch ? 20 : 11);
+    return middle ? { after: middle.after } : null;
+  }
+
+  // The leg nearest to the pointer, within a few pixels.
+  legAt(x, y) {
+    let best = -1, least = 9;
+    this.model.path.forEach((flat, k) => {
+      for (let i = 0; i + 5 < flat.length; i += 3) {
+        const ax = this.view.x(flat[i]), ay = this.view.y(flat[i + 1]), bx = this.view.x(flat[i + 3]), by = this.view.y(flat[i + 4]);
+        const dx = bx - ax, dy = by - ay, size = dx * dx + dy * dy || 1;
+        const t = Math.min(1, Math.max(0, ((x - ax) * dx + (y - ay) * dy) / size));
+        const away = Math.hypot(ax + t * dx - x, ay + t * dy - y);
+        if (away < least) [best, least] = [k, away];
+      }
+    });
+    return best;
+  }
+
+  extentOf(points) {
+    const east = points.map((p) => p[0]), north = points.map((p) => p[1]);
+    return [[Math.min(...east), Math.max(...east)], [Math.min(...north), Math.max(...north)]];
+  }
+
+  fit() {
+    const shown = this.model.items.map((item) => item.at);
+    const [east, north] = this.extentOf([...shown, ...(this.about?.ends || [])]);
+    const rim = 0.08 * Math.max(east[1] - east[0], north[1] - north[0], 400);
+    this.view.fit([[east[0] - rim, east[1] + rim], [north[0] - rim, north[1] + rim]]);
+    this.layOut();
+  }
+}
+
+const ORDER = ["fail", "open", "near", "ok"];
+
+// The worst state of the corners and legs at each item, by its number.
+export function cornerStates(model) {
+  const found = new Map();
+  model.of.forEach((k, i) => {
+    const mine = model.states.corners[i] || ["ok", ""], old = found.get(k);
+    if (!old || ORDER.indexOf(mine[0]) < ORDER.indexOf(old[0]) || (mine[0] === old[0] && mine[1] && !old[1])) found.set(k, mine);
+  });
+  return found;
+}
+
+// The states of the legs to and from an item.
+export function legStates(model, k) {
+  const found = [];
+  model.of.forEach((own, i) => {
+    if (own !== k) return;
+    if (i > 0) found.push(model.states.legs[i - 1]);
+    if (i < model.states.legs.length) found.push(model.states.legs[i]);
+  });
+  return found;
+}
+
+const WORDS = { ok: "passes", near: "near a limit", open: "not judged in full", fail: "fails" };
+
+export function spoken(item, state) {
+  return `${item.what} ${item.seq}, ${plain(item.at[2] ?? NaN)} m, ${WORDS[state]}`;
+}
+
+export function heightWords(grid, east, north, up) {
+  const ground = groundAt(grid, east, north);
+  const above = Number.isNaN(ground) ? "" : `, ${plain(up - ground)} m above ground`;
+  return `${plain(up)} m AMSL${above}`;
+}

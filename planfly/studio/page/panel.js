@@ -1,0 +1,312 @@
+// The panels beside the map: verdict with suggestions, table of waypoints, planner, settings, files.
+
+import { clear, element, groundAt, plain } from "/axes.js";
+import { cornerStates, legStates } from "/map.js";
+
+const $ = (id) => document.getElementById(id);
+const TABS = ["verdict", "items", "plan", "settings", "files"];
+const FORMS = [["waypoints", ".waypoints", "QGC WPL 110: Mission Planner, QGroundControl, MAVProxy"], ["plan", ".plan", "QGroundControl, with fence and rally points"], ["plan.json", "plan.json", "planfly, with scenario and certificate"], ["kml", ".kml", "a map for Google Earth and others"]];
+const MOST_ROWS = 600;
+
+export class Panel {
+  constructor(app) {
+    this.app = app;
+    this.boxes = Object.fromEntries(TABS.map((name) => [name, $(`panel-${name}`)]));
+    this.tabs = TABS.map((name) => $(`tab-${name}`));
+    this.tabs.forEach((tab, i) => {
+      tab.addEventListener("click", () => this.show(TABS[i]));
+      tab.addEventListener("keydown", (event) => {
+        const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+        if (!by) return;
+        event.preventDefault();
+        const next = (i + by + TABS.length) % TABS.length;
+        this.show(TABS[next]);
+        this.tabs[next].focus();
+      });
+    });
+    this.shown = "verdict";
+    this.files = [];
+    this.saveForm = "waypoints";
+  }
+
+  show(name) {
+    this.shown = name;
+    this.tabs.forEach((tab, i) => {
+      tab.setAttribute("aria-selected", String(TABS[i] === name));
+      tab.tabIndex = TABS[i] === name ? 0 : -1;
+      this.boxes[TABS[i]].hidden = TABS[i] !== name;
+    });
+    this.drawItems();
+  }
+
+  // ---- what comes
+
+  choices(message) {
+    this.offered = message;
+    this.files = message.files;
+    this.drawFiles();
+    this.drawPlan();
+  }
+
+  world(world) {
+    this.about = world;
+    this.drawSettings();
+  }
+
+  sheet(sheet) {
+    this.now = sheet;
+    this.drawVerdict();
+    this.drawItems();
+    this.drawPlanEnds();
+    this.drawFiles();
+  }
+
+  flown(flown) {
+    this.flight = flown;
+    this.drawVerdict();
+  }
+
+  select(k) {
+    this.boxes.items.querySelectorAll("tr[data-k]").forEach((row) => row.classList.toggle("selected", Number(row.dataset.k) === k));
+  }
+
+  // ---- verdict
+
+  drawVerdict() {
+    const { now, flight } = this;
+    if (!now) return;
+    const box = clear(this.boxes.verdict), stale = flight && flight.rev !== now.rev;
+    box.append(this.answerOf("Geometry", now.verdict, "every leg and corner against what the aircraft can do"));
+    if (flight) {
+      const part = this.answerOf("Flown", flight.verdict, `${flight.autopilot}, ${duration(flight.seconds)}${stale ? ", before the last change" : ""}`);
+      part.classList.toggle("stale", Boolean(stale));
+      if (flight.changes.length) part.append(element("p", { class: "changes" }, element("b", {}, "Since the last flight: "), flight.changes.join("; ")));
+      box.append(part);
+    }
+    const failed = this.listed(now.findings, false), flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];
+    if (failed.length) box.append(element("h2", {}, "To mend"), element("ul", { class: "findings" }, ...failed));
+    if (flownFailed.length) box.append(element("h2", {}, "To mend, as flown"), element("ul", { class: "findings" }, ...flownFailed));
+    const passed = now.findings.filter((one) => one.ok);
+    if (passed.length) box.append(element("h2", {}, "Closest to its limit, by rule"), element("ul", { class: "findings passed" }, ...passed.map((one) => this.finding(one, true))));
+    if (now.notes.length) box.append(element("h2", {}, "Notes"), element("ul", { class: "notes" }, ...now.notes.slice(0, 20).map((text) => element("li", {}, text))));
+    const long = element("div", { class: "asks" },
+      element("h2", {}, "Ask more"),
+      this.ask("returns", "Does it come home?", "a return to launch from everywhere on the way"),
+      this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"));
+    box.append(long);
+    for (const one of [this.home, this.odds]) if (one) box.append(one);
+  }
+
+  ask(job, words, more) {
+    return element("p", {}, element("button", { type: "button", "data-job": job, onclick: () => this.app.send({ kind: job }) }, words), element("small", {}, more));
+  }
+
+  answerOf(name, verdict, more) {
+    const lines = verdict.lines.slice(0, 6);
+    return element("section", { class: "card", "data-state": verdict.state },
+      element("h2", {}, `${name}: ${verdict.answer}`), element("p", { class: "more" }, more),
+      verdict.state === "ok" ? null : element("p", {}, verdict.headline),
+      lines.length ? element("details", {}, element("summary", {}, "In full"), ...lines.map((line) => element("p", { class: "line" }, line))) : null);
+  }
+
+  listed(findings, flown) {
+    return findings.filter((one) => one.ok !== true).map((one) => this.finding(one, flown));
+  }
+
+  finding(one, quiet) {
+    const suggestions = quiet ? [] : one.suggestions.map((each, which) => element("li", {},
+      each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", finding: one.number, which }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
+      element("span", {}, each.text)));
+    const place = one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
+    return element("li", { "data-state": one.ok === false ? "fail" : one.ok === null ? "open" : "ok" },
+      element("p", {}, element("span", { class: "rule" }, one.rule), " ", place), element("p", { class: "reason" }, one.text),
+      suggestions.length ? element("ul", { class: "suggestions" }, ...suggestions) : null);
+  }
+
+  // ---- waypoints
+
+  drawItems() {
+    const { now, app } = this;
+    if (!now || this.shown !== "items") return;
+    const by = element("input", { type: "number", value: "10", step: "5", "aria-label": "Metres to raise or lower by", id: "raise-by" });
+    const raise = (sign, all) => () => {
+      const value = sign * Math.abs(Number(by.value));
+      if (!Number.isFinite(value) || !value) return;
+      const ks = all ? null : [app.selected()];
+      if (!all && ks[0] === null) return app.complain("Choose a waypoint first.");
+      app.commit({ kind: "raise", by: value, ...(all ? {} : { ks }) });
+    };
+    const box = clear(this.boxes.items);
+    box.append(element("div", { class: "bar" }, element("label", { for: "raise-by" }, "Heights of all"), by, " m",
+      element("button", { type: "button", onclick: raise(1, true) }, "Raise"), element("button", { type: "button", onclick: raise(-1, true) }, "Lower")));
+    const worst = cornerStates(now), grid = app.grid();
+    const rows = now.items.slice(0, MOST_ROWS).map((item) => this.row(item, worst, grid));
+    const head = element("tr", {}, ...["#", "What", "Height, m AMSL", "Over ground", "Closest to a limit", ""].map((text) => element("th", { scope: "col" }, text)));
+    box.append(element("div", { class: "scroll" }, element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows))));
+    if (now.items.length > MOST_ROWS) box.append(element("p", {}, `The first ${MOST_ROWS} of ${now.items.length} items are listed.`));
+  }
+
+  row(item, worst, grid) {
+    const { app, now } = this, ground = groundAt(grid, item.at[0], item.at[1]);
+    const states = [worst.get(item.k) || ["ok", ""], ...legStates(now, item.k)];
+    const order = ["fail", "open", "near", "ok"];
+    const [state, text] = states.sort((a, b) => order.indexOf(a[0]) - order.indexOf(b[0]) || Boolean(b[1]) - Boolean(a[1]))[0];
+    const height = element("input", { type: "number", step: "1", value: item.at[2] === null ? "" : Math.round(item.at[2] * 10) / 10, "aria-label": `Height of item ${item.seq}, metres above mean sea level` });
+    height.addEventListener("change", () => {
+      const up = Number(height.value);
+      if (height.value !== "" && Number.isFinite(up)) app.commit({ kind: "move", k: item.k, up: Math.max(-500, Math.min(9000, up)) });
+    });
+    const go = element("button", { type: "button", class: "place", onclick: () => { app.select(item.k, true); } }, String(item.seq));
+    const remove = element("button", { type: "button", class: "remove", "aria-label": `Delete item ${item.seq}`, title: "Delete", onclick: () => app.commit({ kind: "delete", ks: [item.k] }) }, "\u00d7");
+    return element("tr", { "data-k": item.k, "data-state": state, class: item.k === app.selected() ? "selected" : "" },
+      element("td", {}, go), element("td", {}, item.what), element("td", {}, height),
+      element("td", { class: "number" }, Number.isNaN(ground) || item.at[2] === null ? "\u2013" : plain(item.at[2] - ground)),
+      element("td", { class: "limit" }, text || "\u2013"), element("td", {}, remove));
+  }
+
+  // ---- planner
+
+  drawPlan() {
+    const box = clear(this.boxes.plan), { offered, app } = this;
+    if (!offered) return;
+    this.seed = element("input", { type: "number", min: "0", value: "1", id: "plan-seed" });
+    this.algorithm = element("select", { id: "plan-algorithm" }, element("option", { value: "" }, "the default"), ...Object.keys(offered.algorithms).map((name) => element("option", { value: name, title: offered.algorithms[name] }, name)));
+    this.number = element("select", { id: "plan-ways" }, ...[1, 2, 3, 4, 5].map((n) => element("option", { value: n }, n === 1 ? "one way" : `${n} ways`)));
+    this.first = element("select", { id: "plan-first" });
+    this.last = element("select", { id: "plan-last" });
+    const plan = () => {
+      const asked = { kind: "plan", seed: Math.max(0, Math.round(Number(this.seed.value) || 0)), ways: Number(this.number.value) };
+      if (this.algorithm.value) asked.algorithm = this.algorithm.value;
+      if (this.first.value !== "" && this.last.value !== "") Object.assign(asked, { first: Number(this.first.value), last: Number(this.last.value) });
+      app.send(asked);
+    };
+    this.wayBox = element("div", { class: "ways" });
+    box.append(element("p", { class: "more" }, "The planner searches a path that the aircraft can fly, clear of ground, threats and zones."),
+      field("From", this.first), field("To", this.last), field("Seed", this.seed), field("Algorithm", this.algorithm), field("Search", this.number),
+      element("p", {}, element("button", { type: "button", class: "main", "data-job": "plan", onclick: plan }, "Plan from here")), this.wayBox);
+    this.drawPlanEnds();
+  }
+
+  drawPlanEnds() {
+    const { now } = this;
+    if (!now || !this.first) return;
+    const places = now.items.slice(0, MOST_ROWS);
+    for (const [box, words] of [[this.first, "the scenario's start"], [this.last, "the scenario's destination"]]) {
+      const kept = box.value;
+      clear(box).append(element("option", { value: "" }, words), ...places.map((item) => element("option", { value: item.k }, `item ${item.seq}`)));
+      if ([...box.options].some((one) => one.value === kept)) box.value = kept;
+    }
+  }
+
+  ways({ ways, at_once: atOnce }) {
+    if (atOnce || !this.wayBox) return;
+    const { app } = this, box = clear(this.wayBox);
+    app.ways(ways, 0);
+    if (!ways.length) return;
+    box.append(element("h2", {}, ways.length === 1 ? "Found" : `${ways.length} ways found`));
+    ways.forEach((way, k) => {
+      const rows = [["Length", `${way.length.toFixed(3)} times straight`], ["Exposure to missiles", way.exposure.toFixed(3)], ["Least clearance to spare", way.clearance === null ? "\u2013" : `${plain(way.clearance, 1)} m`]];
+      const take = element("button", { type: "button", onclick: () => { app.ways([]); app.send({ kind: "choose", which: k }); } }, "Take this way");
+      const card = element("section", { class: "card", "data-state": way.state === "safe" ? "ok" : "fail", onpointerenter: () => app.ways(ways, k) },
+        element("h3", {}, `Seed ${way.seed}: ${way.state}`), element("dl", {}, ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])),
+        ...way.problems.map((text) => element("p", {}, text)), take);
+      box.append(card);
+    });
+  }
+
+  // ---- settings
+
+  drawSettings() {
+    const { about, offered, app } = this, box = clear(this.boxes.settings);
+    if (!about || !offered) return;
+    const { settings } = about;
+    const list = (name, values, chosen) => element("select", { id: `set-${name}`, onchange: (event) => app.send({ kind: "settings", [name]: event.target.value }) }, ...values.map((one) => element("option", { value: one, selected: one === chosen }, one)));
+    const number = (name, value, low, high, step) => element("input", { id: `set-${name}`, type: "number", min: low, max: high, step, value, onchange: (event) => {
+      const given = Number(event.target.value);
+      if (event.target.value !== "" && Number.isFinite(given)) app.send({ kind: "settings", [name]: given });
+    } });
+    const laws = [...new Set([settings.autopilot, ...offered.autopilots])].filter(Boolean);
+    const craft = [...new Set([settings.aircraft, ...offered.aircraft])];
+    box.append(element("p", { class: "more" }, "What is changed here is judged and flown at once."),
+      field("Aircraft", list("aircraft", craft, settings.aircraft)), field("Autopilot", list("autopilot", laws, settings.autopilot)),
+      field("Airspeed, m/s", number("airspeed", settings.airspeed, 5, 100, 0.5)), field("Wind, m/s", number("wind_speed", settings.wind_speed, 0, 50, 0.5)),
+      field("Wind from, degrees", number("wind_from", settings.wind_from, -360, 360, 5)), field("Turbulence", list("turbulence", offered.turbulence, settings.turbulence)),
+      field("Least clearance, m", number("clearance", settings.clearance, 0, 2000, 5)));
+  }
+
+  // ---- files
+
+  drawFiles() {
+    const box = clear(this.boxes.files), { app, now } = this;
+    const over = now?.over ? element("p", {}, element("button", { type: "button", class: "main", onclick: () => this.save() }, `Save over ${now.name}`), element("small", {}, "Ctrl+S")) : null;
+    box.append(element("h2", {}, "Save"), over, ...FORMS.map(([form, name, more]) => element("p", {}, element("button", { type: "button", onclick: () => app.send({ kind: "save", form }) }, name), element("small", {}, more))));
+    this.lossBox = this.lossBox || element("div", { role: "status" });
+    box.append(this.lossBox);
+    const pick = element("input", { type: "file", id: "pick", onchange: (event) => event.target.files[0] && this.openFile(event.target.files[0]) });
+    box.append(element("h2", {}, "Open"), element("p", { class: "more" }, "Drop a file anywhere, or choose one: .waypoints, .plan, plan.json, or a log whose mission is opened."), element("p", {}, element("label", { for: "pick", class: "hidden" }, "File to open"), pick));
+    if (this.files.length) box.append(element("ul", { class: "files" }, ...this.files.map((name) => element("li", {}, element("button", { type: "button", class: "place", onclick: () => app.send({ kind: "open", name }) }, name)))));
+    box.append(element("h2", {}, "Back"), element("p", {}, element("button", { type: "button", disabled: !now?.changed, onclick: () => app.send({ kind: "revert" }) }, "Revert to the file"), element("small", {}, "undo brings the changes back")));
+  }
+
+  save() {
+    if (this.now?.over) this.app.send({ kind: "save", form: "waypoints", over: true });
+    else this.app.send({ kind: "save", form: "waypoints" });
+  }
+
+  saved({ name, losses, over, data }) {
+    if (!over) {
+      const bytes = Uint8Array.from(atob(data), (ch) => ch.charCodeAt(0));
+      const url = URL.createObjectURL(new Blob([bytes]));
+      element("a", { href: url, download: name }).click();
+      setTimeout(() => URL.revokeObjectURL(url), 10000);
+    }
+    const lost = losses.length ? element("ul", {}, ...losses.map((text) => element("li", {}, text))) : null;
+    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is saved. `), losses.length ? "It does not hold:" : "It holds all of the mission."), ...(lost ? [lost] : []));
+    this.show("files");
+  }
+
+  async openFile(file) {
+    if (file.size > 16 * 2 ** 20) return this.app.complain(`${file.name}: larger than 16 MB: open it with planfly studio ${file.name}`);
+    const bytes = new Uint8Array(await file.arrayBuffer()), parts = [];
+    for (let i = 0; i < bytes.length; i += 32768) parts.push(String.fromCharCode(...bytes.subarray(i, i + 32768)));
+    return this.app.send({ kind: "open", name: file.name.slice(-200), data: btoa(parts.join("")) });
+  }
+
+  // ---- long works
+
+  working({ job, share, text }) {
+    for (const button of document.querySelectorAll(`button[data-job="${job}"]`)) {
+      button.dataset.share = share === undefined ? "" : `${Math.round(100 * share)} %`;
+      button.title = text || "";
+    }
+  }
+
+  stopped(job) {
+    for (const button of document.querySelectorAll(`button[data-job="${job}"]`)) delete button.dataset.share;
+  }
+
+  returns(message) {
+    this.stopped("returns");
+    this.home = this.result("It comes home", message);
+    this.drawVerdict();
+  }
+
+  campaign(message) {
+    this.stopped("campaign");
+    this.odds = this.result("In this weather", message);
+    this.drawVerdict();
+  }
+
+  result(title, { state, headline, lines }) {
+    return element("section", { class: "card", "data-state": state }, element("h2", {}, title), element("p", {}, headline), ...lines.slice(0, 6).map((line) => element("p", { class: "line" }, line)));
+  }
+}
+
+function field(words, input) {
+  return element("div", { class: "field" }, element("label", { for: input.id }, words), input);
+}
+
+function duration(seconds) {
+  const minutes = Math.floor(seconds / 60), rest = Math.round(seconds - 60 * minutes);
+  return minutes ? `${minutes} min ${rest} s` : `${rest} s`;
+}

@@ -1,0 +1,339 @@
+"""The studio's server: pages on websockets, one session, a thread that judges, and two processes that work.
+
+What a page drags is judged newest first, one at a time.  What it changes is changed in order, and every page is sent
+what comes of it.
+"""
+
+import asyncio
+import base64
+import binascii
+import contextlib
+import hmac
+import json
+import struct
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from planfly.studio import messages
+from planfly.studio.documents import open_document, open_dropped
+from planfly.studio.ground_picture import ground_grid, ground_picture
+from planfly.studio.jobs import Jobs
+from planfly.studio.messages import read_message
+from planfly.studio.pilot import INTERNAL, Answer, internal_text
+from planfly.studio.session import Session, StaleEdit
+from planfly.studio.sheet import Json
+from world.errors import MissionError, PlanflyError
+
+Given = TypeVar("Given")
+
+# Pages at a time; s until a page has said its token, and between what is kept; frames that wait for a slow page.
+MAX_PAGES, PATIENCE, KEEPING = 4, 5.0, 3.0
+_WAITING = 64
+# Files of a folder that are listed, and their suffixes.
+_MOST_FILES, _LISTED = 200, (".waypoints", ".plan", ".json", ".mcap")
+# Codes with which a websocket is closed.
+NO_TOKEN, TOO_MANY, NOT_UNDERSTOOD = 4403, 4429, 1007
+
+
+@dataclass(eq=False)
+class Page:
+    """A page that has given its token."""
+
+    socket: WebSocket
+    dark: bool
+    frames: asyncio.Queue[str | bytes] = field(default_factory=lambda: asyncio.Queue(_WAITING))
+    drag: messages.Drag | None = None
+    dragged: asyncio.Event = field(default_factory=asyncio.Event)
+    seen: tuple[int, bool] = (0, False)
+
+    def send(self, message: Json | bytes) -> None:
+        """Send it when the page can take it; one that takes nothing more is closed."""
+        frame = message if isinstance(message, bytes) else json.dumps(message, separators=(",", ":"), allow_nan=False)
+        with contextlib.suppress(asyncio.QueueFull):
+            self.frames.put_nowait(frame)
+
+
+class Server:
+    """All of it but the sockets that listen."""
+
+    def __init__(self, session: Session, token: str, kept: Path | None, folder: Path | None) -> None:
+        """kept: where what was done is written.  folder: whose files may be opened by the page, None for none."""
+        self.session, self._token, self._kept = session, token, kept
+        self._files = {} if folder is None else listed_files(folder)
+        self._pages: set[Page] = set()
+        self._judging = ThreadPoolExecutor(1, "studio-judge")
+        self._drawing = ThreadPoolExecutor(1, "studio-draw")
+        self._order = asyncio.Lock()
+        self._grounds: dict[tuple[int, bool], tuple[bytes, ...]] = {}
+        self.jobs = Jobs(self._answered_elsewhere)
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self.welcomed = threading.Event()
+
+    # ------------------------------------------------------------------
+    # Begin and end.
+
+    async def run(self) -> None:
+        """Keep what is done until the server ends."""
+        self._loop = asyncio.get_running_loop()
+        self.jobs.start(self.session)
+        while True:
+            await asyncio.sleep(KEEPING)
+            await self._keep()
+
+    async def _keep(self) -> None:
+        if self._kept is not None and (self.session.is_changed or self.session.kept_rev):
+            # Without room on the disk the studio goes on, and what is done is not kept.
+            with contextlib.suppress(OSError, PlanflyError):
+                await self._judged(lambda: self.session.keep(self._kept or Path()))
+
+    async def close(self) -> None:
+        """End the processes and keep what was done."""
+        await self._keep()
+        self.jobs.close()
+        self._judging.shutdown(wait=False, cancel_futures=True)
+        self._drawing.shutdown(wait=False, cancel_futures=True)
+
+    async def _judged(self, work: Callable[[], Given]) -> Given:
+        return await asyncio.get_running_loop().run_in_executor(self._judging, work)
+
+    # ------------------------------------------------------------------
+    # One page.
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Speak with a page until it goes."""
+        await socket.accept()
+        page = await self._welcome(socket)
+        if page is None:
+            return
+        self._pages.add(page)
+        self.welcomed.set()
+        tasks = [asyncio.create_task(self._write(page)), asyncio.create_task(self._preview(page))]
+        try:
+            await self._show_all(page)
+            while True:
+                await self._hear(page, await _text(socket))
+        except WebSocketDisconnect:
+            pass
+        except ValueError:
+            with contextlib.suppress(RuntimeError):
+                await socket.close(NOT_UNDERSTOOD)
+        finally:
+            self._pages.discard(page)
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _welcome(self, socket: WebSocket) -> Page | None:
+        """The page, if its first message has the token."""
+        code = TOO_MANY if len(self._pages) >= MAX_PAGES else NO_TOKEN
+        with contextlib.suppress(ValueError, asyncio.TimeoutError, WebSocketDisconnect):
+            first = read_message(await asyncio.wait_for(_text(socket), PATIENCE))
+            given = isinstance(first, messages.Hello) and hmac.compare_digest(
+                first.token.encode(), self._token.encode()
+            )
+            if code != TOO_MANY and given and isinstance(first, messages.Hello):
+                return Page(socket, first.dark)
+        with contextlib.suppress(RuntimeError):
+            await socket.close(code)
+        return None
+
+    async def _write(self, page: Page) -> None:
+        while True:
+            frame = await page.frames.get()
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+                await (page.socket.send_bytes(frame) if isinstance(frame, bytes) else page.socket.send_text(frame))
+
+    async def _preview(self, page: Page) -> None:
+        """Judge the newest place of what a page drags, one at a time."""
+        while True:
+            await page.dragged.wait()
+            page.dragged.clear()
+            asked, page.drag = page.drag, None
+            if asked is None:
+                continue
+            try:
+                found = await self._judged(lambda asked=asked: self.session.preview(asked))  # type: ignore[misc]
+            except StaleEdit:
+                continue
+            except PlanflyError as error:
+                found = {"fault": str(error)}
+            except INTERNAL as error:
+                found = {"fault": internal_text(error)}
+            page.send({"kind": "preview", "rev": asked.rev, "n": asked.n, **found})
+
+    async def _show_all(self, page: Page) -> None:
+        page.send({"kind": "choices", **self.jobs.choices(), "files": sorted(self._files)})
+        page.send(self.session.world_shown())
+        page.send(self.session.sheet())
+        for message in self.jobs.shown():
+            page.send(message)
+        await self._show_ground(page)
+
+    async def _show_ground(self, page: Page) -> None:
+        """The ground of the world and look that the page has, once."""
+        terrain, world = self.session.desk.scenario.terrain, self.session.world_shown()
+        key = (hash(json.dumps(world["shown"])), page.dark)
+        if terrain is None or page.seen == key:
+            return
+        page.seen = key
+        east, north = world["shown"]
+        if key not in self._grounds:
+            self._grounds.clear()
+
+            def draw() -> tuple[bytes, ...]:
+                grid = ground_grid(terrain, tuple(east), tuple(north))
+                head = {"east": east, "north": north, "rows": grid.heights.shape[0], "columns": grid.heights.shape[1]}
+                picture = ground_picture(terrain, tuple(east), tuple(north), dark=page.dark)
+                heights = np.ascontiguousarray(grid.heights, dtype="<f4").tobytes()
+                return _frame("H", head, heights), _frame("G", {"east": east, "north": north}, picture)
+
+            self._grounds[key] = await asyncio.get_running_loop().run_in_executor(self._drawing, draw)
+        for frame in self._grounds[key]:
+            page.send(frame)
+
+    # ------------------------------------------------------------------
+    # What a page says.
+
+    async def _hear(self, page: Page, text: str) -> None:
+        """Do what a message asks.  Raises ValueError for one that is not understood."""
+        message = read_message(text)
+        if isinstance(message, messages.Drag):
+            page.drag = message
+            page.dragged.set()
+            return
+        if isinstance(message, messages.Look):
+            page.dark = message.dark
+            await self._show_ground(page)
+            return
+        try:
+            await self._do(page, message)
+        except StaleEdit:
+            page.send({"kind": "stale"})
+            page.send(self.session.sheet())
+        except PlanflyError as error:
+            page.send({"kind": "fault", "text": str(error)})
+        except INTERNAL as error:
+            page.send({"kind": "fault", "text": internal_text(error)})
+
+    async def _do(self, page: Page, message: messages.Message) -> None:
+        session = self.session
+        match message:
+            case messages.Ask(kind="stop"):
+                self.jobs.stop()
+            case messages.Ask():
+                self.jobs.ask(message.kind, session)
+            case messages.Plan():
+                self.jobs.plan(message, session)
+            case messages.Save():
+                work = session.save_over if message.over else lambda: session.save(message.form)
+                async with self._order:
+                    saved = await self._judged(work)
+                content = "" if message.over else base64.b64encode(saved.data).decode()
+                answer = {"name": saved.name, "losses": list(saved.losses), "over": message.over, "data": content}
+                page.send({"kind": "saved", **answer})
+            case messages.Hello():
+                raise ValueError("a page says its token once")
+            case _:
+                await self._change(message)
+
+    async def _change(self, message: messages.Message) -> None:
+        """Change the session and show every page what came of it."""
+        session = self.session
+        async with self._order:
+            rev, world = session.rev, session.world_rev
+            await self._judged(lambda: self._changed(message))
+            if session.rev == rev:
+                return
+            shown = await self._judged(session.sheet)
+        if session.world_rev != world:
+            self._broadcast(session.world_shown())
+        self._broadcast(shown)
+        self.jobs.fly(session)
+        if session.world_rev != world:
+            for page in list(self._pages):
+                await self._show_ground(page)
+
+    def _changed(self, message: messages.Message) -> None:
+        session = self.session
+        match message:
+            case messages.Move() | messages.Insert() | messages.Delete() | messages.Raise() | messages.Apply():
+                session.edit(message)
+            case messages.Step():
+                session.step(message.kind)
+            case messages.Settings():
+                session.change_settings(message)
+            case messages.Choose():
+                session.replace_plan(message.which)
+            case messages.Open():
+                session.open(self._opened(message))
+                self.jobs.forget()
+
+    def _opened(self, message: messages.Open) -> Any:
+        if message.data is None:
+            path = self._files.get(message.name)
+            if path is None:
+                raise MissionError.at("open", "name", message.name[:60], "a file of the list is expected")
+            return open_document(str(path), self.session.world)
+        try:
+            data = base64.b64decode(message.data, validate=True)
+        except binascii.Error as error:
+            raise MissionError(f"{message.name[:60]}: its bytes did not come whole", field="data") from error
+        return open_dropped(message.name, data, self.session.world)
+
+    # ------------------------------------------------------------------
+    # What the processes answer.
+
+    def _answered_elsewhere(self, pilot: str, answer: Answer) -> None:
+        """Called from a thread of a process's pipe."""
+        if self._loop is not None and not self._loop.is_closed():
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._answered, pilot, answer)
+
+    def _answered(self, pilot: str, answer: Answer) -> None:
+        for message in self.jobs.answered(pilot, answer, self.session):
+            self._broadcast(message)
+        if self.jobs.chosen_at_once(self.session):
+            task = asyncio.ensure_future(self._change(messages.Choose(kind="choose", which=0)))
+            task.add_done_callback(lambda done: done.exception())
+
+    def _broadcast(self, message: Json) -> None:
+        for page in self._pages:
+            page.send(message)
+
+
+async def _text(socket: WebSocket) -> str:
+    """The next message, which is text.  Raises ValueError for a binary one, and WebSocketDisconnect."""
+    received = await socket.receive()
+    if received["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(received.get("code", 1000))
+    text = received.get("text")
+    if text is None:
+        raise ValueError("a message in text is expected")
+    return str(text)
+
+
+def _frame(kind: str, head: Json, body: bytes) -> bytes:
+    """A binary frame: its kind, the length of its head, the head as JSON, and the bytes."""
+    text = json.dumps(head).encode()
+    return kind.encode() + struct.pack("<I", len(text)) + text + body
+
+
+def listed_files(folder: Path) -> dict[str, Path]:
+    """Missions, plans and logs of a folder by name; none that a link leads out of it.
+
+    >>> listed_files(Path("no such folder"))
+    {}
+    """
+    try:
+        inside = folder.resolve(strict=True)
+        found = sorted(one for one in inside.iterdir() if one.suffix.lower() in _LISTED and one.is_file())
+    except OSError:
+        return {}
+    return {one.name: one for one in found[:_MOST_FILES] if one.resolve().parent == inside}

@@ -1,0 +1,373 @@
+"""The mission under edit as all pages see it: opened, changed, judged, saved, and kept beside for a server that dies.
+
+No part of it knows of connections or processes: `planfly.studio.server` does.  Every change has a revision, which only
+grows; an edit of an older one is refused, so that two pages never change what the other does not show.
+"""
+
+import json
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flight.mission.items import Home, Mission, MissionItem
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from planfly.api.planning import changed_scenario
+from planfly.studio import edits
+from planfly.studio.applied import apply_suggestion
+from planfly.studio.desk import Desk, Judged
+from planfly.studio.documents import Document, Saved, World, open_document, planned_mission, save_document
+from planfly.studio.history import History
+from planfly.studio.messages import Apply, Delete, Drag, Insert, Move, Raise, Settings
+from planfly.studio.sheet import Json, sheet_json, window_json, world_json
+from planfly.studio.windows import judge_windows
+from planner.plan import Plan
+from world.errors import MissionError, PlanflyError
+from world.files import write_whole
+from world.frames import to_geo
+from world.scenario import Scenario, from_spec
+
+Edit = Move | Insert | Delete | Raise | Apply
+_KEPT = "planfly.studio/1"
+
+
+class StaleEdit(Exception):
+    """An edit of a sheet that another edit has changed since."""
+
+
+@dataclass(slots=True)
+class Session:
+    """One mission under edit.
+
+    document: as opened.  desk: what it is judged with.  history: what was done to it.
+    rev: grows with every change.  judged, requirements: of the mission as it is.
+    plans: paths that were planned and may be chosen, with the items that they would replace.
+    world_rev: grows with every change of the world.
+    """
+
+    document: Document
+    world: World
+    desk: Desk
+    history: History
+    judged: Judged
+    requirements: RouteRequirements
+    rev: int = 1
+    world_rev: int = 1
+    plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
+    kept_rev: int = 0
+
+    @classmethod
+    def of(cls, document: Document, world: World) -> "Session":
+        """A session that begins with what was opened."""
+        desk = Desk.of(document.opened, world.terrain)
+        judged = desk.judge(document.opened.setup.mission)
+        history = History(document.opened.setup.mission)
+        return cls(document, world, desk, history, judged, route_requirements(judged.setup))
+
+    def open(self, document: Document) -> None:
+        """Begin anew with another document."""
+        made = Session.of(document, self.world)
+        self.document, self.desk, self.history = made.document, made.desk, made.history
+        self.judged, self.requirements, self.plans = made.judged, made.requirements, ([], None)
+        self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
+
+    @property
+    def mission(self) -> Mission:
+        """The mission as it is."""
+        return self.history.mission
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether it differs from what was opened."""
+        return self.mission is not self.history.first
+
+    # ------------------------------------------------------------------
+    # Edits.
+
+    def edit(self, message: Edit) -> None:
+        """Make an edit.  Raises StaleEdit, and MissionError for what no mission may be; nothing is changed then."""
+        if message.rev != self.rev:
+            raise StaleEdit
+        mission, text = self._edited(message)
+        self._show(mission)
+        self.history.add(mission, text)
+
+    def step(self, kind: str) -> None:
+        """Undo, redo, or revert to what was opened; nothing happens where there is nothing to."""
+        if kind == "revert":
+            if self.is_changed:
+                self._show(self.history.first)
+                self.history.add(self.history.first, "revert to the file")
+            return
+        done = self.history.undo() if kind == "undo" else self.history.redo()
+        if done:
+            self._show(self.mission)
+
+    def preview(self, message: Drag) -> Json:
+        """What a drag would come to, which changes nothing: windows, or the whole where that is asked for."""
+        if message.rev != self.rev:
+            raise StaleEdit
+        mission = self._placed(message.k, message.east, message.north, message.up)
+        found = None if message.whole else judge_windows(self.desk, mission, message.k)
+        if found is not None:
+            return window_json(mission, *found)
+        judged = self.desk.judge(mission)
+        return {"sheet": sheet_json(self.desk, judged, route_requirements(judged.setup))}
+
+    def replace_plan(self, which: int) -> None:
+        """Take one of the planned paths: all of the mission, or the items between two."""
+        plans, between = self.plans
+        if not 0 <= which < len(plans):
+            raise PlanflyError("that path is not there any more: plan again", field="which")
+        plan = plans[which]
+        if between is None:
+            self._show_plan(plan)
+            return
+        mission = self._joined(plan, *between)
+        self._show(mission)
+        self.history.add(mission, "plan a part")
+
+    def _show(self, mission: Mission) -> None:
+        """Judge a mission as the one that is shown, in its world."""
+        desk = self.desk.around(mission)
+        judged = desk.judge(mission)
+        requirements = route_requirements(judged.setup)
+        if desk is not self.desk:
+            self.world_rev += 1
+        self.desk, self.judged, self.requirements = desk, judged, requirements
+        self.rev += 1
+
+    def _show_plan(self, plan: Plan) -> None:
+        """A new plan takes the place of all; its certificate counts until it is edited."""
+        mission = planned_mission(plan, self.desk.airframe)
+        self.desk = self.desk.of_plan(plan, mission)
+        self._show(mission)
+        self.history.add(mission, f"plan with seed {plan.seed}")
+
+    def _edited(self, message: Edit) -> tuple[Mission, str]:
+        match message:
+            case Move():
+                item = edits.checked_place(self.mission, message.k)
+                mission = self._placed(message.k, message.east, message.north, message.up)
+                return mission, f"move item {item.seq}"
+            case Insert():
+                return self._inserted(message)
+            case Delete():
+                return self._deleted(message.ks)
+            case Raise():
+                chosen = edits.places(self.mission) if message.ks is None else tuple(message.ks)
+                mission = edits.raised(self.mission, chosen, message.by)
+                which = "all items" if message.ks is None else f"{len(chosen)} item{'s' if len(chosen) != 1 else ''}"
+                return mission, f"{'raise' if message.by >= 0.0 else 'lower'} {which} by {abs(message.by):g} m"
+            case Apply():
+                return self._applied(message)
+
+    def _placed(self, k: int, east: float | None, north: float | None, up: float | None) -> Mission:
+        mission = self.mission
+        edits.checked_place(mission, k)
+        if east is not None and north is not None:
+            mission = edits.moved(mission, k, *self.desk.geographic(east, north))
+        if up is not None:
+            now = float(self.desk.points(mission)[edits.places(mission).index(k), 2])
+            mission = edits.at_height(mission, k, up, now if np.isfinite(now) else up)
+        return mission if mission is self.mission else self.desk.retuned(mission, k)
+
+    def _inserted(self, message: Insert) -> tuple[Mission, str]:
+        """A waypoint behind another, at the height halfway to the next in the frame of the one before."""
+        mission, own = self.mission, edits.places(self.mission)
+        before = edits.checked_place(mission, message.after)
+        height, at = None, own.index(message.after)
+        if at + 1 < len(own):
+            after = mission.items[own[at + 1]]
+            height = 0.5 * (before.alt + after.alt) if after.frame == before.frame else None
+            height = height if height is not None and np.isfinite(height) else None
+        made = edits.inserted(mission, message.after, *self.desk.geographic(message.east, message.north), height)
+        return self.desk.retuned(made, message.after + 1), f"insert an item after {before.seq}"
+
+    def _deleted(self, ks: list[int]) -> tuple[Mission, str]:
+        mission = self.mission
+        for k in sorted(set(ks), reverse=True):
+            mission = edits.deleted(mission, k)
+            own = edits.places(mission)
+            near = min(own, key=lambda one: abs(one - k))
+            mission = self.desk.retuned(mission, near)
+        return mission, f"delete {len(set(ks))} item{'s' if len(set(ks)) != 1 else ''}"
+
+    def _applied(self, message: Apply) -> tuple[Mission, str]:
+        findings = self.judged.verdict.findings
+        if not message.finding < len(findings):
+            raise MissionError(f"{self.document.name}: that finding is not there any more", field="finding")
+        item = findings[message.finding]
+        mission = apply_suggestion(self.desk, self.judged, self.requirements, item, message.which)
+        return mission, f"apply a suggestion of {item.rule}"
+
+    def _joined(self, plan: Plan, first: int, last: int) -> Mission:
+        """The mission with a planned path's waypoints in place of the items between two."""
+        mission = self.mission
+        for k in [k for k in edits.places(mission) if first < k < last][::-1]:
+            mission = edits.deleted(mission, k)
+        lat, lon = to_geo(self.desk.scenario.origin, plan.waypoints[1:-1, 0], plan.waypoints[1:-1, 1])
+        for step, (one_lat, one_lon) in enumerate(zip(lat.tolist(), lon.tolist(), strict=True)):
+            mission = edits.inserted(mission, first + step, one_lat, one_lon)
+            now = float(self.desk.points(mission)[edits.places(mission).index(first + step + 1), 2])
+            mission = edits.at_height(mission, first + step + 1, float(plan.waypoints[step + 1, 2]), now)
+        for k in [k for k in edits.places(mission) if first <= k <= first + len(lat) + 1]:
+            mission = self.desk.retuned(mission, k)
+        return mission
+
+    def place_of(self, k: int) -> tuple[float, float, float]:
+        """East, north and height above mean sea level of an item, m.  Raises MissionError for one that is no place."""
+        edits.checked_place(self.mission, k)
+        east, north, up = self.desk.points(self.mission)[edits.places(self.mission).index(k)].tolist()
+        return east, north, up
+
+    # ------------------------------------------------------------------
+    # The world.
+
+    def change_settings(self, asked: Settings) -> None:
+        """Fly the mission otherwise.  Raises PlanflyError for a value that no scenario may have."""
+        desk = self.desk.flown_as(changed_world(self.desk.scenario, asked))
+        mission = self.mission
+        judged = desk.judge(mission)
+        self.requirements = route_requirements(judged.setup)
+        self.desk, self.judged = desk, judged
+        self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
+
+    def settings_json(self) -> Json:
+        """The settings as they are."""
+        scenario, frame = self.desk.scenario, self.desk.airframe
+        return {
+            "aircraft": frame.aircraft.name,
+            "autopilot": frame.autopilot.name,
+            "autopilot_title": frame.autopilot.title,
+            "airspeed": round(frame.airspeed, 1),
+            "wind_speed": float(scenario.wind.speed),
+            "wind_from": round(float(np.degrees(scenario.wind.from_course)), 1),
+            "turbulence": scenario.wind.turbulence,
+            "clearance": float(scenario.limits.min_clearance_m),
+        }
+
+    # ------------------------------------------------------------------
+    # What the page draws, and files.
+
+    def sheet(self) -> Json:
+        """All of the mission as it is."""
+        return {
+            "kind": "sheet",
+            "rev": self.rev,
+            "name": self.document.name,
+            "changed": self.is_changed,
+            "undo": self.history.undo_text,
+            "redo": self.history.redo_text,
+            "over": self.document.kind if self.document.path is not None else "",
+            "planned": self.judged.setup.plan is not None,
+            "notes": [*self.mission.warnings, *self.judged.setup.notes],
+            **sheet_json(self.desk, self.judged, self.requirements),
+        }
+
+    def world_shown(self) -> Json:
+        """The world about it."""
+        return {
+            "kind": "world",
+            "world": self.world_rev,
+            **world_json(self.desk, self.mission),
+            "settings": self.settings_json(),
+        }
+
+    def save(self, form: str) -> Saved:
+        """The mission as a file.  Raises PlanflyError."""
+        return save_document(self.document, self.desk, self.judged, form)
+
+    def save_over(self) -> Saved:
+        """Write the mission over the file that the command named.  Raises PlanflyError where there is none."""
+        path = self.document.path
+        if path is None or not self.document.kind:
+            raise PlanflyError("no mission file was named: save it as a new one", field="over")
+        saved = self.save(self.document.kind)
+        write_whole(path, saved.data)
+        return saved
+
+    # ------------------------------------------------------------------
+    # Kept beside, for a server that dies.
+
+    def keep(self, file: Path) -> None:
+        """Write what was done, if anything was since it was written last."""
+        if self.kept_rev == self.rev:
+            return
+        data = {"schema": _KEPT, "name": self.document.name, "at": time.time(), "mission": mission_data(self.mission)}
+        write_whole(file, json.dumps({**data, "first": mission_data(self.history.first)}))
+        self.kept_rev = self.rev
+
+    def restore(self, file: Path) -> bool:
+        """Take what was kept of the same document as an edit of it; whether there was anything.
+
+        What was kept of another document, or cannot be read, is left.
+        """
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            same = data["schema"] == _KEPT and data["first"] == mission_data(self.history.first)
+            mission = mission_from(data["mission"], self.history.first) if same else self.history.first
+            if not same or data["mission"] == data["first"]:
+                return False
+            self._show(mission)
+        except (OSError, ValueError, LookupError, TypeError, PlanflyError):
+            return False
+        self.history.add(mission, "what was done before the studio ended")
+        return True
+
+
+def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
+    """A scenario with other settings.  Raises PlanflyError for a value that it may not have."""
+    wind = None
+    if asked.wind_speed is not None or asked.wind_from is not None:
+        speed = scenario.wind.speed if asked.wind_speed is None else asked.wind_speed
+        from_deg = float(np.degrees(scenario.wind.from_course)) if asked.wind_from is None else asked.wind_from
+        wind = (float(speed), from_deg)
+    if asked.aircraft is not None and ("/" in asked.aircraft or "\\" in asked.aircraft):
+        raise PlanflyError("aircraft: a name that planfly aircraft lists is expected", field="aircraft")
+    changed = changed_scenario(
+        scenario, wind=wind, turbulence=asked.turbulence, aircraft=asked.aircraft, airspeed=asked.airspeed,
+        autopilot_law=asked.autopilot,
+    )  # fmt: skip
+    if asked.clearance is None:
+        return changed
+    spec = changed.to_json()
+    spec.setdefault("limits", {})["min_clearance_m"] = asked.clearance
+    return from_spec(spec, changed.name, ground=changed.terrain, external=changed.external)
+
+
+def mission_data(mission: Mission) -> Json:
+    """A mission as plain data, of which `mission_from` makes the same again; NaN is null."""
+
+    def plain(item: MissionItem) -> list[Any]:
+        numbers = [*item.params, item.lat_deg, item.lon_deg, item.alt]
+        return [item.seq, item.command, item.frame, *(None if v != v else v for v in numbers), item.autocontinue]
+
+    home = mission.home
+    return {
+        "home": None if home is None else [home.lat_deg, home.lon_deg, None if home.alt != home.alt else home.alt],
+        "items": [plain(item) for item in mission.items],
+    }
+
+
+def mission_from(data: Json, first: Mission) -> Mission:
+    """A mission of its data; what the items do not say is that of the first."""
+
+    def number(value: Any) -> float:
+        return float("nan") if value is None else float(value)
+
+    items = [
+        MissionItem(int(seq), int(command), int(frame), (p[0], p[1], p[2], p[3]), p[4], p[5], p[6], bool(go_on))
+        for seq, command, frame, *numbers, go_on in data["items"]
+        for p in [[number(value) for value in numbers]]
+    ]
+    home = data["home"]
+    return replace(first, items=tuple(items), home=None if home is None else Home(*(number(one) for one in home)))
+
+
+def open_session(target: str, world: World, kept: Path | None = None) -> tuple[Session, bool]:
+    """A session of what a command names, and whether edits of before were taken up.  Raises PlanflyError."""
+    session = Session.of(open_document(target, world), world)
+    return session, kept is not None and session.restore(kept)

@@ -1,0 +1,159 @@
+"""What a verdict says of each leg and corner of a route, and of each threat and zone: its state and the closest limit.
+
+A state is "fail", "open" (not judged, so that it is not flyable), "near" a limit, or "ok".  Numbers and words are those
+of the finding that is closest to its limit.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from logs.verdict.findings import Finding, left_open
+from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.rules.registry import RULES
+from logs.verdict.tolerances import ROUNDING
+from logs.verdict.wording import UNITS
+from world.threats import Threats
+
+Floats = NDArray[np.float64]
+
+# Of a rule whose margin has no scale, such as a turn's, the last tenth before the limit is near it.
+_NEAR_SHARE = 0.1
+_ORDER = {"fail": 0, "open": 1, "near": 2, "ok": 3}
+
+
+class State(NamedTuple):
+    """The state of a place.
+
+    closeness: what is left to the limit by what a person would call noticeable; below 1 is near, below 0 beyond.
+    text: the finding in a few words, for the pointer.
+    """
+
+    state: str
+    closeness: float = math.inf
+    text: str = ""
+
+
+class PlaceStates(NamedTuple):
+    """States by the numbers of the route; places of which nothing was found have none.
+
+    legs, corners: by leg and by waypoint.
+    threats, zones: those that fail, by their numbers.
+    """
+
+    legs: dict[int, State]
+    corners: dict[int, State]
+    threats: frozenset[int]
+    zones: frozenset[int]
+
+
+def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *, shift: int = 0) -> PlaceStates:
+    """The states that findings come to; those of threats, zones and bounds colour the legs on which they are violated.
+
+    shift: added to the numbers of legs and corners, of a part of a route.
+    """
+    legs: dict[int, State] = {}
+    corners: dict[int, State] = {}
+    threats: set[int] = set()
+    zones: set[int] = set()
+    is_open = {id(item) for item in left_open(findings)}
+    for item in findings:
+        state = state_of(item, unjudged=id(item) in is_open)
+        if state is None:
+            continue
+        place = item.place
+        if place.kind == "leg" and place.index is not None:
+            _note(legs, (place.index + shift,), state)
+        elif place.kind == "waypoint" and place.index is not None:
+            _note(corners, (place.index + shift,), state)
+        elif state.state == "fail":
+            _note(legs, (leg + shift for leg in violated_legs(requirements, item)), state)
+            if place.index is not None:
+                (threats if place.kind in ("missile", "radar") else zones).add(place.index)
+    return PlaceStates(legs, corners, frozenset(threats), frozenset(zones))
+
+
+def _note(states: dict[int, State], numbers: Iterable[int], state: State) -> None:
+    for number in numbers:
+        old = states.get(number)
+        if old is None or (_ORDER[state.state], state.closeness) < (_ORDER[old.state], old.closeness):
+            states[number] = state
+
+
+def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
+    """The state that one finding gives its place; None for one that says nothing of it.
+
+    unjudged: whether the verdict is not given for want of it.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> slope = make_finding(
+    ...     "slope", Place("leg", 1), ok=True, reason="", planned=13.5, limit=14.2, margin=0.7, unit="deg"
+    ... )
+    >>> state_of(slope)
+    State(state='near', closeness=0.7, text='slope 13.5° of 14.2°')
+    """
+    if item.ok is None:
+        return State("open", 0.0, f"{_word(item)}: {item.brief or item.reason}") if unjudged else None
+    if item.ok is False:
+        return State("fail", -math.inf if item.margin is None else item.margin, f"{_word(item)}: {item.brief}")
+    if item.margin is None or item.planned is None:
+        return None
+    closeness = _closeness(item)
+    return State("near" if closeness < 1.0 else "ok", closeness, _numbers(item))
+
+
+def _word(item: Finding) -> str:
+    return RULES[item.rule].word
+
+
+def _closeness(item: Finding) -> float:
+    scale, margin = RULES[item.rule].scale, item.margin or 0.0
+    if scale is None:
+        if item.limit is None or not item.limit:
+            return math.inf
+        scale = _NEAR_SHARE * abs(item.limit)
+    return margin / scale
+
+
+def _numbers(item: Finding) -> str:
+    unit = UNITS.get(item.unit, "")
+    text = f"{_word(item)} {item.planned:.1f}{unit}"
+    return text if item.limit is None else f"{text} of {item.limit:.1f}{unit}"
+
+
+# ----------------------------------------------------------------------
+# The legs on which a threat, a zone or the area is violated: their findings name what is violated.
+
+
+def violated_legs(requirements: RouteRequirements, item: Finding) -> tuple[int, ...]:
+    """Legs of the planned path on which a failed finding of a threat, a zone or the area holds."""
+    path, place = requirements.path, item.place
+    scenario = requirements.setup.scenario
+    if place.kind in ("missile", "radar") and place.index is not None:
+        near = sphere_segments(path.points, scenario.threats, place.index, missile=place.kind == "missile")
+        return tuple(np.unique(path.legs[near]).tolist())
+    facts = {fact.what: fact.value for fact in item.facts}
+    if "entry leg" in facts and "exit leg" in facts:
+        return tuple(range(int(facts["entry leg"]), int(facts["exit leg"]) + 1))
+    if item.rule == "bounds":
+        (west, east), (south, north) = scenario.bounds.tolist()
+        low, high = np.array([west, south, scenario.floor]), np.array([east, north, scenario.ceiling])
+        beyond = np.asarray(((path.points < low - ROUNDING) | (path.points > high + ROUNDING)).any(axis=1))
+        return tuple(np.unique(path.legs[beyond[:-1] | beyond[1:]]).tolist())
+    return ()
+
+
+def sphere_segments(points: Floats, threats: Threats, number: int, *, missile: bool) -> NDArray[np.bool_]:
+    """Whether each segment of a path comes into a threat's sphere, (n - 1,).  points: (n, 3) m."""
+    radius = float((threats.kill_radius if missile else threats.detection_radius)[number])
+    start, step = points[:-1] - threats.position[number], np.diff(points, axis=0)
+    length2 = (step**2).sum(axis=1)
+    share = np.clip(
+        np.divide(-(start * step).sum(axis=1), length2, out=np.zeros_like(length2), where=length2 > 0), 0, 1
+    )
+    nearest = start + share[:, None] * step
+    return np.asarray((nearest**2).sum(axis=1) <= radius**2)

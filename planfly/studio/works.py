@@ -1,0 +1,104 @@
+"""What the studio's processes do: fly a mission, plan a path.  Each takes what can be pickled, and gives data.
+
+Returns and campaigns, which take longer, are in `planfly.studio.long_works`.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flight.mission.items import Mission
+from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.wording import place_text
+from logs.views.failures import track_distance
+from planfly.airframe import Airframe, laid_from_the_ground
+from planfly.pipeline import fly_and_judge
+from planfly.studio.desk import Desk
+from planfly.studio.pilot import Advance
+from planfly.studio.sheet import findings_json, rounded, states_json, verdict_json
+from planfly.studio.states import place_states
+from planner.plan import Plan
+from planner.search.plan_path import plan_path
+from world.scenario import Scenario, from_spec
+
+# Rows of a flown track that the page draws.
+_DRAWN = 1_500
+
+
+def fly(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
+    """Fly a mission by the law of its autopilot, and judge the flight."""
+    desk, mission = payload
+    setup = desk.setup(mission)
+    flown = fly_and_judge(setup, desk.airframe, None, advance, reference=False)
+    states = place_states(route_requirements(setup), flown.verdict.findings)
+    return {
+        "verdict": verdict_json(flown.verdict),
+        "findings": findings_json(flown.verdict),
+        "failed": sorted({(item.rule, place_text(item.place)) for item in flown.verdict.failed}),
+        "states": states_json(states, 0, setup.route.legs),
+        "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
+        "ended": flown.ended,
+        "autopilot": setup.autopilot.title,
+        "seconds": round(float(flown.track.time[-1]), 1) if len(flown.track) else 0.0,
+        **_track(setup.route.waypoints, flown.track),
+    }
+
+
+def _track(route: Any, track: Track) -> dict[str, Any]:
+    """A flown track for the map, and for the profile by its progress along the route."""
+    if not len(track):
+        return {"track": [], "along": []}
+    rows = np.union1d(np.arange(0, len(track), max(1, len(track) // _DRAWN)), [len(track) - 1])
+    along = np.asarray(track_distance(route, track))
+    return {"track": rounded(track.position[rows]), "along": rounded(along[rows]), "time": rounded(track.time[rows])}
+
+
+# ----------------------------------------------------------------------
+# Planned.
+
+
+@dataclass(frozen=True, slots=True)
+class PlanAsked:
+    """Between which places to plan, in the world of a scenario.
+
+    ends: (2, 3) m; None for the scenario's own.  seeds: a path is searched with each.  algorithm: None for the default.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    seeds: tuple[int, ...]
+    algorithm: str | None = None
+    ends: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+
+
+def plan(asked: PlanAsked, advance: Advance) -> list[Plan]:
+    """A path with each seed; those that differ from none before them are left out."""
+    scenario = asked.scenario if asked.ends is None else between(asked.scenario, *asked.ends)
+    limits, found = asked.airframe.limits.surely(), list[Plan]()
+    for number, seed in enumerate(asked.seeds):
+
+        def on(done: int, total: int, remark: str, number: int = number) -> None:
+            advance(number + done / max(1, total), len(asked.seeds), remark)
+
+        made = plan_path(scenario, limits, seed=seed, algorithm=asked.algorithm, progress=on)
+        if asked.ends is None:
+            made = laid_from_the_ground(made, asked.airframe)
+        if not any(_same(made, one) for one in found):
+            found.append(made)
+    return found
+
+
+def between(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:
+    """A scenario with other ends, (3,) m each, in the air and without courses."""
+    spec = scenario.to_json()
+    for key, (east, north, up) in (("start", start), ("destination", destination)):
+        spec[key] = {"east_m": east, "north_m": north, "amsl_m": up}
+    for key in ("launch", "landing"):
+        spec.pop(key, None)
+    return from_spec(spec, scenario.name, ground=scenario.terrain, external=scenario.external)
+
+
+def _same(a: Plan, b: Plan) -> bool:
+    return a.waypoints.shape == b.waypoints.shape and bool(np.allclose(a.waypoints, b.waypoints, atol=5.0))

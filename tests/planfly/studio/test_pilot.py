@@ -1,0 +1,59 @@
+"""The process that works for the studio: the newest work alone, cancelled, and started again where it died."""
+
+import os
+import queue
+import signal
+import time
+
+import pytest
+
+from planfly.studio.pilot import Answer, Pilot, Work
+
+COUNT = "tests.planfly.studio.drafts.count"
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals")
+
+
+class Heard:
+    """A pilot and what it answers."""
+
+    def __init__(self) -> None:
+        self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
+        self.pilot = Pilot("test", self.answers.put)
+
+    def next(self, *kinds: str) -> Answer:
+        deadline = time.monotonic() + 60.0
+        while True:
+            answer = self.answers.get(timeout=deadline - time.monotonic())
+            if answer.kind in kinds:
+                return answer
+
+
+def test_the_newest_work_is_done_and_the_others_are_cancelled() -> None:
+    heard = Heard()
+    try:
+        heard.pilot.ask(Work(1, COUNT, 10_000))
+        assert heard.next("progress").number == 1
+        for number in range(2, 9):
+            heard.pilot.ask(Work(number, COUNT, 10_000))
+        heard.pilot.ask(Work(9, COUNT, 3))
+        done = heard.next("done")
+        assert (done.number, done.value) == (9, 3)
+        heard.pilot.ask(Work(10, COUNT, 10_000))
+        heard.next("progress")
+        asked = time.monotonic()
+        heard.pilot.cancel()
+        assert heard.next("cancelled").number == 10
+        assert time.monotonic() - asked < 1.0
+        heard.pilot.ask(Work(11, "planfly.studio.works.fly", None))
+        assert "fault" in heard.next("fault").value
+        pid = heard.pilot.pid
+        assert pid is not None
+        heard.pilot.ask(Work(12, COUNT, 10_000))
+        heard.next("progress")
+        os.kill(pid, signal.SIGKILL)
+        lost = heard.next("fault")
+        assert (lost.number, "has ended" in lost.value) == (12, True)
+        heard.pilot.ask(Work(13, COUNT, 2))
+        assert heard.next("done").number == 13
+    finally:
+        heard.pilot.close()

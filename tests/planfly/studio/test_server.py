@@ -1,0 +1,264 @@
+"""The server as pages meet it: who is let in, what is refused, and that two pages agree."""
+
+import base64
+import http.client
+import json
+import socket
+import string
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection
+
+from flight.mission_files.formats import mission_text
+from planfly.studio import messages
+from tests.planfly.studio.drafts import drawn_session
+from tests.planfly.studio.served import PageProgram, Served, served
+from tests.soak import note, scaled
+
+FUZZED = scaled(2000, 60)
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("studio")
+    file = folder / "m.waypoints"
+    file.write_text(mission_text(drawn_session(8, 8).mission, "waypoints"), encoding="utf-8")
+    (folder / "other.waypoints").write_text(mission_text(drawn_session(9, 8).mission, "waypoints"), encoding="utf-8")
+    (folder / "outside.waypoints").symlink_to("/etc/passwd")
+    with served(file, scenario="jacksboro", keep=folder / "kept") as running:
+        yield running
+
+
+def code_of(socket: ClientConnection, message: str | bytes) -> int:
+    """The code that a message is answered with; 0 where it is answered with anything else."""
+    try:
+        socket.send(message)
+        socket.recv(timeout=20)
+    except ConnectionClosed as closed:
+        return 0 if closed.rcvd is None else closed.rcvd.code
+    return 0
+
+
+def test_a_drag_is_judged_and_a_move_is_flown_and_seen_by_both_pages(studio: Served) -> None:
+    with studio.page() as page, studio.page() as other:
+        sheet = page.until("sheet")
+        other.until("sheet")
+        item = sheet["items"][2]
+        east, north, _ = item["at"]
+        page.send(kind="drag", rev=sheet["rev"], n=1, k=item["k"], east=east + 150.0, north=north)
+        seen = page.until("preview", n=1)
+        assert "sheet" in seen or seen["windows"]
+        page.send(kind="drag", rev=sheet["rev"], n=2, k=item["k"], east=east + 200.0, north=north, whole=True)
+        assert page.until("preview", n=2)["sheet"]["verdict"]["level"] == "geometric"
+        page.send(kind="move", rev=sheet["rev"], k=item["k"], east=east + 200.0, north=north)
+        mine, theirs = page.until("sheet", rev=sheet["rev"] + 1), other.until("sheet", rev=sheet["rev"] + 1)
+        assert mine == theirs
+        assert mine["items"][2]["at"][0] == pytest.approx(east + 200.0, abs=0.2)
+        flown = page.until("flown", rev=mine["rev"])
+        assert flown["track"]
+        assert flown["seconds"] > 60.0
+        # An edit of the sheet before is refused, and the page is shown the sheet as it is.
+        other.send(kind="delete", rev=sheet["rev"], ks=[item["k"]])
+        other.until("stale")
+        page.send(kind="undo")
+        assert page.until("sheet", rev=mine["rev"] + 1)["items"] == sheet["items"]
+
+
+def test_a_file_of_the_folder_is_opened_and_none_outside(studio: Served) -> None:
+    with studio.page() as page:
+        assert page.until("choices")["files"] == ["m.waypoints", "other.waypoints"]
+        before = page.until("sheet")
+        for name in (
+            "outside.waypoints",
+            "/etc/passwd",
+            "../m.waypoints",
+            "..",
+            "kept",
+            "m.waypoints/../other.waypoints",
+        ):
+            page.send(kind="open", name=name)
+            assert "file of the list" in page.until("fault")["text"]
+        page.send(kind="open", name="other.waypoints")
+        opened = page.until("sheet", name="other.waypoints")
+        assert opened["rev"] > before["rev"]
+        data = base64.b64encode(mission_text(drawn_session(8, 8).mission, "waypoints").encode()).decode()
+        page.send(kind="open", name="dropped.waypoints", data=data)
+        assert page.until("sheet", name="dropped.waypoints")["over"] == ""
+        page.send(kind="save", form="waypoints")
+        assert base64.b64decode(page.until("saved")["data"]) == base64.b64decode(data)
+        page.send(kind="open", name="m.waypoints")
+        page.until("sheet", name="m.waypoints")
+
+
+def test_without_the_token_nothing_is_shown(studio: Served) -> None:
+    for first in ('{"kind": "hello", "token": "wrong"}', '{"kind": "undo"}', "", "{", f'{{"token": "{studio.token}"}}'):
+        with studio.socket() as one:
+            assert code_of(one, first) == 4403
+
+
+@pytest.mark.parametrize("origin", [None, "http://evil.test", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
+def test_another_page_reaches_no_websocket(studio: Served, origin: str | None) -> None:
+    with pytest.raises(InvalidStatus) as refused, studio.socket(origin=origin):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+def asked(studio: Served, method: str, path: str, **headers: str) -> tuple[int, bytes]:
+    link = http.client.HTTPConnection("127.0.0.1", studio.port, timeout=20)
+    link.putrequest(method, path, skip_host="Host" in headers)
+    for name, value in headers.items():
+        link.putheader(name.replace("_", "-"), value)
+    link.endheaders()
+    answer = link.getresponse()
+    data = answer.read()
+    assert answer.getheader("Content-Security-Policy") or answer.status == 400
+    link.close()
+    return answer.status, data
+
+
+def test_only_the_pages_own_files_are_there(studio: Served) -> None:
+    assert asked(studio, "GET", "/")[0] == 200
+    for path in (
+        "/../pyproject.toml",
+        "/..%2f..%2fetc/passwd",
+        "//etc/passwd",
+        "/studio.html",
+        "/m.waypoints",
+        "/session",
+    ):
+        assert asked(studio, "GET", path)[0] in (403, 404), path
+    assert asked(studio, "POST", "/")[0] == 405
+    assert asked(studio, "GET", "/", Host="evil.test")[0] == 421
+
+
+def test_a_page_holds_no_secret_and_loads_nothing_from_elsewhere(studio: Served) -> None:
+    for path in ("/", "/studio.js", "/link.js", "/panel.js", "/studio.css", "/theme.css"):
+        _, data = asked(studio, "GET", path)
+        assert studio.token.encode() not in data
+        assert b"https://" not in data
+        assert b"eval(" not in data
+
+
+def test_a_body_of_a_gigabyte_is_not_read(studio: Served) -> None:
+    with socket.create_connection(("127.0.0.1", studio.port), timeout=20) as link:
+        head = f"POST / HTTP/1.1\r\nHost: 127.0.0.1:{studio.port}\r\nContent-Length: {2**30}\r\n\r\n"
+        link.sendall(head.encode())
+        sent = 0
+        try:
+            while sent < 2**30:
+                sent += link.send(b"x" * 2**16)
+        except OSError:
+            pass
+        assert sent < 64 * 2**20
+    with studio.socket() as one:
+        assert code_of(one, "x" * (messages.MAX_DROPPED_MESSAGE + messages.MAX_MESSAGE + 1)) == 1009
+
+
+def test_four_pages_are_enough(studio: Served) -> None:
+    with studio.page() as a, studio.page() as b, studio.page() as c, studio.page() as d:
+        for page in (a, b, c, d):
+            page.until("sheet")
+        with studio.page() as fifth, pytest.raises(ConnectionClosed) as closed:
+            fifth.until("sheet")
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 4429
+
+
+def code_after(page: PageProgram, message: str | bytes) -> int:
+    """The code with which a page is closed for a message; 0 for one that it may say, which others follow."""
+    try:
+        page.socket.send(message)
+        page.send(kind="save", form="kml")
+        page.until("saved")
+    except ConnectionClosed as closed:
+        return 0 if closed.rcvd is None else closed.rcvd.code
+    return 0
+
+
+def fuzzed(rng: np.random.Generator) -> str | bytes:
+    """A message that is none, or one with something wrong in it."""
+    kinds = [
+        "hello",
+        "drag",
+        "move",
+        "insert",
+        "delete",
+        "raise",
+        "apply",
+        "settings",
+        "plan",
+        "save",
+        "open",
+        "fly",
+        "x",
+    ]
+    values = [
+        None,
+        True,
+        -1,
+        1e308,
+        2**70,
+        "x" * 300,
+        [],
+        {},
+        [[[[]]]],
+        "../../etc/passwd",
+        "NaN",
+        0.5,
+        "\x00",
+        "\ud800",
+    ]
+    match int(rng.integers(6)):
+        case 0:
+            return bytes(rng.integers(0, 256, 40, dtype=np.uint8))
+        case 1:
+            return "[" * int(rng.integers(1, 60_000))
+        case 2:
+            return "".join(rng.choice(list(string.printable), 60))
+        case 3:
+            return '{"kind": "move", "rev": 1, "k": 0, "east": NaN, "north": Infinity}'
+        case 4:
+            return "x" * (messages.MAX_MESSAGE + 10)
+    data: dict[str, object] = {"kind": str(rng.choice(kinds))}
+    for name in rng.choice(
+        ["rev", "k", "east", "north", "up", "ks", "by", "form", "name", "data", "token", "which"], 4
+    ):
+        data[str(name)] = values[int(rng.integers(len(values)))]
+    return json.dumps(data)
+
+
+def test_no_message_ends_the_server(studio: Served) -> None:
+    rng = np.random.default_rng(7)
+    closed = 0
+    for _ in range(FUZZED):
+        with studio.page() as page:
+            page.until("sheet")
+            code = code_after(page, fuzzed(rng))
+            assert code in (0, 1007, 1009)
+            closed += code > 0
+    assert closed > FUZZED // 2
+    with studio.page() as page:
+        assert page.until("sheet")["name"] == "m.waypoints"
+    note("studio: fuzzed messages", messages=FUZZED, closed=closed, servers_ended=0)
+
+
+def test_a_long_work_is_stopped(studio: Served) -> None:
+    with studio.page() as page:
+        page.until("sheet")
+        page.send(kind="campaign")
+        page.until("working", job="campaign")
+        page.send(kind="stop")
+        page.until("stopped", job="campaign")
+
+
+def test_what_is_kept_is_private(studio: Served, tmp_path: Path) -> None:
+    from planfly.studio.server import listed_files
+
+    (tmp_path / "a.waypoints").write_text("x", encoding="utf-8")
+    (tmp_path / "b.waypoints").symlink_to("/etc/hostname")
+    (tmp_path / "c.txt").write_text("x", encoding="utf-8")
+    assert list(listed_files(tmp_path)) == ["a.waypoints"]

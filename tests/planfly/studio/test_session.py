@@ -1,0 +1,243 @@
+"""A session: what is done to a mission and undone, judged as the API judges it, saved without loss, and kept."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import planfly
+from flight.mission_files.formats import mission_text, parse_mission
+from logs.verdict.findings import verdict_json
+from planfly.studio import edits, messages
+from planfly.studio.documents import World, open_document, open_dropped
+from planfly.studio.session import Session, StaleEdit, mission_data, mission_from, open_session
+from tests.planfly.studio.drafts import drawn_session, session_of
+from tests.soak import note, scaled
+from world.errors import MissionError, PlanflyError
+
+EDITS = scaled(1000, 24)
+
+
+def draw_edit(session: Session, rng: np.random.Generator) -> None:
+    """One edit at random, or an undo or a redo; one that no mission may have is refused and changes nothing."""
+    kind = rng.choice(["move", "up", "insert", "delete", "raise", "undo", "redo", "apply"])
+    k = int(rng.choice(edits.places(session.mission)))
+    east, north, up = session.place_of(k)
+    east, north = (float(np.clip(v + rng.normal(0.0, 200.0), -9000.0, 9000.0)) for v in (east, north))
+    rev = session.rev
+    match kind:
+        case "move":
+            session.edit(messages.Move(kind="move", rev=rev, k=k, east=east, north=north))
+        case "up":
+            session.edit(messages.Move(kind="move", rev=rev, k=k, up=up + float(rng.normal(0.0, 40.0))))
+        case "insert":
+            session.edit(messages.Insert(kind="insert", rev=rev, after=k, east=east, north=north))
+        case "delete":
+            session.edit(messages.Delete(kind="delete", rev=rev, ks=[k]))
+        case "raise":
+            session.edit(messages.Raise(kind="raise", rev=rev, by=float(rng.integers(-20, 30))))
+        case "apply":
+            ready = [(n, i) for n, i in enumerate(session.judged.verdict.findings) if i.suggestions]
+            if ready:
+                finding = ready[int(rng.integers(len(ready)))][0]
+                session.edit(messages.Apply(kind="apply", rev=rev, finding=finding, which=0))
+        case _:
+            session.step(str(kind))
+
+
+def test_edits_and_undos_come_to_the_verdict_of_the_api(tmp_path: Path) -> None:
+    session = drawn_session(5, 12)
+    rng = np.random.default_rng(38)
+    refused = compared = 0
+    for number in range(EDITS):
+        before, rev = session.mission, session.rev
+        try:
+            draw_edit(session, rng)
+        except MissionError:
+            refused += 1
+            assert session.mission is before
+            assert session.rev == rev
+            continue
+        if EDITS < 100 and number % 4:
+            continue
+        file = tmp_path / "edited.waypoints"
+        file.write_text(mission_text(session.mission, "waypoints"), encoding="utf-8")
+        asked = planfly.judge(file, scenario="jacksboro").verdict
+        assert verdict_json(session.judged.verdict) == verdict_json(asked), f"after edit {number}"
+        compared += 1
+    assert refused < EDITS // 2
+    note("studio: edits against the API", edits=EDITS, compared=compared, refused=refused, differing=0)
+
+
+def test_undo_goes_back_to_the_first_mission_itself() -> None:
+    session = drawn_session(5, 12)
+    first, verdict = session.mission, session.judged.verdict
+    k = edits.places(first)[2]
+    for step in range(3):
+        session.edit(messages.Move(kind="move", rev=session.rev, k=k, up=900.0 + step))
+    for _ in range(4):
+        session.step("undo")
+    assert session.mission is first
+    assert session.judged.verdict == verdict
+    assert session.sheet()["redo"]
+    session.step("redo")
+    assert session.is_changed
+
+
+def test_an_edit_of_an_older_sheet_is_refused() -> None:
+    session = drawn_session(5, 12)
+    k, rev = edits.places(session.mission)[2], session.rev
+    session.edit(messages.Move(kind="move", rev=rev, k=k, up=900.0))
+    with pytest.raises(StaleEdit):
+        session.edit(messages.Delete(kind="delete", rev=rev, ks=[k]))
+    with pytest.raises(StaleEdit):
+        session.preview(messages.Drag(kind="drag", rev=rev, n=1, k=k, east=0.0, north=0.0))
+
+
+def test_a_preview_changes_nothing_and_is_what_the_move_comes_to() -> None:
+    session = drawn_session(6, 14)
+    k, before = edits.places(session.mission)[5], session.mission
+    east, north, _ = session.place_of(k)
+    asked = messages.Drag(kind="drag", rev=session.rev, n=1, k=k, east=east + 300.0, north=north, whole=True)
+    shown = session.preview(asked)["sheet"]
+    assert session.mission is before
+    session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=east + 300.0, north=north))
+    assert {name: session.sheet()[name] for name in shown} == shown
+
+
+# ----------------------------------------------------------------------
+# Files.
+
+
+@pytest.mark.parametrize("name", ["by_hand.waypoints", "mission_planner.waypoints", "qgc_amsl.plan", "mavproxy.txt"])
+def test_an_unmoved_mission_saved_is_the_file(name: str) -> None:
+    file = Path(__file__).parents[2] / "flight" / "missions" / name
+    session, _ = open_session(str(file), World(terrain=None))
+    assert session.save(session.document.kind).data == file.read_bytes()
+
+
+def test_a_moved_mission_saved_is_read_as_it_is() -> None:
+    session = drawn_session(7, 14)
+    k = edits.places(session.mission)[3]
+    session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=100.0, north=200.0))
+    for form in ("waypoints", "plan"):
+        saved = session.save(form)
+        assert parse_mission(saved.data.decode(), saved.name).items == session.mission.items
+
+
+def test_what_a_form_does_not_hold_is_said() -> None:
+    session = drawn_session(7, 14)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    assert any("threats" in line for line in session.save("waypoints").losses)
+    assert "a map only" in session.save("kml").losses[0]
+    with pytest.raises(MissionError, match="plain waypoints"):
+        session.save("plan.json")
+
+
+def test_only_the_named_file_is_written_over(tmp_path: Path) -> None:
+    file = tmp_path / "m.waypoints"
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), World(scenario="jacksboro"))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    session.save_over()
+    assert parse_mission(file.read_text(encoding="utf-8"), "m").items == session.mission.items
+    session.open(open_dropped("other.waypoints", file.read_bytes(), session.world))
+    with pytest.raises(PlanflyError, match="no mission file was named"):
+        session.save_over()
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "words"),
+    [
+        ("x.exe", b"", "suffix"),
+        ("../../etc/passwd", b"", "suffix"),
+        ("m.waypoints", b"not a mission", "m.waypoints"),
+        ("p.json", b'{"scenario": {"terrain": {"path": "/etc/passwd"}}}', "names other files"),
+        ("p.json", b'{"scenario": {"flight": {"params": "/etc/passwd"}}}', "names other files"),
+        ("p.json", b'{"scenario": {"flight": {"aircraft": "../x"}}}', "names other files"),
+        ("p.json", b'{"scenario": {"zones_file": ["/etc/passwd"]}}', "names other files"),
+        ("p.json", b"[" * 100_000, "p.json"),
+    ],
+)
+def test_a_dropped_file_is_refused_in_a_line(name: str, data: bytes, words: str) -> None:
+    with pytest.raises(PlanflyError, match=words) as refused:
+        open_dropped(name, data, World())
+    assert "planfly-studio-" not in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+# ----------------------------------------------------------------------
+# Kept, and settings.
+
+
+def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
+    file, kept = tmp_path / "m.waypoints", tmp_path / "kept.json"
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    session, restored = open_session(str(file), World(scenario="jacksboro"), kept)
+    assert not restored
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    session.keep(kept)
+    again, restored = open_session(str(file), World(scenario="jacksboro"), kept)
+    assert restored
+    assert again.mission.items == session.mission.items
+    again.step("undo")
+    assert again.mission is again.history.first
+    file.write_text(mission_text(drawn_session(9, 10).mission, "waypoints"), encoding="utf-8")
+    other, restored = open_session(str(file), World(scenario="jacksboro"), kept)
+    assert not restored
+    kept.write_text("{", encoding="utf-8")
+    assert not open_session(str(file), World(scenario="jacksboro"), kept)[1]
+    assert not other.is_changed
+
+
+def test_a_mission_comes_back_from_its_data() -> None:
+    mission = drawn_session(9, 20).mission
+    assert mission_from(mission_data(mission), mission) == mission
+
+
+def test_settings_are_judged_at_once() -> None:
+    session = drawn_session(6, 14)
+    session.change_settings(messages.Settings(kind="settings", wind_speed=9.0, wind_from=270.0, clearance=10.0))
+    shown = session.settings_json()
+    assert (shown["wind_speed"], shown["wind_from"], shown["clearance"]) == (9.0, 270.0, 10.0)
+    assert session.judged.setup.scenario.wind.speed == 9.0
+    session.change_settings(messages.Settings(kind="settings", autopilot="px4", aircraft="aerosonde"))
+    assert session.settings_json()["autopilot"] == "px4"
+    with pytest.raises(PlanflyError, match="aircraft"):
+        session.change_settings(messages.Settings(kind="settings", aircraft="../x8"))
+
+
+def test_a_suggestion_applied_mends_its_finding() -> None:
+    session = drawn_session(5, 12)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=-90.0))
+    findings = session.judged.verdict.findings
+    number, item = next((n, i) for n, i in enumerate(findings) if i.rule == "clearance" and i.suggestions)
+    session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
+    after = [one for one in session.judged.verdict.findings if (one.rule, one.place) == (item.rule, item.place)]
+    assert [one.ok for one in after] == [True]
+
+
+def test_a_scenario_opens_with_its_straight_line() -> None:
+    document = open_document("jacksboro", World())
+    assert document.to_plan
+    session = Session.of(document, World())
+    assert len(edits.places(session.mission)) == 2
+    assert session.sheet()["verdict"]["state"] == "fail"
+
+
+def test_a_mission_without_a_scenario_takes_its_world_along() -> None:
+    mission = drawn_session(8, 6).mission
+    document = open_dropped("m.waypoints", mission_text(mission, "waypoints").encode(), World(terrain="jacksboro"))
+    session = Session.of(document, World(terrain="jacksboro"))
+    k = edits.places(session.mission)[-1]
+    east, north, _ = session.place_of(k)
+    world = session.world_rev
+    session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=east + 2500.0, north=north))
+    assert session.world_rev == world + 1
+    assert session.desk.scenario.bounds[0, 1] >= session.place_of(k)[0]
+
+
+def test_the_world_names_what_findings_number() -> None:
+    session = session_of(drawn_session(6, 14).mission)
+    world = session.world_shown()
+    assert [one["name"] for one in world["threats"]] == list(session.desk.scenario.threats.names)
