@@ -5,7 +5,7 @@ limits for a planner's candidates, for certificates and for missions.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +79,8 @@ class Limits:
     max_bank: float
     wind: Wind
     tracking: TrackingError | None = None
+    # Each is made once: a route asks for the same few speeds again and again.
+    _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
         """Steepest climb and dive over the ground on a course (rad) at an altitude (m), rad, both positive.
@@ -103,6 +105,11 @@ class Limits:
         with height it flies faster, where the aircraft climbs less.
         Climb and descent are NaN where `Envelope.air_angles` is.
         """
+        if airspeed not in self._tables:
+            self._tables[airspeed] = self._table(airspeed)
+        return self._tables[airspeed]
+
+    def _table(self, airspeed: float | None) -> PerformanceTable:
         speed, heights, wind = self.airspeed if airspeed is None else airspeed, self.envelope.amsl, self.wind
         equivalent = airspeed is None and self.tracking is not None
         faster = [air_density_factor(float(amsl)) if equivalent else 1.0 for amsl in heights]

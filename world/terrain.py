@@ -256,4 +256,5 @@ def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terra
             np.exp(-((north - peak.north) ** 2) / (2 * peak.sigma**2)),
             np.exp(-((east - peak.east) ** 2) / (2 * peak.sigma**2)),
         )
-    return gridded(heights, east, north, source=f"{len(peaks)} Gaussian peaks", sha256="", datum="mean sea level")
+    source = f"{len(peaks)} Gaussian peak{'s' * (len(peaks) != 1)}"
+    return gridded(heights, east, north, source=source, sha256="", datum="mean sea level")

@@ -326,10 +326,16 @@ def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
     return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
 
 
-def _point_at(path: FlyByPath, s: float) -> tuple[float, float, float]:
-    piece: Record = path.pieces[_piece_index(path, np.asarray(s))]
-    east, north = arc_point(piece, s - piece.start)
-    return east, north, float(profile(path.nodes, s)[0])
+def _points_at(path: FlyByPath, distances: Floats) -> Floats:
+    """Points (n, 3) of the path at distances (n,) along it, m."""
+    pieces = path.pieces[_piece_index(path, distances)]
+    course, curvature, along = pieces["course"], pieces["curvature"], distances - pieces["start"]
+    straight = curvature == 0.0
+    bent, turned = np.where(straight, 1.0, curvature), course + curvature * along
+    east = np.where(straight, along * np.sin(course), (np.cos(course) - np.cos(turned)) / bent)
+    north = np.where(straight, along * np.cos(course), (np.sin(turned) - np.sin(course)) / bent)
+    up = [profile(path.nodes, float(s))[0] for s in distances]
+    return np.column_stack([pieces["east"] + east, pieces["north"] + north, up])
 
 
 def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
@@ -344,16 +350,17 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     ([[0.0, 0.0, 500.0], [0.0, 900.0, 500.0]], [0])
     """
     stops = [0.0, path.length]
-    for piece in path.pieces:
-        parts = max(1, math.ceil(abs(piece.curvature) * piece.length / CHORD))
-        stops += [piece.start + piece.length * k / parts for k in range(parts + 1)]
-        if math.isfinite(piece.leg_change):
-            stops.append(piece.leg_change)
+    columns = (path.pieces[name].tolist() for name in ("start", "length", "curvature", "leg_change"))
+    for start, length, curvature, leg_change in zip(*columns, strict=True):
+        parts = max(1, math.ceil(abs(curvature) * length / CHORD))
+        stops += [start + length * k / parts for k in range(parts + 1)]
+        if math.isfinite(leg_change):
+            stops.append(leg_change)
     for node in path.nodes:
         stops += [node.distance + node.half_length * share for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
     inside = np.clip(np.array(stops), 0.0, path.length)
     distances = np.unique(np.round(inside, 6))
-    points = np.array([_point_at(path, float(s)) for s in distances])
+    points = _points_at(path, distances)
     middles = 0.5 * (distances[1:] + distances[:-1])
     pieces = path.pieces[_piece_index(path, middles)]
     return points, (pieces["leg"] + (middles > pieces["leg_change"])).astype(np.int64)
