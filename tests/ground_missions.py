@@ -23,8 +23,11 @@ LEVEL = 0.05
 _HALF = 6500.0
 
 
-def draw_field(number: int) -> Scenario:
-    """The scenario of a number: every other one over the tile that planfly ships."""
+def draw_field(number: int, launch: str = "catapult", flight: dict[str, str] | None = None) -> Scenario:
+    """The scenario of a number: every other one over the tile that planfly ships.
+
+    launch: its method.  flight: what its `[flight]` states.
+    """
     rng = np.random.default_rng([SEED, number])
     measured = number % 2 == 0
     terrain: dict[str, Any] = {"kind": "dem", "path": "jacksboro"}
@@ -46,6 +49,7 @@ def draw_field(number: int) -> Scenario:
         "planner": {"waypoints": 8},
         "wind": {"speed_mps": float(rng.uniform(0.0, 8.0)), "from_deg": from_deg, "turbulence": "light"},
     }
+    spec |= {"flight": flight} if flight else {}
     ends = {
         "start": {"east_m": 0, "north_m": 0, "amsl_m": 3000},
         "destination": {"east_m": 50, "north_m": 0, "amsl_m": 3000},
@@ -54,7 +58,8 @@ def draw_field(number: int) -> Scenario:
         spec | {"area": spec["area"] | {"ceiling_amsl_m": 9000.0}} | _around(ends, middle), "ground"
     ).terrain
     assert ground is not None
-    return from_spec(spec | _places(rng, ground, middle, math.radians(from_deg)), f"field-{number}")
+    places = _places(rng, ground, middle, math.radians(from_deg))
+    return from_spec(spec | places | {"launch": {"method": launch}}, f"field-{number}")
 
 
 def _hill(rng: np.random.Generator) -> dict[str, float]:
@@ -96,7 +101,6 @@ def _places(rng: np.random.Generator, ground: Terrain, middle: Floats, upwind: f
         "start": _at(start) | {"height_m": float(rng.uniform(90.0, 250.0))},
         "destination": _at(destination) | {"height_m": float(rng.uniform(90.0, 250.0))},
         "home": _at(home),
-        "launch": {"method": "catapult"},
         "landing": _at(field),
         "threats": threats,
     }

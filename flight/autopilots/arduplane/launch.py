@@ -67,3 +67,15 @@ def takeoff_slew(parameters: ArduPilotParameters) -> float:
     if parameters.takeoff_slew < 0.0:
         return math.inf
     return parameters.takeoff_slew or parameters.throttle_slew or math.inf
+
+
+def run_up(starts: float, parameters: ArduPilotParameters) -> float:
+    """How long whoever launches waits for all of the motor, s; 0 where it starts on the rail, in the hand or later.
+
+    starts: what `motor_start` says.
+
+    >>> from flight.autopilots.arduplane.parameters import default_parameters
+    >>> round(run_up(-math.inf, default_parameters()), 2), run_up(-0.4, default_parameters())
+    (1.2, 0.0)
+    """
+    return parameters.takeoff_delay + 1.0 / takeoff_slew(parameters) if math.isinf(starts) and starts < 0.0 else 0.0

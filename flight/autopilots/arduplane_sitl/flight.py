@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlaneFromGround
+from flight.autopilots.arduplane.launch import run_up
 from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.arduplane_sitl.ground_tick import program_ground_tick
@@ -19,12 +21,16 @@ from flight.autopilots.arduplane_sitl.process import (
     person_parameters,
 )
 from flight.autopilots.autopilot import AutopilotProgram, Tick
+from flight.autopilots.sitl.conversation import Talk
 from flight.autopilots.sitl.flight import SitlFlight
 from flight.autopilots.sitl.link import AutopilotLink, TcpLink
 from flight.autopilots.sitl.process import AutopilotProcess, check_binary
 from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Progress, SimulatedFlight, Sink, fly_to_end
+
+# After its throttle a motor is given so much longer, s.
+_SPOOL = 0.5
 
 
 class AutopilotFlight(SitlFlight):
@@ -69,7 +75,19 @@ class AutopilotFlight(SitlFlight):
 
     def _get_ready(self) -> None:
         self._converse(self._preflight.prepare(self._mission))
+        self._converse(self._run_up())
         self._push()
+
+    def _run_up(self) -> Talk:
+        """Wait until the motor has all that it will have, where it runs before the launch: nobody throws before."""
+        take_off = self._ways.take_off
+        law = None if take_off is None else self._from_ground
+        if take_off is None or take_off.launch.method == "runway" or not isinstance(law, ArduPlaneFromGround):
+            return
+        seconds = run_up(law.motor_start, law.parameters)
+        until = self._lockstep.time + (seconds + _SPOOL if seconds else 0.0)
+        while self._lockstep.time < until:
+            yield
 
 
 def _parameters(setup: FlightSetup, aircraft: Aircraft) -> ArduPilotParameters:

@@ -11,8 +11,9 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.ground_law import APPROACHING, FLARING, GROUND_STATE, IN_AIR, TAKING_OFF
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
-from flight.autopilots.arduplane_sitl.flight import fly_autopilot
+from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.autopilots.arduplane_sitl.ground_tick import find_phase
 from flight.autopilots.arduplane_sitl.process import person_parameters
 from flight.autopilots.sitl.exchange import motion_on_rail
@@ -136,3 +137,19 @@ def test_a_stand_in_flies_from_the_catapult_to_rest_on_the_strip(fake_autopilot:
     rules = {item.rule: item.ok for item in verdict.findings}
     assert rules["launch"] is True
     assert "touchdown" in rules
+
+
+@pytest.mark.parametrize(("least", "seconds"), [(0.0, 1.7), (15.0, 0.0)])
+def test_whoever_launches_waits_for_all_of_the_motor_where_it_runs_before(
+    fake_autopilot: MakeFake, least: float, seconds: float
+) -> None:
+    """TKOFF_THR_DELAY 0.2 s, the throttle's whole range at THR_SLEWRATE 100 %/s, and half a second."""
+    setup = by_program(circuit(RAIL, STRIP))
+    parameters = setup.autopilot.parameters
+    assert isinstance(parameters, ArduPilotParameters)
+    setup = replace(setup, autopilot=ArduPlaneSitl(parameters.changed(TKOFF_THR_MINACC=least)))
+    with AutopilotFlight(setup, AEROSONDE, fake_autopilot("none"), {}) as flight:
+        began = flight.exchanged
+        for _ in flight._run_up():
+            flight._lockstep.hold(flight._rail)
+        assert flight.exchanged - began == pytest.approx(seconds, abs=0.01)
