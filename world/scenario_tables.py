@@ -351,9 +351,11 @@ class PlannerTable(ScenarioTable):
     """[planner].
 
     zone_margin_m: what a plan keeps from zones, beside how far its autopilot strays; the planner's own where not given.
+    objective: what a plan makes small; its length where not given.
     """
 
     algorithm: Name | None = None
+    objective: Literal["length", "time", "energy"] | None = None
     waypoints: Annotated[int, within(3, 500)] = 12
     population: Annotated[int, within(4, 100_000)] = 200
     generations: Annotated[int, within(0, 100_000)] = 100

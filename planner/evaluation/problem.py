@@ -17,6 +17,7 @@ from aircraft.tracking import no_tracking
 from planner.airspace.zone_limits import PlannerAirspace, ZoneMargins, make_airspace
 from planner.evaluation.encoding import Space
 from planner.evaluation.threat_index import MissileIndex, ThreatCells, make_missile_index, make_threat_cells
+from planner.evaluation.travel_cost import LENGTH, TravelCost
 from planner.plan import Objective, Violation
 from world.by_reference import by_reference
 from world.errors import ScenarioError
@@ -92,6 +93,7 @@ class ProblemArrays(NamedTuple):
     slope_bounds: of the ground.
     tracking: a record of `aircraft.tracking.TRACKING`, the autopilot's tracking error.
     airspace: zones and the maximum height above ground.
+    travel: what shortening makes small: the length of a path, its time or its energy.
     """
 
     heights: Heights
@@ -126,6 +128,7 @@ class ProblemArrays(NamedTuple):
     slope_bounds: SlopeBounds
     tracking: Record
     airspace: PlannerAirspace
+    travel: TravelCost
 
 
 def threat_records(threats: Threats) -> Records:
@@ -357,6 +360,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         slope_bounds=_slope_bounds(terrain),
         tracking=tracking,
         airspace=make_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
+        travel=LENGTH,
     )
     return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
 

@@ -17,6 +17,7 @@ from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import path_generations, waypoint_generations
+from planner.search.search_cheapest import search_cheapest, wanted_cost
 from planner.search.search_state import Archive, Improved, Search, SearchEnded, SearchProgress, StopCondition, no_scores
 from planner.search.seeds import (
     may_turn_back,
@@ -82,12 +83,13 @@ def plan_path(
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits_for(chosen, limits))
+    cost = wanted_cost(scenario, limits, problem)
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
     # No path is further from missile spheres than its own ends.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
     wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
     search = Search(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
-    waypoints, certificate = _attempts(search, previous)
+    waypoints, certificate = search_cheapest(search, _attempts(search, previous), cost)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
         scenario=scenario,

@@ -29,6 +29,7 @@ from planner.evaluation.corners import (
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, measure_lags
+from planner.evaluation.travel_cost import LegModel, model_leg
 from world.frames import polymap
 from world.kernels import Records, copy_into, inner
 from world.terrain import pixel_height
@@ -258,6 +259,23 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no co
 
 
 @inner
+def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) -> float:  # pragma: no cover - compiled
+    """Add what the path costs to the model where that is not its length alone; returns the cost, m."""
+    total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros(6), np.zeros((6, 6)))
+    for i in range(path.shape[0] - 1):
+        total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
+        begin = 3 * (i - 1)
+        for a in range(6):
+            row = begin + a
+            if 0 <= row < size:
+                model.gradient[row] += leg.slopes[a]
+                for b in range(a + 1):
+                    if begin + b >= 0:
+                        model.band[row, a - b] += leg.bends[a, b]
+    return total
+
+
+@inner
 def _add_missiles(
     data: ProblemArrays,
     active: ActiveConstraints,
@@ -431,10 +449,11 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:  # pragma: no cover - compiled
-    """Augmented length of a path (w, 3), m; fills the constraints' values and the model."""
+    """Augmented length or cost of a path (w, 3), m; fills the constraints' values and the model."""
     model.gradient[:], model.band[:] = 0.0, 0.0
     at = active.pairs.shape[0]
-    merit = _add_length(path, model)
+    by_length = data.travel.time == 0.0 and data.travel.energy == 0.0
+    merit = _add_length(path, model) if by_length else _add_travel_cost(data, path, model)
     merit += _add_missiles(data, active, path, multipliers, values, penalty, model)
     merit += _add_ground(data, limits, active, path, multipliers, values, penalty, model, at)
     at += active.samples * (path.shape[0] - 1)

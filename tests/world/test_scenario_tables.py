@@ -117,6 +117,7 @@ def test_every_default() -> None:
         },
         "planner": {
             "algorithm": None,
+            "objective": None,
             "waypoints": 12,
             "population": 200,
             "generations": 100,

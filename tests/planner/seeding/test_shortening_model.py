@@ -1,11 +1,14 @@
 """What binds a path: the missiles near it by NumPy, and what is carry_multipliers from one round to the next."""
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
 from benchmarks.task import make_task
 from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import ProblemArrays, make_problem
+from planner.evaluation.travel_cost import make_travel_cost, path_cost
 from planner.seeding.shortening import resample
 from planner.seeding.shortening_model import (
     BAND,
@@ -147,3 +150,36 @@ def test_the_hessian_of_the_length_is_that_of_its_gradient() -> None:
         [[model.band[max(i, j), abs(i - j)] if abs(i - j) < BAND else 0.0 for j in range(size)] for i in range(size)]
     )
     np.testing.assert_allclose(whole, np.array(columns).T, atol=1e-6)
+
+
+@pytest.mark.parametrize("objective", ["time", "energy"])
+def test_the_gradient_of_time_and_energy_is_that_of_their_values(objective: Literal["time", "energy"]) -> None:
+    task = make_task("jacksboro-air")
+    problem = make_problem(task.scenario, task.airframe.limits)
+    shear = problem.search.aircraft._replace(wind_speed=9.0, wind_gradient=0.005)
+    travel = make_travel_cost(objective, task.airframe.limits.envelope, shear)
+    assert travel is not None
+    data = problem.search._replace(travel=travel, aircraft=shear, max_turn=9.0, legs_hold_turns=False)
+    path, limits = zigzag(data, 0.1, 6), precompute_limits(data)
+    # Far above all of it nothing but the cost is left.
+    path[:, 2] += 1000.0
+    active = active_constraints(data, path, 4, 0.5)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
+    active = active._replace(distances=np.zeros_like(active.distances))
+    count, size = constraint_count(active), 3 * (len(path) - 2)
+    values, model = np.zeros(count), LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3)))
+
+    def value(change: np.ndarray) -> float:
+        moved = path.copy()
+        moved[1:-1] += change.reshape(-1, 3)
+        return float(lagrangian(data, limits, active, moved, np.zeros(count), values, 0.3, model))
+
+    differences = np.array([(value(0.05 * step) - value(-0.05 * step)) / 0.1 for step in np.eye(size)])
+    legs = path_cost(travel, shear, path)
+    assert value(np.zeros(size)) == pytest.approx(legs, rel=1e-9)
+    np.testing.assert_allclose(model.gradient, differences, rtol=1e-3, atol=1e-4)
+    # No direction that the curvature takes for a way down without end.
+    whole = np.zeros((size, size))
+    for row in range(size):
+        for back in range(min(BAND, row + 1)):
+            whole[row, row - back] = whole[row - back, row] = model.band[row, back]
+    assert np.linalg.eigvalsh(whole).min() > -1e-9

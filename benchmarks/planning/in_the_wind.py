@@ -1,0 +1,143 @@
+"""Plans for the least time and the least energy in a wind of 10 m/s, flown beside plans for the shortest path.
+
+``python -m benchmarks.planning.in_the_wind [--missions N] [--from NUMBER] [--planned] [--json FILE]`` plans missions
+(`tests.autopilot_plans`: measured and made terrain, ten missiles each) three times, in a wind of 10 m/s at the height
+of the start from a random direction: for length, for time and for energy. Each plan is flown by the law in JSBSim, and
+the flown times and the energy used are compared with those of the shortest path. Settings are the wind's increase with
+height (none; 1 m/s every 100 m, about that of a power law with exponent 1/4 between 100 m and 500 m) and the aircraft
+(the Aerosonde at 25 m/s, the X8 at 18 m/s).
+"""
+
+import argparse
+import json
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits, PerformanceTable
+from flight.mission.from_plan import plan_mission
+from planfly.airframe import load_airframe
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from planner.evaluation.travel_cost import energy_cost, path_cost, time_cost
+from tests.autopilot_plans import plan_scenario
+from world.scenario import Scenario, from_spec
+
+Floats = NDArray[np.float64]
+
+# Of the missions: no other benchmark or test takes numbers so high.
+FIRST, SEED = 3900, 3904
+WIND = 10.0
+SETTINGS: dict[str, dict[str, Any]] = {
+    "aerosonde, 1 m/s more every 100 m": {"aircraft": "aerosonde", "gradient": 0.01},
+    "aerosonde, same wind at every height": {"aircraft": "aerosonde", "gradient": 0.0},
+    "x8, 1 m/s more every 100 m": {"aircraft": "x8", "gradient": 0.01},
+    "x8, same wind at every height": {"aircraft": "x8", "gradient": 0.0},
+}
+OBJECTIVES = ("length", "time", "energy")
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """A plan and its flight: flown time (s), energy (Wh), length ratio, CPU of the plan (s); why not, "" if flown."""
+
+    seconds: float
+    energy: float
+    length_ratio: float
+    cpu: float
+    wrong: str
+
+
+def mission(number: int, aircraft: str, gradient: float, objective: str) -> Scenario:
+    """The mission of this number in 10 m/s of wind from a direction of its own."""
+    spec = plan_scenario(number).to_json()
+    spec["wind"] = {
+        "speed_mps": WIND,
+        "from_deg": float(np.random.default_rng([SEED, number]).uniform(0.0, 360.0)),
+        "gradient": gradient,
+    }
+    spec["flight"]["aircraft"] = aircraft
+    spec["planner"]["objective"] = objective
+    return from_spec(spec, spec["name"])
+
+
+def fly(scenario: Scenario, seed: int, *, planned: bool) -> Flown:
+    """Plan a scenario and fly the plan by the law; where `planned`, work out time and energy by the legs alone."""
+    airframe = load_airframe(scenario)
+    began = time.process_time()
+    plan = make_plan(scenario, airframe, seed)
+    cpu = time.process_time() - began
+    if not plan.safe:
+        return Flown(np.nan, np.nan, np.nan, cpu, f"no plan: {'; '.join(plan.certificate.problems[:2])}")
+    if planned:
+        table = airframe.limits.performance()
+        values = _by_legs(airframe.limits, table, np.array(plan.waypoints))
+        return Flown(*values, float(plan.objectives[0]), cpu, "")
+    items = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+    judged = fly_and_judge(make_setup(scenario, airframe, items, seed, plan=plan), airframe, None)
+    wrong = [] if judged.ended == "completed" else [judged.ended]
+    wrong += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]
+    seconds, energy = float(judged.track.time[-1]), float(judged.track.energy.max())
+    return Flown(seconds, energy, float(plan.objectives[0]), cpu, "; ".join(wrong))
+
+
+def _by_legs(limits: Limits, table: PerformanceTable, path: Floats) -> tuple[float, float]:
+    """Time (s) and energy (Wh) of a path (w, 3) by its legs."""
+    energy = energy_cost(limits.envelope, table)
+    joules = np.nan if energy is None else path_cost(energy, table, path) / energy.energy
+    return path_cost(time_cost(table), table, path) / float(table.airspeed), joules / 3600.0
+
+
+def measure(name: str, first: int, count: int, *, planned: bool) -> list[dict[str, Any]]:
+    """Fly every mission in one setting, and print a line for each."""
+    rows = []
+    print(f"\n{name}: ratios to the shortest path")
+    for number in range(first, first + count):
+        worlds = {goal: mission(number, objective=goal, **SETTINGS[name]) for goal in OBJECTIVES}
+        flown = {goal: fly(world, number, planned=planned) for goal, world in worlds.items()}
+        rows.append({"mission": number} | {goal: asdict(one) for goal, one in flown.items()})
+        short, fast, thrifty = (flown[goal] for goal in OBJECTIVES)
+        print(
+            f"  {number}  {short.seconds:6.1f} s {short.energy:6.2f} Wh"
+            f"   for time: time x {fast.seconds / short.seconds:.4f}"
+            f" length x {fast.length_ratio / short.length_ratio:.4f}"
+            f"   for energy: energy x {thrifty.energy / short.energy:.4f}"
+            f"   {'; '.join(f'{goal}: {one.wrong[:70]}' for goal, one in flown.items() if one.wrong)}",
+            flush=True,
+        )
+    _sum_up(rows)
+    return rows
+
+
+def _sum_up(rows: list[dict[str, Any]]) -> None:
+    """Print medians and extremes of the ratios, and how many flights were not flyable."""
+    for goal, column in (("time", "seconds"), ("energy", "energy")):
+        ratios = np.array([row[goal][column] / row["length"][column] for row in rows])
+        ratios = ratios[np.isfinite(ratios)]
+        low, middle, high = np.min(ratios), np.median(ratios), np.max(ratios)
+        print(f"  {goal} / that of the shortest: median {middle:.4f}, least {low:.4f}, most {high:.4f}", end="")
+        print(f", of {len(ratios)}; {int((ratios > 1.002).sum())} are more than 1.002")
+    for goal in OBJECTIVES:
+        wrong = sum(row[goal]["wrong"] != "" for row in rows)
+        cpu = float(np.median([row[goal]["cpu"] for row in rows]))
+        print(f"  for {goal}: {wrong} of {len(rows)} not planned or not flyable; plan {cpu:.2f} s of CPU, median")
+
+
+def main() -> None:
+    """Measure every setting."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.planning.in_the_wind")
+    parser.add_argument("--missions", type=int, default=20)
+    parser.add_argument("--from", dest="first", type=int, default=FIRST, help="number of the first mission")
+    parser.add_argument("--json", type=Path, help="file for the rows")
+    parser.add_argument("--planned", action="store_true", help="by the legs of the plans alone, without flights")
+    args = parser.parse_args()
+    record = {name: measure(name, args.first, args.missions, planned=args.planned) for name in SETTINGS}
+    if args.json:
+        args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,337 @@
+"""What a leg costs: its length, its time in the mean wind, or the energy that its flight takes.
+
+The air carries the aircraft along. A leg d that is held at true airspeed V in the wind w takes the time T for which
+|d - w T| = V T: the wind triangle, in three dimensions, whose larger part is horizontal (Zermelo's problem in a steady
+wind, "Über das Navigationsproblem bei ruhender oder veränderlicher Windverteilung", Zeitschrift für Angewandte
+Mathematik und Mechanik 11, 1931). There is no such time where the wind is faster than the aircraft and leads elsewhere.
+Wind and airspeed change with height, so a leg is the sum of Simpson's rule over its two ends and its middle.
+
+In a wind that is the same everywhere a straight line takes the least time, and T is a norm of d plus a term that every
+path to the same destination shares. What differs then is the direction of a detour, by at most V / sqrt(V^2 - w^2).
+"""
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import Envelope
+from aircraft.path_limits import PerformanceTable, downwind, true_airspeed, wind_speed_at
+from world.by_reference import by_reference
+from world.kernels import compiled, inner
+
+Floats = NDArray[np.float64]
+
+# Half-step of the finite difference in height, m.
+HEIGHT_STEP = 2.0
+# A leg that cannot be held counts as flown over the ground at this share of the airspeed, so that a search leaves it.
+UNFLYABLE_SHARE = 0.01
+# Simpson's rule: shares of a leg and their weights.
+_SHARES, _WEIGHTS = (0.0, 0.5, 1.0), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+
+
+@by_reference
+class TravelCost(NamedTuple):
+    """Weights of what a path costs, and the power of steady flight by height, for compiled functions.
+
+    length: cost per metre of path. time: per second. energy: per joule.
+    level, linear, square: (h,) power (W) at the heights of the performance table and at its airspeed, as level +
+    linear x + square x^2, where x is the sine of the climb angle to the air.
+    lowest, highest: (h,) bounds of x, beyond which power is constant: idle and full throttle.
+    """
+
+    length: float
+    time: float
+    energy: float
+    level: Floats
+    linear: Floats
+    square: Floats
+    lowest: Floats
+    highest: Floats
+
+
+Objective = Literal["length", "time", "energy"]
+_NONE = np.zeros(0)
+_NONE.setflags(write=False)
+# Of a search that asks for length alone.
+LENGTH = TravelCost(1.0, 0.0, 0.0, _NONE, _NONE, _NONE, _NONE, _NONE)
+
+
+def make_travel_cost(objective: Objective, envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
+    """The cost of a path by an objective, in m: its length, or time or energy over those of a metre in level flight.
+
+    None where energy is asked for and the aircraft's power is unknown.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> limits = load_airframe(load_scenario("tight")).limits
+    >>> make_travel_cost("time", limits.envelope, limits.performance()).time
+    25.0
+    """
+    if objective == "length":
+        return LENGTH
+    return time_cost(table) if objective == "time" else energy_cost(envelope, table)
+
+
+def time_cost(table: PerformanceTable) -> TravelCost:
+    """The cost of a path's time, in m of level flight in still air."""
+    return LENGTH._replace(length=0.0, time=float(table.airspeed))
+
+
+def energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
+    """The cost of a path's energy, in m of level flight in still air; None where the aircraft's power is unknown.
+
+    Power is that of `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
+    throttle. At heights where there is no level flight it is that of the nearest with one.
+    """
+    rows = np.array([_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
+    known = np.isfinite(rows).all(axis=1)
+    if not known.any():
+        return None
+    columns = [np.interp(table.amsl, table.amsl[known], rows[known, k]) for k in range(5)]
+    for column in columns:
+        column.setflags(write=False)
+    return TravelCost(0.0, 0.0, float(table.airspeed / columns[0][0]), *columns)
+
+
+def _parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
+    """Coefficients of power by the sine of the climb angle, and the bounds of this sine; NaN where power is unknown."""
+    climb, descent = envelope.air_angles(airspeed, amsl)
+    low, high = -math.sin(descent), math.sin(climb)
+    level = envelope.power(airspeed, amsl, 0.0)
+    if not (low < 0.0 < high and math.isfinite(level)):
+        return (math.nan,) * 5
+    idle, full = envelope.power(airspeed, amsl, -0.5 * math.pi), envelope.power(airspeed, amsl, 0.5 * math.pi)
+    by_idle, by_full = (idle - level) / low, (full - level) / high
+    square = (by_full - by_idle) / (high - low)
+    return level, by_full - square * high, square, low, high
+
+
+class LegTime(NamedTuple):
+    """Time of a leg (s) and its derivatives by the leg (s/m); D of `leg_time`; and whether the leg can be held."""
+
+    seconds: float
+    by_east: float
+    by_north: float
+    by_up: float
+    root: float
+    held: bool
+
+
+@inner
+def leg_time(
+    dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float
+) -> LegTime:  # pragma: no cover - compiled
+    """Time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
+
+    From |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2, and its
+    derivative by d is (d - w T) / D.
+    """
+    length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
+    along = wind_east * dx + wind_north * dy
+    square = along * along + (airspeed * airspeed - wind_east * wind_east - wind_north * wind_north) * length2
+    root = math.sqrt(max(0.0, square))
+    if square <= 0.0 or along + root <= 1e-9 * length2:
+        length, speed = math.sqrt(length2), UNFLYABLE_SHARE * airspeed
+        scale = 1.0 / (length * speed)
+        return LegTime(length / speed, scale * dx, scale * dy, scale * dz, speed * length, False)
+    seconds = length2 / (along + root)
+    return LegTime(
+        seconds, (dx - wind_east * seconds) / root, (dy - wind_north * seconds) / root, dz / root, root, True
+    )
+
+
+class _At(NamedTuple):
+    """Airspeed (m/s) and power coefficients at a height; see `TravelCost`."""
+
+    airspeed: float
+    wind: float
+    level: float
+    linear: float
+    square: float
+    lowest: float
+    highest: float
+
+
+@inner
+def _at_height(travel: TravelCost, table: PerformanceTable, amsl: float) -> _At:  # pragma: no cover - compiled
+    """Airspeed, wind and power at a height, m."""
+    airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
+    if travel.energy == 0.0:
+        return _At(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
+    count, k = table.amsl.size, 0
+    while k + 2 < count and table.amsl[k + 1] <= amsl:
+        k += 1
+    share = 0.0
+    if count > 1:
+        share = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
+    j = min(k + 1, count - 1)
+    return _At(
+        airspeed,
+        wind,
+        travel.level[k] + share * (travel.level[j] - travel.level[k]),
+        travel.linear[k] + share * (travel.linear[j] - travel.linear[k]),
+        travel.square[k] + share * (travel.square[j] - travel.square[k]),
+        travel.lowest[k] + share * (travel.lowest[j] - travel.lowest[k]),
+        travel.highest[k] + share * (travel.highest[j] - travel.highest[k]),
+    )
+
+
+@inner
+def _timed_cost(
+    travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
+) -> tuple[float, bool]:  # pragma: no cover - compiled
+    """Cost of the time and the energy of a leg flown at one height, and whether the leg can be held."""
+    here, (wx, wy) = _at_height(travel, table, amsl), downwind(table)
+    time = leg_time(dx, dy, dz, here.wind * wx, here.wind * wy, here.airspeed)
+    cost = travel.time * time.seconds
+    if travel.energy != 0.0:
+        sine = min(here.highest, max(here.lowest, dz / (here.airspeed * time.seconds)))
+        cost += travel.energy * time.seconds * (here.level + sine * (here.linear + here.square * sine))
+    return cost, time.held
+
+
+@inner
+def leg_cost(
+    travel: TravelCost, table: PerformanceTable, a: NDArray[np.float64], b: NDArray[np.float64]
+) -> float:  # pragma: no cover - compiled
+    """Cost of the leg a-b; inf where it cannot be held."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    total = travel.length * math.sqrt(dx * dx + dy * dy + dz * dz)
+    if travel.time == 0.0 and travel.energy == 0.0:
+        return total
+    for k in range(3):
+        cost, held = _timed_cost(travel, table, dx, dy, dz, a[2] + _SHARES[k] * dz)
+        if not held:
+            return math.inf
+        total += _WEIGHTS[k] * cost
+    return total
+
+
+@compiled
+def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> float:  # pragma: no cover - compiled
+    """Cost of a path (w, 3) world m: that of its legs; inf where one cannot be held.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> table = load_airframe(load_scenario("tight")).limits.performance()
+    >>> path_cost(LENGTH, table, np.array([[0.0, 0.0, 9.0], [30.0, 0.0, 9.0], [30.0, 40.0, 9.0]]))
+    70.0
+    """
+    total = 0.0
+    for i in range(path.shape[0] - 1):
+        total += leg_cost(travel, table, path[i], path[i + 1])
+    return total
+
+
+class LegModel(NamedTuple):
+    """Scratch of `model_leg`: derivatives of a leg's cost by its ends (6,), and a matrix (6, 6) of its curvature."""
+
+    slopes: Floats
+    bends: Floats
+
+
+@inner
+def model_leg(
+    travel: TravelCost, table: PerformanceTable, a: Floats, b: Floats, model: LegModel
+) -> float:  # pragma: no cover - compiled
+    """Cost of the leg a-b, finite for any leg; fills its derivatives by a and b and its curvature.
+
+    The curvature is that of the length, of the time at each height, and of the power, all convex; what couples height
+    and course is left out, so that the matrix has no negative eigenvalue.
+    """
+    slopes, bends = model.slopes, model.bends
+    slopes[:], bends[:] = 0.0, 0.0
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    length = max(1e-3, math.sqrt(dx * dx + dy * dy + dz * dz))
+    (wx, wy), step = downwind(table), (dx, dy, dz)
+    bend = np.empty((3, 3))
+    _add_bends(bends, slopes, _length_bends(bend, step, length), travel.length, step, travel.length / length)
+    total = travel.length * length
+    if travel.time == 0.0 and travel.energy == 0.0:
+        return total
+    for k in range(3):
+        share, weight = _SHARES[k], _WEIGHTS[k]
+        amsl = a[2] + share * dz
+        here = _at_height(travel, table, amsl)
+        time = leg_time(dx, dy, dz, here.wind * wx, here.wind * wy, here.airspeed)
+        # Cost as time x rate, plus what rises with the climb.
+        rate, rise, curve, cost = travel.time, 0.0, 0.0, travel.time * time.seconds
+        if travel.energy != 0.0:
+            sine = dz / (here.airspeed * time.seconds)
+            inside = here.lowest < sine < here.highest
+            sine = min(here.highest, max(here.lowest, sine))
+            power = here.level + sine * (here.linear + here.square * sine)
+            cost += travel.energy * power * time.seconds
+            slope = here.linear + 2.0 * here.square * sine if inside else 0.0
+            rate += travel.energy * (power - slope * sine)
+            rise = travel.energy * slope / here.airspeed
+            if inside:
+                curve = max(0.0, travel.energy * 2.0 * here.square / (here.airspeed**2 * time.seconds))
+        total += weight * cost
+        gradient = (time.by_east, time.by_north, time.by_up)
+        _time_bends(bend, time, here, wx, wy)
+        bend[2, 2] += curve / max(1e-9, rate)
+        _add_bends(bends, slopes, bend, weight * rate, gradient, weight * rate)
+        slopes[2] -= weight * rise
+        slopes[5] += weight * rise
+        above, _ = _timed_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP)
+        below, _ = _timed_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP)
+        by_height = weight * (above - below) / (2.0 * HEIGHT_STEP)
+        slopes[2] += (1.0 - share) * by_height
+        slopes[5] += share * by_height
+        convex = weight * max(0.0, above - 2.0 * cost + below) / HEIGHT_STEP**2
+        bends[2, 2] += convex * (1.0 - share) ** 2
+        bends[5, 5] += convex * share**2
+        bends[2, 5] += convex * share * (1.0 - share)
+        bends[5, 2] += convex * share * (1.0 - share)
+    return total
+
+
+@inner
+def _length_bends(
+    bend: Floats, step: tuple[float, float, float], length: float
+) -> Floats:  # pragma: no cover - compiled
+    """Fill the curvature (3, 3) of a leg's length by its step."""
+    for axis in range(3):
+        for other in range(3):
+            same = 1.0 if axis == other else 0.0
+            bend[axis, other] = (same - step[axis] * step[other] / (length * length)) / length
+    return bend
+
+
+@inner
+def _time_bends(bend: Floats, time: LegTime, here: _At, wx: float, wy: float) -> None:  # pragma: no cover - compiled
+    """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D, g its gradient."""
+    wind = (here.wind * wx, here.wind * wy, 0.0)
+    gradient = (time.by_east, time.by_north, time.by_up)
+    rest = here.airspeed**2 - here.wind**2
+    for axis in range(3):
+        for other in range(3):
+            value = 1.0 if axis == other else 0.0
+            if time.held:
+                value -= wind[axis] * gradient[other] + gradient[axis] * wind[other]
+                value -= rest * gradient[axis] * gradient[other]
+            bend[axis, other] = value / time.root
+
+
+@inner
+def _add_bends(
+    bends: Floats,
+    slopes: Floats,
+    bend: Floats,
+    factor: float,
+    gradient: tuple[float, float, float],
+    slope_factor: float,
+) -> None:  # pragma: no cover - compiled
+    """Add curvature and gradient by a leg's step to those by its ends: minus at a, plus at b."""
+    for axis in range(3):
+        slopes[axis] -= slope_factor * gradient[axis]
+        slopes[3 + axis] += slope_factor * gradient[axis]
+        for other in range(3):
+            value = factor * bend[axis, other]
+            bends[axis, other] += value
+            bends[3 + axis, 3 + other] += value
+            bends[axis, 3 + other] -= value
+            bends[3 + axis, other] -= value

@@ -1,0 +1,120 @@
+"""The path that takes least time or energy, where a scenario asks for that instead of the shortest.
+
+The search for the shortest path comes first, with its certificate. From that path, from the straight line and from
+routes on other sides of the obstacles, all waypoints then move at once so that the path costs less under the same
+constraints (`planner.seeding.shortening` with `planner.evaluation.travel_cost`): to heights where the wind helps or
+hinders less, and to courses on which it does. A result replaces the shortest path if its certificate is as good and it
+costs less, so that a plan never costs more than the shortest path does.
+"""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from planner.airspace.zone_limits import is_limited
+from planner.evaluation.certify import certify
+from planner.evaluation.encoding import rotated_frame
+from planner.evaluation.problem import Problem, ProblemArrays
+from planner.evaluation.travel_cost import TravelCost, make_travel_cost, path_cost
+from planner.plan import Certificate
+from planner.search.search_state import Search, SearchEnded
+from planner.seeding.shortening import resample, shorten_path
+from planner.seeding.side_routes import optimistic_grid, side_routes
+from world.errors import ScenarioError
+from world.geometry import path_length
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+# Grids for routes on other sides: stages, shares of a step for the area of highest ground, the spacing across, and the
+# reductions of spheres; routes of each; and maximum length of a route relative to the shortest path.
+STAGES, SPREAD, RATIO, SHRINKS, MAX_ROUTES, SLACK = 50, 0.2, 1.0 / 3.0, (0.2, 0.5), 8, 1.2
+# Maximum repetitions from equidistant waypoints, and the minimum gain for another, as a share.
+MAX_REPEATS, MIN_GAIN = 4, 2e-5
+# Additional margins with which a path is tried until it is certified: to spheres and ground, m, and of slopes, rad. A
+# leg's steepest climb is that of its strongest wind, which its steps of height change.
+EXTRA_MARGINS = ((0.1, 0.0), (2.0, math.radians(0.2)), (2.0, math.radians(0.6)))
+# Shares of the way from the shortest path to a cheaper one that leaves the airspace, which shortening does not know.
+SHARES = (1.0, 0.75, 0.5, 0.25, 0.1)
+
+_Found = tuple[Floats, Certificate]
+
+
+def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
+    """What a scenario's plan makes small. Raises ScenarioError for energy where the aircraft's power is unknown."""
+    objective = scenario.planner.objective or "length"
+    cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
+    if cost is None:
+        allowed = 'the power of this aircraft is not known; "length" and "time" can be planned for'
+        raise ScenarioError.at(scenario.name, "planner.objective", objective, allowed)
+    return cost
+
+
+def search_cheapest(search: Search, found: _Found, cost: TravelCost) -> _Found:
+    """The path that costs least and its certificate; the shortest path where no other that is as safe costs less."""
+    by_length = cost.time == 0.0 and cost.energy == 0.0
+    if by_length or not search.finished(found[1]):
+        return found
+    data = search.problem.search._replace(travel=cost)
+    cheapest = found
+    for start in _starts(search, found[0]):
+        if search.must_end():
+            return cheapest
+        cheapest = _cheaper(search, data, start, cheapest)
+    for _ in range(MAX_REPEATS):
+        before = _cost(data, cheapest[0])
+        for start in (resample(cheapest[0], len(cheapest[0])), cheapest[0]):
+            if search.must_end():
+                return cheapest
+            cheapest = _cheaper(search, data, start, cheapest)
+        if _cost(data, cheapest[0]) > (1.0 - MIN_GAIN) * before:
+            break
+    return cheapest
+
+
+def _cost(data: ProblemArrays, path: Floats) -> float:
+    """Cost of a path (w, 3), m; inf where a leg cannot be held against the wind."""
+    return float(path_cost(data.travel, data.aircraft, np.array(path, dtype=np.float64)))
+
+
+def _starts(search: Search, shortest: Floats) -> Iterator[Floats]:
+    """Paths (w, 3) to begin from: the shortest, with equal legs too, the straight line, and routes on other sides."""
+    count, space, data = len(shortest), search.problem.space, search.problem.search
+    yield shortest
+    yield resample(shortest, count)
+    yield resample(np.stack([space.start, space.destination]), count)
+    if is_limited(data.airspace) or search.encoding.name != "rotated":
+        return
+    frame = rotated_frame(space.start, space.destination)
+    span = (float(search.encoding.lower[1::3].min()), float(search.encoding.upper[1::3].max()))
+    bound = SLACK * float(path_length(shortest))
+    for shrink in SHRINKS:
+        grid = optimistic_grid(data, frame, span, STAGES, shrink=shrink, spread=SPREAD, ratio=RATIO)
+        for route in side_routes(data, frame, grid, bound, MAX_ROUTES):
+            yield resample(frame.restore(route.points), count)
+
+
+def _cheaper(search: Search, data: ProblemArrays, start: Floats, best: _Found) -> _Found:
+    """The cheaper of the best path so far and of what shortening makes of a start (w, 3)."""
+    path = start
+    for extra_margin, angle in EXTRA_MARGINS:
+        stricter = data._replace(angle_margin=data.angle_margin + angle)
+        try:
+            path, made = shorten_path(stricter, path, extra_margin=extra_margin, pause=search.pause)
+        except SearchEnded:
+            return best
+        search.evaluations += made
+        limit = _cost(data, best[0])
+        if not _cost(data, path) < limit:
+            return best
+        for share in SHARES if is_limited(data.airspace) else SHARES[:1]:
+            part = np.ascontiguousarray(best[0] + share * (path - best[0]))
+            certificate = certify(search.problem, part)
+            if search.finished(certificate) and _cost(data, part) < limit:
+                if search.improved is not None:
+                    search.improved(part)
+                return part, certificate
+    return best
