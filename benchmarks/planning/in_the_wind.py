@@ -1,9 +1,9 @@
 """Plans for the least time and the least energy in a wind of 10 m/s, flown beside plans for the shortest path.
 
-``python -m benchmarks.planning.in_the_wind [--missions N] [--from NUMBER] [--planned] [--json FILE]`` plans missions
-(`tests.autopilot_plans`: measured and made terrain, ten missiles each) three times, in a wind of 10 m/s at the height
-of the start from a random direction: for length, for time and for energy. Each plan is flown by the law in JSBSim, and
-the flown times and the energy used are compared with those of the shortest path. Settings are the wind's increase with
+``python -m benchmarks.planning.in_the_wind [--missions N] [--from NUMBER] [--setting TEXT] [--planned] [--json FILE]``
+plans missions (`tests.autopilot_plans`: measured and made terrain, ten missiles each) three times, in a wind of 10 m/s
+at the height of the start from a random direction: for length, for time and for energy. Each plan is flown by the law
+in JSBSim, and the flown times and the energy used are compared with those of the shortest path. Settings are the wind's increase with
 height (none; 1 m/s every 100 m, about that of a power law with exponent 1/4 between 100 m and 500 m) and the aircraft
 (the Aerosonde at 25 m/s, the X8 at 18 m/s).
 """
@@ -132,9 +132,14 @@ def main() -> None:
     parser.add_argument("--missions", type=int, default=20)
     parser.add_argument("--from", dest="first", type=int, default=FIRST, help="number of the first mission")
     parser.add_argument("--json", type=Path, help="file for the rows")
+    parser.add_argument("--setting", default="", help="only settings whose name contains this")
     parser.add_argument("--planned", action="store_true", help="by the legs of the plans alone, without flights")
     args = parser.parse_args()
-    record = {name: measure(name, args.first, args.missions, planned=args.planned) for name in SETTINGS}
+    record = {
+        name: measure(name, args.first, args.missions, planned=args.planned)
+        for name in SETTINGS
+        if args.setting in name
+    }
     if args.json:
         args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 

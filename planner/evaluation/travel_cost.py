@@ -23,6 +23,8 @@ from world.kernels import compiled, inner
 
 Floats = NDArray[np.float64]
 
+# The third coordinate.
+UP = 2
 # Half-step of the finite difference in height, m.
 HEIGHT_STEP = 2.0
 # A leg that cannot be held counts as flown over the ground at this share of the airspeed, so that a search leaves it.
@@ -226,7 +228,7 @@ def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> floa
 
 
 class LegModel(NamedTuple):
-    """Scratch of `model_leg`: derivatives of a leg's cost by its ends (6,), and a matrix (6, 6) of its curvature."""
+    """Scratch of `model_leg`: derivatives (2, 3) of a leg's cost by its ends, and its curvature (2, 3, 2, 3)."""
 
     slopes: Floats
     bends: Floats
@@ -272,20 +274,19 @@ def model_leg(
         total += weight * cost
         gradient = (time.by_east, time.by_north, time.by_up)
         _time_bends(bend, time, here, wx, wy)
-        bend[2, 2] += curve / max(1e-9, rate)
+        bend[UP, UP] += curve / max(1e-9, rate)
         _add_bends(bends, slopes, bend, weight * rate, gradient, weight * rate)
-        slopes[2] -= weight * rise
-        slopes[5] += weight * rise
+        slopes[0, UP] -= weight * rise
+        slopes[1, UP] += weight * rise
         above, _ = _timed_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP)
         below, _ = _timed_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP)
         by_height = weight * (above - below) / (2.0 * HEIGHT_STEP)
-        slopes[2] += (1.0 - share) * by_height
-        slopes[5] += share * by_height
         convex = weight * max(0.0, above - 2.0 * cost + below) / HEIGHT_STEP**2
-        bends[2, 2] += convex * (1.0 - share) ** 2
-        bends[5, 5] += convex * share**2
-        bends[2, 5] += convex * share * (1.0 - share)
-        bends[5, 2] += convex * share * (1.0 - share)
+        parts = (1.0 - share, share)
+        for end in range(2):
+            slopes[end, UP] += parts[end] * by_height
+            for other in range(2):
+                bends[end, UP, other, UP] += convex * parts[end] * parts[other]
     return total
 
 
@@ -327,11 +328,10 @@ def _add_bends(
 ) -> None:  # pragma: no cover - compiled
     """Add curvature and gradient by a leg's step to those by its ends: minus at a, plus at b."""
     for axis in range(3):
-        slopes[axis] -= slope_factor * gradient[axis]
-        slopes[3 + axis] += slope_factor * gradient[axis]
+        slopes[0, axis] -= slope_factor * gradient[axis]
+        slopes[1, axis] += slope_factor * gradient[axis]
         for other in range(3):
             value = factor * bend[axis, other]
-            bends[axis, other] += value
-            bends[3 + axis, 3 + other] += value
-            bends[axis, 3 + other] -= value
-            bends[3 + axis, other] -= value
+            for end in range(2):
+                bends[end, axis, end, other] += value
+                bends[end, axis, 1 - end, other] -= value

@@ -261,17 +261,17 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no co
 @inner
 def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) -> float:  # pragma: no cover - compiled
     """Add what the path costs to the model where that is not its length alone; returns the cost, m."""
-    total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros(6), np.zeros((6, 6)))
+    total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros((2, 3)), np.zeros((2, 3, 2, 3)))
     for i in range(path.shape[0] - 1):
         total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
         begin = 3 * (i - 1)
         for a in range(6):
             row = begin + a
             if 0 <= row < size:
-                model.gradient[row] += leg.slopes[a]
+                model.gradient[row] += leg.slopes[a // 3, a % 3]
                 for b in range(a + 1):
                     if begin + b >= 0:
-                        model.band[row, a - b] += leg.bends[a, b]
+                        model.band[row, a - b] += leg.bends[a // 3, a % 3, b // 3, b % 3]
     return total
 
 
