@@ -3,9 +3,9 @@
 ``python -m benchmarks.planning.in_the_wind [--missions N] [--from NUMBER] [--setting TEXT] [--planned] [--json FILE]``
 plans missions (`tests.autopilot_plans`: measured and made terrain, ten missiles each) three times, in a wind of 10 m/s
 at the height of the start from a random direction: for length, for time and for energy. Each plan is flown by the law
-in JSBSim, and the flown times and the energy used are compared with those of the shortest path. Settings are the wind's increase with
-height (none; 1 m/s every 100 m, about that of a power law with exponent 1/4 between 100 m and 500 m) and the aircraft
-(the Aerosonde at 25 m/s, the X8 at 18 m/s).
+in JSBSim, and the flown times and the energy used are compared with those of the shortest path. Settings are the
+wind's increase with height (none; 1 m/s every 100 m, about that of a power law with exponent 1/4 between 100 m and
+500 m) and the aircraft (the Aerosonde at 25 m/s, the X8 at 18 m/s).
 """
 
 import argparse
