@@ -26,6 +26,7 @@ from logs.verdict.tolerances import (
     ABOVE_FLARE,
     EARLY_TOUCH,
     FINAL_ROOM,
+    GUST_TOUCH_ERROR,
     POINT_ERROR,
     TOUCH_ERROR,
     TOUCH_SINK,
@@ -88,7 +89,8 @@ def touchdown_findings(
     faults = _amiss(approach, landing)
     if entered := entered_by_way(requirements, track_way(track)):
         faults.append(message(f"the final enters {entered}"))
-    return [_finding(place, approach, landing, faults)]
+    gusts = requirements.setup.scenario.wind.turbulence != "none"
+    return [_finding(place, approach, landing, faults, gusts=gusts)]
 
 
 def _foreseen(place: Place, approach: Approach) -> list[Finding]:
@@ -116,9 +118,12 @@ def _measured(requirements: RouteRequirements, track: Track, terrain: Terrain, a
     )
 
 
-def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[Message]) -> Finding:
-    """The finding: what fails, or else what is open, or else what is not known."""
-    open_ = [] if faults else _left_open(approach, landing)
+def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, gusts: bool) -> Finding:
+    """The finding: what fails, or else what is open, or else what is not known.
+
+    gusts: whether the air is turbulent.
+    """
+    open_ = [] if faults else _left_open(approach, landing, gusts=gusts)
     said = faults or open_
     inside = 0.5 * approach.strip.length - TOUCH_ERROR
     farthest = max(landing.stop[0], abs(landing.touch[0]))
@@ -227,9 +232,13 @@ def _too_short(approach: Approach) -> list[Message]:
     return [message(brief, f"; a touch-down is known within {TOUCH_ERROR:.0f} m either way, which takes more")]
 
 
-def _left_open(approach: Approach, landing: _Landing) -> list[Message]:
+def _left_open(approach: Approach, landing: _Landing, *, gusts: bool) -> list[Message]:
     """What may be amiss with the landing, by what the law does not know so well."""
     found = _too_short(approach)
+    left = 0.5 * approach.strip.length - max(landing.touch[0], landing.stop[0])
+    if gusts and left < GUST_TOUCH_ERROR and not found:
+        brief = f"comes down or to rest {left:.0f} m before the strip's end"
+        found.append(message(brief, f"; in turbulence that is known within {GUST_TOUCH_ERROR:.0f} m"))
     if landing.over > POINT_ERROR:
         brief = f"the landing point of {_place_of(approach)} is {landing.over:.0f} m above the ground"
         found.append(message(brief, ": it flares too early, and falls"))
@@ -264,6 +273,7 @@ RULE = Rule(
     asks="Does the aircraft touch down and come to rest on the strip, on a final free of ground, missiles and zones?",
     margin=Margin("strip", "m", 20.0),
     tolerances=(
+        "GUST_TOUCH_ERROR",
         "TOUCH_ERROR",
         "TOUCHED",
         "TOUCH_SINK",

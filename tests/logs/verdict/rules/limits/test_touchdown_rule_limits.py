@@ -7,9 +7,11 @@ import pytest
 
 from logs.verdict.findings import GROUND_WAY, Finding
 from logs.verdict.judge_geometry import judge_geometry
-from logs.verdict.rules.touchdown_rule import _amiss, _Landing, _left_open
+from logs.verdict.rules.touchdown_rule import _amiss, _finding, _Landing, _left_open
 from tests.flight.autopilots.arduplane.flown_grounds import circuit
+from tests.logs.verdict.judging import leg
 from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, found, moved
+from world.wind import Turbulence
 
 
 def on_strip(**strip: float) -> bool | None:
@@ -41,7 +43,32 @@ def test_a_strip_that_the_error_leaves_nothing_of_is_left_open(
     assert approach is not None
     short = replace(approach, strip=replace(approach.strip, length=length))
     at = _Landing(0.0, 0.0, (0.0, 0.0), (stop, 0.0), 0.5 * length - stop, 1.0, 1.0, 10.0, 0.0)
-    assert (len(_amiss(short, at)), len(_left_open(short, at))) == (faults, open_)
+    assert (len(_amiss(short, at)), len(_left_open(short, at, gusts=False))) == (faults, open_)
+
+
+@pytest.mark.parametrize(("touch", "stop", "gusts", "ok"), [
+    (0.0, 49.9, True, True), (0.0, 50.1, True, None), (0.0, 50.1, False, True), (0.0, 70.1, True, False),
+    (49.9, 0.0, True, True), (50.1, 0.0, True, None), (-50.1, 0.0, True, True), (-70.1, 0.0, True, False),
+])  # fmt: skip
+def test_in_turbulence_fifty_metres_of_the_strip_are_left(
+    touch: float, stop: float, gusts: bool, ok: bool | None
+) -> None:
+    """On a strip of 200 m."""
+    approach = flown_circuit().setup.ground_ways.approach
+    assert approach is not None
+    strip = replace(approach, strip=replace(approach.strip, length=200.0))
+    at = _Landing(0.0, 0.0, (touch, 0.0), (stop, 0.0), 100.0 - stop, 1.0, 1.0, 10.0, 0.0)
+    assert _finding(leg(0), strip, at, _amiss(strip, at), gusts=gusts).ok is ok
+
+
+@pytest.mark.parametrize(("turbulence", "ok"), [("none", True), ("light", None)])
+def test_the_scenarios_turbulence_counts(turbulence: Turbulence, ok: bool | None) -> None:
+    """Forty metres of the strip are left."""
+    flown = flown_circuit()
+    scenario, length = flown.setup.scenario, 2.0 * (300.0 - known("strip left") + 40.0)
+    changed = replace(scenario, wind=replace(scenario.wind, turbulence=turbulence))
+    setup = flown.setup.in_scenario(replace(changed, landing=replace(STRIP, length=length)))
+    assert found(setup, flown.track, "touchdown").ok is ok
 
 
 @pytest.mark.parametrize(("length", "open_"), [(60.0, True), (60.1, False)])
