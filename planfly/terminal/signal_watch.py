@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
@@ -15,8 +16,9 @@ from world.files import remove_temporary_folders
 from world.interruption import Interrupted, interrupt, remove_unfinished
 
 ENDING = (signal.SIGINT, signal.SIGTERM)
-# Time from a signal to the end of the process where its command has not ended by itself, s.
-GRACE = 0.7
+# Time from a signal to the end of the process where its command has not ended by itself, s; time that it waited for a
+# processor does not count, up to so much in all.
+GRACE, _AT_LONGEST = 0.7, 10.0
 # For which files are tried to be removed, s.
 _REMOVING = 0.5
 # Time from a signal that could not be heard to its next, and between two tries to remove files, s.
@@ -107,10 +109,20 @@ def _watch(read: Callable[[int], bytes], heard: list[int], grace: float) -> None
         pass
     # Here too: a command may have handlers of its own.
     heard.append(number)
-    time.sleep(grace)
+    begun, waited = time.monotonic(), _waited_for_processor()
+    while (passed := time.monotonic() - begun) < _AT_LONGEST and passed - _waited_for_processor() + waited < grace:
+        time.sleep(_AGAIN)
     with contextlib.suppress(OSError):
         os.write(2, b"planfly: interrupted\n")
     _leave(128 + number)
+
+
+def _waited_for_processor() -> float:
+    """How long the main thread has waited for a processor in all, s; 0 where the system does not say (not Linux)."""
+    try:
+        return int(Path("/proc/self/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
+    except (OSError, IndexError, ValueError):
+        return 0.0
 
 
 def end_process(code: int) -> NoReturn:

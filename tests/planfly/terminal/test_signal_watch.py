@@ -99,6 +99,45 @@ def test_a_kernel_is_not_interrupted_where_numba_makes_its_results(tmp_path: Pat
     assert not mine.exists()
 
 
+TIDIES_UP = """
+import os, sys, time
+from planfly.terminal.signal_watch import ended_by_signals
+from world.interruption import Interrupted
+os.sched_setaffinity(0, {int(sys.argv[1])})
+with ended_by_signals(grace=0.5):
+    try:
+        print("begun", flush=True)
+        time.sleep(30)
+    except Interrupted:
+        end = time.thread_time() + 0.3
+        while time.thread_time() < end:
+            pass
+        print("saved", flush=True)
+"""
+BUSY = "import os, sys, time\nos.sched_setaffinity(0, {int(sys.argv[1])})\nwhile True: pass"
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not say who waits")
+def test_time_that_a_command_waits_for_a_processor_is_no_grace() -> None:
+    """Three others take its processor: it needs 1.2 s for 0.3 s of work, and has 0.5 s."""
+    where = str(min(os.sched_getaffinity(0)))
+    others = [subprocess.Popen([sys.executable, "-c", BUSY, where]) for _ in range(3)]
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-c", TIDIES_UP, where], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begun\n"
+        time.sleep(0.2)
+        process.send_signal(signal.SIGTERM)
+        out, said = process.communicate(timeout=120.0)
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+    assert (out, said) == ("saved\n", "")
+
+
 def test_it_ends_in_time_where_no_pipe_can_be_told_not_to_block(tmp_path: Path) -> None:
     """As on Windows before Python 3.12."""
     text, least = BODIES["in C"]
