@@ -150,8 +150,12 @@ class Browser:
 
     def open(self, page: Path) -> None:
         """Load a file and wait until it is there."""
+        self.go(page.resolve().as_uri())
+
+    def go(self, address: str) -> None:
+        """Load an address and wait until it is there."""
         self.seen.clear()
-        self.call("Page.navigate", url=page.resolve().as_uri())
+        self.call("Page.navigate", url=address)
         deadline = time.monotonic() + _PATIENCE
         while "Page.loadEventFired" not in self.seen:
             self._listen(deadline)
@@ -161,6 +165,15 @@ class Browser:
         answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
+
+    def wait_for(self, expression: str, patience: float = _PATIENCE) -> Any:
+        """Wait until an expression in the page is true, and give what it is."""
+        deadline = time.monotonic() + patience
+        while not (value := self.value(expression)):
+            if time.monotonic() > deadline:
+                raise TimeoutError(f"never true: {expression}")
+            time.sleep(0.02)
+        return value
 
     def settle(self) -> None:
         """Wait for two frames: what was asked for is then drawn."""

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Range = tuple[float, float]
 
 # Pixels of the longer side; contours at most, and every so many a bold one; strength of a line.
-_PIXELS, _CONTOURS, _BOLD, _STRENGTH = 1_400, 16, 5, 0.55
+_PIXELS, _CONTOURS, _BOLD, _STRENGTH = 1_400, 16, 5, 0.38
 # Heights of the grid that the page reads below the pointer, of the longer side.
 _GRID = 220
 _QUALITY = 82

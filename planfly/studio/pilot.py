@@ -135,7 +135,8 @@ class Pilot:
         while True:
             try:
                 answer = pipe.recv()
-            except (EOFError, OSError):
+            except (EOFError, OSError, TypeError):
+                # A pipe that is closed while it is waited on loses its handle: a TypeError.
                 break
             with self._lock:
                 if self._asked is not None and answer.number == self._asked.number and answer.kind != "progress":

@@ -110,9 +110,8 @@ class Session:
         if message.rev != self.rev:
             raise StaleEdit
         mission = self._placed(message.k, message.east, message.north, message.up)
-        found = None if message.whole else judge_windows(self.desk, mission, message.k)
-        if found is not None:
-            return window_json(mission, *found)
+        if not message.whole:
+            return window_json(mission, *judge_windows(self.desk, mission, message.k))
         judged = self.desk.judge(mission)
         return {"sheet": sheet_json(self.desk, judged, route_requirements(judged.setup))}
 
@@ -296,6 +295,7 @@ class Session:
         """Write what was done, if anything was since it was written last."""
         if self.kept_rev == self.rev:
             return
+        file.parent.mkdir(parents=True, exist_ok=True)
         data = {"schema": _KEPT, "name": self.document.name, "at": time.time(), "mission": mission_data(self.mission)}
         write_whole(file, json.dumps({**data, "first": mission_data(self.history.first)}))
         self.kept_rev = self.rev

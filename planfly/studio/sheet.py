@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.guidance.path import path_polyline
 from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
@@ -134,13 +133,13 @@ def window_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Js
 
 def _window(mission: Mission, route: Route, window: Window) -> Json:
     first, last = window.first, window.last
-    points, legs = path_polyline(window.requirements.setup.path)
+    path = window.requirements.path
     states = place_states(window.requirements, window.findings, shift=window.begin)
     return {
         "first": first,
         "last": last,
         **route_json(mission, route, first, last),
-        "path": _legs_of(points, legs + window.begin, first, last),
+        "path": _legs_of(path.points, path.legs + window.begin, first, last),
         "states": states_json(states, first, last),
     }
 

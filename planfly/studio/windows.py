@@ -20,7 +20,7 @@ from world.geometry import leg_runs
 
 # What a move can change reaches so far along the legs, m, and over so many of them; as much again is judged around it
 # and left out, because its end is not the route's.
-REACH, LEGS = 800.0, 4
+REACH, LEGS = 450.0, 4
 # A route that passes an item more often is judged as a whole.
 _MOST_PASSES = 6
 # Between the places beyond a part's end, m.
@@ -43,15 +43,15 @@ class Window:
     findings: tuple[Finding, ...]
 
 
-def judge_windows(desk: Desk, mission: Mission, index: int) -> tuple[Route, tuple[Window, ...]] | None:
-    """The windows about an item of a mission, and the route; None where the whole is as quick, or has to be judged.
+def judge_windows(desk: Desk, mission: Mission, index: int) -> tuple[Route, tuple[Window, ...]]:
+    """The windows about an item of a mission, and the route; one of all where that is as quick, or has to be judged.
 
     index: of the item in the mission's list.  Raises MissionError for a mission that cannot be laid out.
     """
     route = desk.route(mission)
     spans = _spans(route, mission.items[index].seq)
     if spans is None:
-        return None
+        return route, (_judged(desk.part(mission, route), 0, route.legs, 0),)
     windows = []
     for first, last in spans:
         begin, end = _grown(route, first, last)
@@ -81,7 +81,9 @@ def _with_fastest(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tupl
     count = len(heights)
     end, beside = (0, 1) if ahead else (-1, -2)
     way = part.waypoints[end, :2] - part.waypoints[beside, :2]
-    steps = _APART * np.arange(1.0, count + 1.0)[:, None] * way / max(float(np.hypot(*way)), 1e-6)
+    if not way.any():
+        way = np.array([0.0, 1.0])
+    steps = _APART * np.arange(1.0, count + 1.0)[:, None] * way / float(np.hypot(*way))
     points = np.column_stack([part.waypoints[end, :2] + steps, heights])
     # The first of them joins the part at the airspeed there; each pair of heights has its leg's airspeed between.
     onward = np.concatenate([part.airspeed[end : end + 1 or None], speeds])

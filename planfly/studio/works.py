@@ -3,10 +3,14 @@
 Returns and campaigns, which take longer, are in `planfly.studio.long_works`.
 """
 
-from dataclasses import dataclass
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flight.mission.items import Mission
 from flight.simulation.track import Track
@@ -23,6 +27,9 @@ from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.scenario import Scenario, from_spec
 
+Floats = NDArray[np.float64]
+# A search for one path, at most, s: a hand waits for it.
+SECONDS = 25.0
 # Rows of a flown track that the page draws.
 _DRAWN = 1_500
 
@@ -42,14 +49,19 @@ def fly(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
         "ended": flown.ended,
         "autopilot": setup.autopilot.title,
         "seconds": round(float(flown.track.time[-1]), 1) if len(flown.track) else 0.0,
-        **_track(setup.route.waypoints, flown.track),
+        **_track(setup.route.waypoints, flown.track, flown.verdict.leg_ends),
     }
 
 
-def _track(route: Any, track: Track) -> dict[str, Any]:
-    """A flown track for the map, and for the profile by its progress along the route."""
+def _track(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, Any]:
+    """A flown track for the map, and for the profile by its progress along the route.
+
+    leg_ends: when each leg but the last had ended, as the verdict found; what guidance noted is not relied on.
+    """
     if not len(track):
         return {"track": [], "along": []}
+    if len(leg_ends) == len(route) - 2:
+        track = replace(track, leg=np.searchsorted(np.array(leg_ends), track.time).astype(track.leg.dtype))
     rows = np.union1d(np.arange(0, len(track), max(1, len(track) // _DRAWN)), [len(track) - 1])
     along = np.asarray(track_distance(route, track))
     return {"track": rounded(track.position[rows]), "along": rounded(along[rows]), "time": rounded(track.time[rows])}
@@ -82,12 +94,18 @@ def plan(asked: PlanAsked, advance: Advance) -> list[Plan]:
         def on(done: int, total: int, remark: str, number: int = number) -> None:
             advance(number + done / max(1, total), len(asked.seeds), remark)
 
-        made = plan_path(scenario, limits, seed=seed, algorithm=asked.algorithm, progress=on)
+        ends = partial(_ended, time.monotonic() + SECONDS)
+        made = plan_path(scenario, limits, seed=seed, algorithm=asked.algorithm, progress=on, stop=ends)
         if asked.ends is None:
             made = laid_from_the_ground(made, asked.airframe)
         if not any(_same(made, one) for one in found):
             found.append(made)
     return found
+
+
+def _ended(deadline: float) -> str:
+    """Why a search is to end: "" to go on."""
+    return "budget" if time.monotonic() > deadline else ""
 
 
 def between(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:

@@ -76,8 +76,22 @@ def airspace_of(setup: FlightSetup) -> Airspace:
         own = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
     except MissionError as error:
         fault = str(error)
-    zones = (*setup.scenario.zones, *own)
-    return Airspace(zones, zone_records(zones), fault, len(setup.scenario.zones))
+    zones = (*setup.scenario.zones, *own) if own else setup.scenario.zones
+    return Airspace(zones, _records_of(zones), fault, len(setup.scenario.zones))
+
+
+# Of the zones that were asked for last: a thousand take longer to write down than to judge.
+_last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
+
+
+def _records_of(zones: tuple[Zone, ...]) -> ZoneRecords:
+    """Records of zones; of the same tuple as the last time, those of then, which nobody writes to."""
+    for known, records in _last_records:
+        if known is zones:
+            return records
+    records = zone_records(zones)
+    _last_records[:] = [(zones, records)]
+    return records
 
 
 def with_fence_zones(setup: FlightSetup) -> FlightSetup:

@@ -7,6 +7,8 @@ included; that the corridor about it reaches further is reported beside it.
 import math
 from collections.abc import Callable
 
+import numpy as np
+
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
@@ -57,11 +59,11 @@ def fence_findings(
     terrain = requirements.setup.scenario.terrain
     planned = path_zones(planned_moves(requirements), airspace.records, terrain)
     flown = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
-    touched = []
-    for z in range(len(airspace.zones)):
-        visits = [planned[z]] if flown is None else [planned[z], flown[z]]
-        if any(visit.depth > 0.0 or visit.unknown for visit in visits):
-            touched.append(_touched(requirements, z, planned[z], None if flown is None else flown[z]))
+    sides = [planned] if flown is None else [planned, flown]
+    met = np.any([(side["depth"] > 0.0) | side["unknown"] for side in sides], axis=0)
+    touched = [
+        _touched(requirements, z, planned[z], None if flown is None else flown[z]) for z in np.flatnonzero(met).tolist()
+    ]
     if not any(item.ok is False for item in touched):
         touched.insert(0, _kept(requirements, planned, flown))
     return out + touched

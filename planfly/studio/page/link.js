@@ -23,6 +23,8 @@ export class Link {
     this.tries = 0;
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.dark.addEventListener("change", () => this.send({ kind: "look", dark: this.dark.matches }));
+    // An address with a new key, opened where the page is already, is no new page.
+    addEventListener("hashchange", () => location.hash.startsWith("#t=") && location.reload());
     this.connect();
   }
 
@@ -80,6 +82,8 @@ export class Link {
   // verdict is asked for when the hand rests.
   drag(place) {
     this.number += 1;
+    // What was asked and what is shown stands in the page, for whoever measures it.
+    document.documentElement.dataset.asked = this.number;
     this.next = { kind: "drag", n: this.number, ...place };
     clearTimeout(this.rest);
     this.rest = setTimeout(() => this.ask({ ...this.next0, whole: true, n: ++this.number }), REST);

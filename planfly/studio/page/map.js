@@ -270,7 +270,7 @@ export class MapView {
 
   fit() {
     const shown = this.model.items.map((item) => item.at);
-    const [east, north] = this.extentOf([...shown, ...(this.about?.ends || [])]);
+    const [east, north] = this.extentOf(shown);
     const rim = 0.08 * Math.max(east[1] - east[0], north[1] - north[0], 400);
     this.view.fit([[east[0] - rim, east[1] + rim], [north[0] - rim, north[1] + rim]]);
     this.layOut();

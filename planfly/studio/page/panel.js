@@ -117,7 +117,8 @@ export class Panel {
     const suggestions = quiet ? [] : one.suggestions.map((each, which) => element("li", {},
       each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", finding: one.number, which }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
       element("span", {}, each.text)));
-    const place = one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
+    const whole = ["flight", "mission", "plan"].includes(one.kind) && !/\d/.test(one.where);
+    const place = whole ? "" : one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
     return element("li", { "data-state": one.ok === false ? "fail" : one.ok === null ? "open" : "ok" },
       element("p", {}, element("span", { class: "rule" }, one.rule), " ", place), element("p", { class: "reason" }, one.text),
       suggestions.length ? element("ul", { class: "suggestions" }, ...suggestions) : null);
@@ -199,6 +200,7 @@ export class Panel {
   }
 
   ways({ ways, at_once: atOnce }) {
+    this.stopped("plan");
     if (atOnce || !this.wayBox) return;
     const { app } = this, box = clear(this.wayBox);
     app.ways(ways, 0);

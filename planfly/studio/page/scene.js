@@ -141,9 +141,13 @@ export class Scene {
     const [x, y] = this.point(...at);
     pen.beginPath();
     pen.ellipse(x, y, kill * this.scale, kill * this.scale * Math.hypot(Math.sin(this.tilt), RISE * Math.cos(this.tilt)), 0, 0, 2 * Math.PI);
-    pen.strokeStyle = this.colour("missile");
-    pen.lineWidth = 1.2;
+    pen.strokeStyle = pen.fillStyle = this.colour("missile");
+    pen.lineWidth = 1;
+    pen.globalAlpha = 0.07;
+    pen.fill();
+    pen.globalAlpha = 0.55;
     pen.stroke();
+    pen.globalAlpha = 1;
   }
 
   line(pen, points) {

@@ -10,7 +10,7 @@ import { Scene } from "/scene.js";
 
 const $ = (id) => document.getElementById(id);
 const map = new MapView($("map")), profile = new Profile($("profile"));
-const now = { world: null, sheet: null, model: null, grid: null, flown: null, selected: null, dragging: null, fault: "", work: {} };
+const now = { world: null, sheet: null, model: null, grid: null, flown: null, selected: null, dragging: null, fault: "", work: {}, committed: false, queue: [] };
 let fitted = "", scene = null;
 
 // ---- what the server sends
@@ -50,25 +50,35 @@ function onSheet(sheet) {
     $(side).title = sheet[side] ? `${side === "undo" ? "Undo" : "Redo"}: ${sheet[side]}` : side === "undo" ? "Nothing to undo" : "Nothing to redo";
   }
   say(`Geometry: ${sheet.verdict.headline}`);
+  document.documentElement.dataset.rev = sheet.rev;
+  now.committed = false;
+  if (now.queue.length) app.commit(now.queue.shift());
 }
 
 // A verdict on a drag: of all, or of the legs about the item, which are put in their places.
 function onPreview(message) {
   if (!now.dragging || message.rev !== now.sheet.rev) return;
   now.fault = message.fault || "";
-  if (message.fault) return answers();
+  if (message.fault) {
+    document.documentElement.dataset.shown = message.n;
+    return answers();
+  }
   if (message.sheet) {
     now.model = { ...now.sheet, ...message.sheet };
     now.checking = false;
   } else {
     now.checking = true;
-    if (message.total_legs !== now.model.path.length) return answers();
+    if (message.total_legs !== now.model.path.length) {
+      document.documentElement.dataset.shown = message.n;
+      return answers();
+    }
     now.model = merged(now.model, message.windows);
   }
   hold();
   map.show(now.model);
   profile.show(now.model, now.world, now.grid, shownFlight());
   answers();
+  document.documentElement.dataset.shown = message.n;
 }
 
 function merged(model, windows) {
@@ -93,11 +103,13 @@ function hold() {
 function onFlown(flown) {
   now.flown = flown;
   now.work.fly = null;
+  progress();
   if (now.model) {
     profile.show(now.model, now.world, now.grid, shownFlight());
     map.setTrack(flown.track, isStale());
     scene?.show(now);
   }
+  document.documentElement.dataset.flown = flown.rev;
   answers();
   panel.flown(flown, isStale());
   if (!isStale()) say(`Flown: ${flown.verdict.headline}`);
@@ -235,9 +247,22 @@ const app = {
     answers();
     app.hint(null);
   },
+  // One edit at a time is on its way: the next counts from the sheet that it comes to.
   commit(message) {
     link.settle();
-    if (!link.send({ rev: now.sheet.rev, ...message })) app.cancel();
+    if (now.nudged) {
+      const nudged = now.nudged;
+      clearTimeout(now.nudgeTimer);
+      now.nudged = null;
+      app.commit({ kind: "move", ...nudged });
+    }
+    if (now.committed) now.queue.push(message);
+    else if (link.send({ rev: now.sheet.rev, ...message })) now.committed = true;
+    else app.cancel();
+  },
+  refused() {
+    now.committed = false;
+    now.queue = [];
   },
   // Keys come faster than answers: they add up, and are sent as one.
   nudge(k, to) {
@@ -247,8 +272,9 @@ const app = {
     if (to.east !== undefined) map.dragged(k, to.east, to.north);
     clearTimeout(now.nudgeTimer);
     now.nudgeTimer = setTimeout(() => {
-      app.commit({ kind: "move", ...now.nudged });
+      const nudged = now.nudged;
       now.nudged = null;
+      if (nudged) app.commit({ kind: "move", ...nudged });
     }, 60);
   },
   hint(lines, x, y, state) {
@@ -302,7 +328,7 @@ const panel = new Panel(app);
 const hands = new Hands(app);
 const link = new Link({
   open: () => complain(""),
-  lost: (text) => complain(text, true),
+  lost: (text) => { app.refused(); complain(text, true); },
   world: onWorld,
   sheet: onSheet,
   preview: onPreview,
@@ -314,8 +340,8 @@ const link = new Link({
   saved: (message) => panel.saved(message),
   returns: (message) => { now.work.returns = null; progress(); panel.returns(message); },
   campaign: (message) => { now.work.campaign = null; progress(); panel.campaign(message); },
-  fault: ({ text }) => { complain(text); if (now.dragging) app.cancel(); },
-  stale: () => complain("Another page has changed the mission: this is how it is now."),
+  fault: ({ text }) => { app.refused(); complain(text); if (now.dragging) app.cancel(); },
+  stale: () => { app.refused(); complain("Another page has changed the mission: this is how it is now."); },
   picture: (picture) => map.setPicture(picture),
   heights: (grid) => { now.grid = grid; scene?.show(now); },
 });

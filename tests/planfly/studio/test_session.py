@@ -171,7 +171,7 @@ def test_a_dropped_file_is_refused_in_a_line(name: str, data: bytes, words: str)
 
 
 def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
-    file, kept = tmp_path / "m.waypoints", tmp_path / "kept.json"
+    file, kept = tmp_path / "m.waypoints", tmp_path / "kept" / "m.json"
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
     session, restored = open_session(str(file), World(scenario="jacksboro"), kept)
     assert not restored

@@ -50,10 +50,8 @@ def test_windows_say_what_the_whole_says() -> None:
             whole = by_place(geometric_findings(route_requirements(session.desk.setup(mission))))
         except MissionError:
             continue
-        if found is None:
-            continue
-        windowed += 1
         route, windows = found
+        windowed += windows[0].last - windows[0].first < route.legs
         inside: Judged = {}
         for window in windows:
             inside |= by_place(window.findings, window.begin)
@@ -70,7 +68,7 @@ def test_windows_say_what_the_whole_says() -> None:
             beyond = {key: rows for key, rows in whole.items() if key not in covered}
             assert all(same(before.get(key, []), rows) for key, rows in beyond.items()), f"seed {seed}"
     assert windowed >= MISSIONS // 2
-    assert compared > 40 * windowed
+    assert compared > 20 * MISSIONS
     note("studio: windows against the whole", missions=MISSIONS, windowed=windowed, compared=compared, differing=0)
 
 
@@ -80,7 +78,7 @@ def test_a_move_is_seen_where_it_matters() -> None:
     east, north, _ = session.place_of(k)
     mission = edits.moved(session.mission, k, *session.desk.geographic(east + 400.0, north))
     found = judge_windows(session.desk, mission, k)
-    assert found is not None
+    assert found[1][0].last - found[1][0].first < found[0].legs
     before = by_place(session.judged.verdict.findings)
     changed = [
         key

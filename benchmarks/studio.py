@@ -1,0 +1,260 @@
+"""How quick the studio is: a drag to its coloured verdict, a release to the flight, the page opened, and memory.
+
+``python -m benchmarks.studio`` starts ``planfly studio`` as it is installed, and a headless Chromium beside it: both
+share the cores, and seconds count only on a quiet machine.  A move is timed in the page, from its event to the first
+frame after a verdict on it, or on a newer one, has been drawn.
+"""
+
+import contextlib
+import json
+import math
+import os
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+from websockets.sync.client import connect
+
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission_files.formats import mission_text
+from planfly.airframe import load_airframe
+from planfly.pipeline import make_plan
+from planner.plan import plan_json
+from tests.browser import Browser
+from world.frames import to_geo
+from world.scenario import load_scenario
+
+MOVES, RELEASES, EDITS = 200, 7, 1_000
+SCENARIO = "jacksboro-air"
+# Moves of the pointer, 16 ms apart, as a page's own script sends them; gives the time to each verdict's frame, ms.
+DRAG = """
+new Promise((done) => {
+  const page = document.documentElement, map = document.getElementById("map"), asked = [], found = [];
+  const mark = document.querySelectorAll(".mark")[%(mark)d].querySelector(".dot").getBoundingClientRect();
+  const x = mark.x + mark.width / 2, y = mark.y + mark.height / 2;
+  const send = (kind, dx, dy) => map.dispatchEvent(new PointerEvent(kind, {
+    pointerId: 1, pointerType: "mouse", isPrimary: true, bubbles: true, button: 0, buttons: 1,
+    clientX: x + dx, clientY: y + dy }));
+  map.setPointerCapture = () => {};
+  const watch = new MutationObserver(() => {
+    const shown = Number(page.dataset.shown);
+    requestAnimationFrame(() => {
+      while (asked.length && asked[0][0] <= shown) found.push(performance.now() - asked.shift()[1]);
+    });
+  });
+  watch.observe(page, { attributes: true, attributeFilter: ["data-shown"] });
+  send("pointerdown", 0, 0);
+  let k = 0;
+  const step = () => {
+    k += 1;
+    const at = performance.now();
+    send("pointermove", 8 + 24 * Math.sin(k / 9), 24 * Math.cos(k / 7));
+    asked.push([Number(page.dataset.asked), at]);
+    if (k < %(moves)d) setTimeout(step, 16);
+    else setTimeout(() => { watch.disconnect(); send("pointerup", 8, 8); done(found); }, 900);
+  };
+  setTimeout(step, 200);
+})
+"""
+RELEASE = """
+new Promise((done) => {
+  const page = document.documentElement, map = document.getElementById("map"), before = page.dataset.flown;
+  const mark = document.querySelectorAll(".mark")[%(mark)d].querySelector(".dot").getBoundingClientRect();
+  const x = mark.x + mark.width / 2, y = mark.y + mark.height / 2;
+  const send = (kind, dx) => map.dispatchEvent(new PointerEvent(kind, {
+    pointerId: 1, pointerType: "mouse", isPrimary: true, bubbles: true, button: 0, buttons: 1,
+    clientX: x + dx, clientY: y }));
+  map.setPointerCapture = () => {};
+  send("pointerdown", 0);
+  for (let k = 1; k < 6; k++) send("pointermove", %(way)d * k);
+  setTimeout(() => {
+    const at = performance.now();
+    new MutationObserver((_, watch) => {
+      if (page.dataset.flown === before) return;
+      watch.disconnect();
+      requestAnimationFrame(() => done(performance.now() - at));
+    }).observe(page, { attributes: true, attributeFilter: ["data-flown"] });
+    send("pointerup", %(way)d * 5);
+  }, 300);
+})
+"""
+# Before the page's own scripts: when waypoints, their colours and the ground first stand in the page, ms.
+OPENED = """
+window.opened = {};
+new MutationObserver(() => {
+  const note = (name, there) => {
+    if (!opened[name] && there) requestAnimationFrame(() => { opened[name] = performance.now(); });
+  };
+  note("map", document.querySelectorAll(".mark").length > 1);
+  note("ground", document.querySelector("#map image[href]"));
+}).observe(document, { subtree: true, childList: true, attributes: true, attributeFilter: ["href"] });
+"""
+
+
+def write_missions(folder: Path) -> dict[str, tuple[str, ...]]:
+    """The missions that are dragged, by what they are: what the command is given for each."""
+    scenario = load_scenario(SCENARIO)
+    plan = make_plan(scenario, load_airframe(scenario), 1)
+    (folder / "demo.json").write_text(plan_json(plan), encoding="utf-8")
+    found: dict[str, tuple[str, ...]] = {"demo, 14 waypoints": ("demo.json",)}
+    for count in (100, 500):
+        name = f"w{count}.waypoints"
+        (folder / name).write_text(mission_text(_long_mission(count), "waypoints"), encoding="utf-8")
+        found[f"{count} waypoints"] = (name, "--scenario", SCENARIO)
+    (folder / "zones.geojson").write_text(_zones(), encoding="utf-8")
+    found["demo, 1,000 zones"] = ("demo.json", "--fence", "zones.geojson")
+    return found
+
+
+def _long_mission(count: int) -> Mission:
+    """Waypoints along a gentle wave through the middle of the map, at one height."""
+    scenario = load_scenario(SCENARIO)
+    east = np.linspace(-9_000.0, 9_000.0, count)
+    north = 1_500.0 * np.sin(east / 3_000.0)
+    lat, lon = to_geo(scenario.origin, east, north)
+    items = [
+        MissionItem(k + 1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(a), on_grid(b), 1_080.0)
+        for k, (a, b) in enumerate(zip(lat.tolist(), lon.tolist(), strict=True))
+    ]
+    return Mission(Home(on_grid(float(lat[0])), on_grid(float(lon[0])), 300.0), tuple(items))
+
+
+def _zones() -> str:
+    """A thousand square zones to keep out of, all over the map, below the flight."""
+    scenario, rng = load_scenario(SCENARIO), np.random.default_rng(38)
+    features = []
+    for number in range(1_000):
+        east, north = rng.uniform(-10_000.0, 10_000.0, 2)
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * 90.0 + [east, north]
+        lat, lon = to_geo(scenario.origin, corners[:, 0], corners[:, 1])
+        ring = np.stack([lon, lat], axis=1).tolist()
+        properties = {"name": f"zone {number}", "kind": "exclusion", "ceiling_amsl_m": 300.0}
+        features.append(
+            {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+        )
+    return json.dumps({"type": "FeatureCollection", "features": features})
+
+
+@contextlib.contextmanager
+def running(folder: Path, given: tuple[str, ...]) -> Iterator[tuple[str, psutil.Process]]:
+    """The address of a studio, and its process."""
+    command = [sys.executable, "-m", "planfly", "studio", *given, "--no-browser", "--port", "0", "--keep", "kept"]
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True, env=os.environ) as process:
+        assert process.stdout is not None
+        address = ""
+        while "#t=" not in address:
+            address = process.stdout.readline()
+            if process.poll() is not None:
+                raise SystemExit("the studio did not start")
+        try:
+            yield address.split()[-1], psutil.Process(process.pid)
+        finally:
+            process.terminate()
+
+
+def drawn(browser: Browser, address: str) -> None:
+    """Open the page and wait until the mission, its ground and its flight are there."""
+    browser.go(address)
+    browser.wait_for("document.querySelectorAll('.mark').length > 1")
+    browser.wait_for("document.querySelector('#map image').hasAttribute('href')")
+    browser.wait_for("document.documentElement.dataset.flown")
+    browser.settle()
+
+
+def share(values: list[float], part: float) -> float:
+    """The value below which that part of some lies."""
+    return sorted(values)[min(len(values) - 1, math.ceil(part * len(values)) - 1)]
+
+
+def measure_drags(folder: Path, missions: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
+    """A row a mission."""
+    rows = []
+    for name, given in missions.items():
+        with (
+            running(folder, given) as (address, _),
+            tempfile.TemporaryDirectory() as profile,
+            Browser(Path(profile), 1400, 900) as browser,
+        ):
+            drawn(browser, address)
+            count = int(browser.value("document.querySelectorAll('.mark').length"))
+            moves = browser.value(DRAG % {"mark": count // 2, "moves": MOVES})
+            browser.wait_for("document.getElementById('flown').dataset.state !== 'checking'")
+            way = [2, -2]
+            flown = [browser.value(RELEASE % {"mark": count // 2, "way": way[k % 2]}) for k in range(RELEASES)]
+        row = {"mission": name, "p50": share(moves, 0.5), "p95": share(moves, 0.95), "max": max(moves), "n": len(moves)}
+        rows.append(row | {"flown": statistics.median(flown)})
+        print(
+            f"{name:22} drag to verdict: p50 {row['p50']:5.0f}, p95 {row['p95']:5.0f}, max {row['max']:5.0f} ms of"
+            f" {row['n']}; release to flown: median {rows[-1]['flown']:5.0f} ms",
+            flush=True,
+        )
+    return rows
+
+
+def measure_opening(folder: Path) -> None:
+    """The page opened by a browser that has never seen it, and then again."""
+    with running(folder, ("demo.json",)) as (address, _):
+        time.sleep(3.0)
+        for how in ("cold", "cold", "cold"):
+            with tempfile.TemporaryDirectory() as profile, Browser(Path(profile), 1400, 900) as browser:
+                browser.call("Page.addScriptToEvaluateOnNewDocument", source=OPENED)
+                drawn(browser, address)
+                seen = browser.value("window.opened")
+            print(
+                f"page opened, {how}: mission coloured {seen['map']:.0f} ms, ground {seen['ground']:.0f} ms", flush=True
+            )
+
+
+def measure_memory(folder: Path) -> None:
+    """What the server's process takes more after many edits."""
+    with running(folder, ("demo.json",)) as (address, process):
+        port, token = re.findall(r":(\d+)/#t=(.+)", address)[0]
+        rng = np.random.default_rng(1)
+        with connect(
+            f"ws://127.0.0.1:{port}/session",
+            origin=f"http://127.0.0.1:{port}",
+            max_size=None,  # type: ignore[arg-type]
+        ) as socket:
+            socket.send(json.dumps({"kind": "hello", "token": token}))
+            sheet = _sheet(socket)
+            taken = []
+            for number in range(EDITS):
+                if number % (EDITS // 10) == 0:
+                    taken.append(process.memory_info().rss / 2**20)
+                item = sheet["items"][int(rng.integers(1, len(sheet["items"]) - 1))]
+                east, north, _ = item["at"]
+                step = rng.normal(0.0, 40.0, 2)
+                move = {"k": item["k"], "east": east + step[0], "north": north + step[1]}
+                socket.send(json.dumps({"kind": "move", "rev": sheet["rev"], **move}))
+                sheet = _sheet(socket)
+            taken.append(process.memory_info().rss / 2**20)
+    print(f"server's memory, MB, over {EDITS} edits: {', '.join(f'{one:.0f}' for one in taken)}", flush=True)
+
+
+def _sheet(socket: Any) -> dict[str, Any]:
+    while True:
+        data = socket.recv(timeout=60)
+        if isinstance(data, str) and data.startswith('{"kind":"sheet"'):
+            return dict(json.loads(data))
+
+
+def main() -> None:
+    """Measure all, and print it."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        missions = write_missions(folder)
+        measure_drags(folder, missions)
+        measure_opening(folder)
+        measure_memory(folder)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,299 @@
+"""The page in a real Chromium: what hands do, what is shown, and what happens when the server goes."""
+
+import base64
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flight.mission_files.formats import mission_text, parse_mission
+from tests.browser import Browser
+from tests.planfly.studio.drafts import drawn_session
+from tests.soak import at_most
+
+ROOT = Path(__file__).parents[3]
+STATE = "document.getElementById('{}').dataset.state"
+READY = "document.querySelectorAll('.mark').length > 1 && document.querySelector('#map image[href]') !== null"
+CENTRE = """(() => {{ const r = document.querySelectorAll({0})[{1}].getBoundingClientRect();
+ return [r.x + r.width / 2, r.y + r.height / 2]; }})()"""
+# Pairs of names that stand over each other, and the tools of the page that are smaller than a finger's tip.
+OVERLAPS = """(() => { let n = 0;
+ const boxes = [...document.querySelectorAll('.names text')].map((one) => one.getBoundingClientRect());
+ boxes.forEach((a, i) => boxes.slice(i + 1).forEach((b) => {
+ n += a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 2 && b.top < a.bottom - 2; }));
+ return n; })()"""
+UNNAMED = """[...document.querySelectorAll('button, input, select, [role=button]')].filter((one) =>
+ one.checkVisibility() && !(one.ariaLabel || one.textContent.trim() || one.labels?.length || one.title))
+ .map((one) => one.outerHTML)"""
+
+
+class Studio:
+    """A studio's process of a mission file."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.file = folder, folder / "m.waypoints"
+        self.file.write_text(mission_text(drawn_session(8, 8).mission, "waypoints"), encoding="utf-8")
+        self.port = 0
+        self.start()
+
+    def start(self) -> None:
+        """Start it, on the port of the last time."""
+        command = [sys.executable, "-m", "planfly", "studio", "m.waypoints", "--scenario", "jacksboro", "--no-browser"]
+        self.process = subprocess.Popen(
+            [*command, "--port", str(self.port), "--keep", "kept"], cwd=self.folder, stdout=subprocess.PIPE, text=True,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+        assert self.process.stdout is not None
+        line = ""
+        while "#t=" not in line:
+            line = self.process.stdout.readline()
+            assert self.process.poll() is None
+        self.address = line.split()[-1]
+        self.port = int(self.address.split(":")[2].partition("/")[0])
+
+    def kill(self) -> None:
+        """End it as a crash does."""
+        self.end(signal.SIGKILL)
+
+    def end(self, how: int = signal.SIGTERM) -> None:
+        """End it, and what it wrote to."""
+        self.process.send_signal(how)
+        self.process.communicate(timeout=20)
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Studio]:
+    running = Studio(tmp_path_factory.mktemp("studio-page"))
+    yield running
+    running.end()
+
+
+@pytest.fixture(scope="module")
+def browser(studio: Studio, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("chromium"), 1400, 900) as opened:
+        yield opened
+
+
+@pytest.fixture
+def page(browser: Browser, studio: Studio) -> Browser:
+    """The page, open with its mission and its flight."""
+    browser.problems.clear()
+    browser.requests.clear()
+    if browser.value("location.pathname") != "/" or not browser.value(READY):
+        browser.go(studio.address)
+        browser.wait_for(READY)
+    browser.wait_for("['ok', 'fail', 'open'].includes(" + STATE.format("flown") + ")")
+    return browser
+
+
+def centre(page: Browser, selector: str, number: int = 0) -> list[float]:
+    found: list[float] = page.value(CENTRE.format(json.dumps(selector), number))
+    return found
+
+
+def drag(page: Browser, start: list[float], way: tuple[float, float], *, let_go: bool = True) -> None:
+    x, y = start
+    page.mouse("mousePressed", x, y, button="left", clickCount=1)
+    for k in range(1, 6):
+        page.mouse("mouseMoved", x + k * way[0] / 5, y + k * way[1] / 5, button="left", buttons=1)
+    if let_go:
+        page.mouse("mouseReleased", x + way[0], y + way[1], button="left", clickCount=1)
+
+
+def key(page: Browser, name: str, code: int, *, control: bool = False) -> None:
+    for kind in ("rawKeyDown", "keyUp"):
+        page.call(
+            "Input.dispatchKeyEvent", type=kind, key=name, windowsVirtualKeyCode=code, modifiers=2 if control else 0
+        )
+
+
+def undo_text(page: Browser) -> str:
+    return str(page.value("document.getElementById('undo').title"))
+
+
+def undo_all(page: Browser) -> None:
+    """Undo until nothing is left to undo."""
+    while not page.value("document.getElementById('undo').disabled"):
+        rev = page.value("document.documentElement.dataset.rev")
+        page.value("document.getElementById('undo').click()")
+        page.wait_for(f"document.documentElement.dataset.rev !== '{rev}'")
+
+
+def marks(page: Browser) -> int:
+    return int(page.value("document.querySelectorAll('.mark').length"))
+
+
+def saved(page: Browser) -> str:
+    """The mission as the page saves it."""
+    catch = (
+        "window.kept = []; URL.createObjectURL = (blob) => { blob.text().then((t) => kept.push(t)); return 'blob:x'; }"
+    )
+    page.value(f"{catch}; HTMLAnchorElement.prototype.click = () => {{}}; 1")
+    page.value("document.getElementById('tab-files').click()")
+    page.value(
+        "[...document.querySelectorAll('#panel-files button')].find((b) => b.textContent === '.waypoints').click()"
+    )
+    text = page.wait_for("window.kept.length && kept[0]")
+    return str(text)
+
+
+def test_it_opens_with_the_mission_and_asks_for_nothing_elsewhere(page: Browser, studio: Studio) -> None:
+    assert marks(page) == len(drawn_session(8, 8).sheet()["items"])
+    assert page.value("location.hash + location.search") == ""
+    own = f"http://127.0.0.1:{studio.port}/"
+    assert [one for one in page.requests if not one.startswith((own, "blob:"))] == []
+    assert page.problems == []
+    assert page.value(OVERLAPS) == 0
+    assert page.value(UNNAMED) == []
+
+
+def test_a_waypoint_is_dragged_judged_flown_and_undone(page: Browser) -> None:
+    before = saved(page)
+    drag(page, centre(page, ".mark .dot", 2), (40.0, 25.0), let_go=False)
+    page.wait_for("Number(document.documentElement.dataset.shown) > 0")
+    page.wait_for(STATE.format("flown") + " === 'stale'")
+    shown = page.value("document.getElementById('hint').textContent")
+    assert "m AMSL" in shown
+    x, y = centre(page, ".mark.selected .dot")
+    page.mouse("mouseReleased", x, y, button="left", clickCount=1)
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: move item 3')")
+    page.wait_for("['ok', 'fail', 'open'].includes(" + STATE.format("flown") + ")")
+    assert saved(page) != before
+    page.value("document.activeElement.blur()")
+    key(page, "z", 90, control=True)
+    page.wait_for("document.getElementById('undo').disabled")
+    assert parse_mission(saved(page), "m.waypoints") == parse_mission(before, "m.waypoints")
+    assert page.problems == []
+
+
+def test_a_drag_is_taken_back_by_escape(page: Browser) -> None:
+    place = centre(page, ".mark .dot", 2)
+    drag(page, place, (60.0, 0.0), let_go=False)
+    key(page, "Escape", 27)
+    page.mouse("mouseReleased", place[0] + 60.0, place[1], button="left", clickCount=1)
+    page.settle()
+    assert centre(page, ".mark .dot", 2) == pytest.approx(place, abs=1.0)
+    assert page.value("document.getElementById('undo').disabled")
+
+
+def test_keys_move_raise_and_delete(page: Browser) -> None:
+    count = marks(page)
+    x, y = centre(page, ".mark .dot", 1)
+    page.mouse("mousePressed", x, y, button="left", clickCount=1)
+    page.mouse("mouseReleased", x, y, button="left", clickCount=1)
+    assert page.value("document.activeElement.getAttribute('aria-label')").startswith("waypoint 2,")
+    key(page, "ArrowUp", 38)
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: move item 2')")
+    key(page, "PageUp", 33)
+    page.wait_for("document.querySelector('.mark.selected') !== null")
+    key(page, "Delete", 46)
+    page.wait_for(f"document.querySelectorAll('.mark').length === {count - 1}")
+    undo_all(page)
+    assert marks(page) == count
+
+
+def test_a_diamond_inserts_and_a_profiles_dot_raises(page: Browser) -> None:
+    count = marks(page)
+    x, y = centre(page, ".diamonds path")
+    page.mouse("mousePressed", x, y, button="left", clickCount=1)
+    page.mouse("mouseReleased", x, y, button="left", clickCount=1)
+    page.wait_for(f"document.querySelectorAll('.mark').length === {count + 1}")
+    drag(page, centre(page, "#profile .dot", 2), (0.0, -30.0))
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: move item')")
+    undo_all(page)
+    assert marks(page) == count
+
+
+def test_a_suggestion_is_applied_by_its_button(page: Browser) -> None:
+    page.value("document.getElementById('tab-verdict').click()")
+    failed = int(page.value("document.querySelectorAll('#panel-verdict li[data-state=fail]').length"))
+    assert failed
+    page.value("document.querySelector('#panel-verdict .apply').click()")
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: apply a suggestion')")
+    undo_all(page)
+
+
+def test_a_path_is_planned_between_two_items(page: Browser) -> None:
+    page.value("document.getElementById('tab-items').click()")
+    page.value("document.getElementById('raise-by').value = 150")
+    page.value("[...document.querySelectorAll('#panel-items button')].find((b) => b.textContent === 'Raise').click()")
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: raise all')")
+    page.value("document.getElementById('tab-plan').click()")
+    page.value("document.getElementById('plan-first').selectedIndex = 1")
+    page.value("document.getElementById('plan-last').selectedIndex = 3")
+    page.value("document.querySelector('#panel-plan .main').click()")
+    page.wait_for("document.querySelector('#panel-plan .card button') !== null")
+    page.value("document.querySelector('#panel-plan .card button').click()")
+    page.wait_for("document.getElementById('undo').title === 'Undo: plan a part'")
+    undo_all(page)
+
+
+def test_a_dropped_file_is_opened(page: Browser) -> None:
+    text = mission_text(drawn_session(9, 6).mission, "waypoints")
+    data = base64.b64encode(text.encode()).decode()
+    page.value(
+        f"(() => {{ const data = new DataTransfer(); data.items.add(new File([atob('{data}')], 'dropped.waypoints'));"
+        " dispatchEvent(new DragEvent('drop', { dataTransfer: data, cancelable: true })); return 1; })()"
+    )
+    page.wait_for("document.getElementById('name').textContent === 'dropped.waypoints'")
+    page.value("document.getElementById('tab-files').click()")
+    page.value("[...document.querySelectorAll('.files button')].find((b) => b.textContent === 'm.waypoints').click()")
+    page.wait_for("document.getElementById('name').textContent === 'm.waypoints'")
+
+
+def test_what_was_done_survives_a_reload_and_a_server_that_dies(page: Browser, studio: Studio) -> None:
+    undo_all(page)
+    drag(page, centre(page, ".mark .dot", 3), (20.0, 10.0))
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: move')")
+    began, done = time.time(), saved(page)
+    page.call("Page.reload")
+    page.wait_for(f"({READY}) && document.getElementById('undo').title.startsWith('Undo: move')")
+    deadline = time.monotonic() + 30.0
+    while not any(file.stat().st_mtime > began for file in (studio.folder / "kept").glob("*.json")):
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    studio.kill()
+    page.wait_for("!document.getElementById('message').hidden")
+    studio.start()
+    page.wait_for("document.getElementById('message').textContent.includes('another start')")
+    page.go(studio.address)
+    page.wait_for(f"({READY}) && document.getElementById('undo').title.includes('before the studio ended')")
+    assert parse_mission(saved(page), "m").items == parse_mission(done, "m").items
+
+
+def test_a_phone_drags_by_touch(studio: Studio, tmp_path: Path) -> None:
+    with Browser(tmp_path, 420, 900, phone=True) as phone:
+        phone.go(studio.address)
+        phone.wait_for(READY)
+        assert phone.value("document.documentElement.scrollWidth <= innerWidth")
+        assert phone.value(OVERLAPS) == 0
+        before = undo_text(phone)
+        x, y = centre(phone, ".mark .dot", 2)
+
+        def touch(kind: str, dx: float) -> None:
+            points: list[dict[str, Any]] = [] if kind == "touchEnd" else [{"x": x + dx, "y": y, "id": 1}]
+            phone.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
+        touch("touchStart", 0.0)
+        for k in range(1, 13):
+            touch("touchMove", 4.0 * k)
+        touch("touchEnd", 0.0)
+        phone.wait_for(f"document.getElementById('undo').title !== {json.dumps(before)}")
+        assert undo_text(phone).startswith("Undo: move item")
+        assert phone.problems == []
+
+
+def test_a_drag_is_coloured_in_time(page: Browser) -> None:
+    from benchmarks.studio import DRAG
+
+    moves = page.value(DRAG % {"mark": 3, "moves": 40})
+    page.call("Page.reload")
+    assert len(moves) == 40
+    assert sorted(moves)[37] < 1000.0 * at_most(0.15)
