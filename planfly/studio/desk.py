@@ -21,7 +21,6 @@ from planfly.airframe import Airframe, load_airframe
 from planfly.open_mission import OpenedMission
 from planfly.pipeline import make_setup
 from planfly.studio.edits import places
-from planfly.studio.known_limits import with_known_limits
 from planner.plan import Plan
 from world.frames import to_geo, to_map
 from world.scenario import Scenario
@@ -63,7 +62,7 @@ class Desk:
         setup = opened.setup
         return cls(
             setup.scenario,
-            with_known_limits(opened.airframe),
+            opened.airframe,
             setup.seed,
             setup,
             terrain,
@@ -72,7 +71,7 @@ class Desk:
 
     def flown_as(self, scenario: Scenario) -> "Desk":
         """The desk with the same mission in another weather, or with another aircraft or autopilot."""
-        airframe = with_known_limits(load_airframe(scenario))
+        airframe = load_airframe(scenario)
         opened, plan = self.opened, self.opened.plan
         plan = None if plan is None else replace(plan, scenario=scenario)
         setup = make_setup(scenario, airframe, opened.mission, self.seed, plan=plan)
