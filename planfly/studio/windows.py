@@ -1,7 +1,7 @@
 """The geometric verdict on the legs and corners about a moved item: the same as the whole one's, at any length.
 
-A part of the route is judged that reaches beyond what a move can change.  What is asked of the whole flight, energy,
-stall, bounds and the distance to threats, waits for the whole verdict.
+A part of the route is judged that reaches beyond what a move can change, with the threats and zones that it enters.
+What is asked of the whole flight, energy, stall and bounds, waits for the whole verdict.
 """
 
 from collections.abc import Iterator
@@ -119,8 +119,13 @@ def _judged(setup: FlightSetup, first: int, last: int, begin: int) -> Window:
 
 
 def _within(item: Finding, first: int, last: int) -> bool:
-    """Whether a finding is of a leg or a corner between two waypoints; a corner at either end counts."""
+    """Whether a finding is of a leg or a corner between two waypoints, or of a threat or zone that is violated.
+
+    A corner at either end counts.
+    """
     place = item.place
+    if item.ok is False and place.kind in ("missile", "exclusion", "inclusion"):
+        return True
     if place.index is None or place.kind not in ("leg", "waypoint"):
         return False
     return first <= place.index < last + (place.kind == "waypoint")

@@ -140,6 +140,7 @@ export class Hands {
 
   // Numbers beside the pointer: heights, and what of its corner and legs is closest to its limit.
   words(k, x, y, place) {
+    this.said = [k, x, y, place];
     const { app } = this, model = app.model(), item = model.items.find((one) => one.k === k);
     if (!item) return;
     const [east, north] = place ? [place.east, place.north] : item.at;
@@ -149,6 +150,11 @@ export class Hands {
     const lines = [...new Set(rows.filter((row) => row[1]).sort((a, b) => order.indexOf(a[0]) - order.indexOf(b[0])).map((row) => row[1]))];
     const fault = app.dragFault();
     app.hint([`${item.seq}: ${heightWords(app.grid(), east, north, place?.up ?? item.at[2])}`, ...(fault ? [fault] : lines.slice(0, 3))], x, y, fault ? "fail" : worst);
+  }
+
+  // The numbers of a drag anew, when its verdict has come.
+  again() {
+    if ((this.drag?.moved && this.drag.k !== undefined) || this.side?.moved) this.words(...this.said);
   }
 
   // ---- the profile

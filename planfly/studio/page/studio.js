@@ -29,6 +29,7 @@ function onSheet(sheet) {
   link.settle();
   now.dragging = null;
   map.root.classList.remove("dragging");
+  $("panel-verdict").classList.remove("before");
   if (now.after !== undefined) {
     const items = sheet.items, i = items.findIndex((one) => one.k === now.after);
     if (i >= 0 && items[i + 1] && before && before.items.length < items.length) now.selected = items[i + 1].k;
@@ -78,6 +79,7 @@ function onPreview(message) {
   map.show(now.model);
   profile.show(now.model, now.world, now.grid, shownFlight());
   answers();
+  hands.again();
   document.documentElement.dataset.shown = message.n;
 }
 
@@ -225,6 +227,7 @@ const app = {
       now.dragging = { k };
       now.checking = true;
       map.root.classList.add("dragging");
+      $("panel-verdict").classList.add("before");
       map.setTrack(now.flown?.track, true);
     }
     now.dragging.drop = hands.drop?.k === k ? hands.drop : null;
@@ -241,6 +244,7 @@ const app = {
     now.dragging = null;
     now.fault = "";
     map.root.classList.remove("dragging");
+    $("panel-verdict").classList.remove("before");
     link.settle();
     now.model = now.sheet;
     drawAll();

@@ -19,7 +19,7 @@ from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import PageProgram, Served, served
 from tests.soak import note, scaled
 
-FUZZED = scaled(2000, 60)
+FUZZED = scaled(2000, 24)
 
 
 @pytest.fixture(scope="module")

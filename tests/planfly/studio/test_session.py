@@ -15,7 +15,7 @@ from tests.planfly.studio.drafts import drawn_session, session_of
 from tests.soak import note, scaled
 from world.errors import MissionError, PlanflyError
 
-EDITS = scaled(1000, 24)
+EDITS = scaled(1000, 12)
 
 
 def draw_edit(session: Session, rng: np.random.Generator) -> None:

@@ -14,7 +14,7 @@ from tests.planfly.studio.drafts import drawn_session
 from tests.soak import note, scaled
 from world.errors import MissionError
 
-MISSIONS = scaled(1000, 8)
+MISSIONS = scaled(1000, 5)
 # A window's path is rounded from its own beginning, and heights over ground differ by what that is worth, m.
 ROUNDED = 0.02
 Judged = dict[tuple[str, str, int], list[Any]]
