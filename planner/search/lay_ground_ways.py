@@ -50,8 +50,9 @@ GLIDE_SHARE = 0.85
 _GENTLER = (1.0, 0.75, 0.6)
 # m.  So much higher than the certificate asks for a take-off ends, and no lower than this over home.
 _OVER_CLEARANCE, _MIN_TAKEOFF = 2.0, 40.0
-# The first leg is so much longer than the climb to the take-off's height: a share and m; and tried longer by these.
-_AFTER_TAKEOFF, _LONGER = (1.05, 30.0), (1.0, 1.7)
+# The first leg is so much longer than the climb to the take-off's height: a share and m; and tried longer by these.  By
+# this share of that climb a take-off is over: what is left of the leg has to hold the turn at its end.
+_AFTER_TAKEOFF, _LONGER, _OVER = (1.05, 30.0), (1.0, 1.7), 0.8
 # m.  So far from home no ground stands in the way (the verdict's LAUNCH_RUN); beyond, this share of the height that was
 # climbed is to be left above ground, up to the scenario's clearance.
 _LAUNCH_RUN, _IN_HAND = 50.0, 0.5
@@ -265,7 +266,9 @@ def _climb_out(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
             nearest.add(found)
             if nearest.tried >= _CERTIFIED:
                 break
-    courses = "on its course" if launch.course is not None else f"on {len({course for course, _ in launches})} courses"
+    courses = (
+        "on its course" if launch.course is not None else f"on {len({launch.course for launch in launches})} courses"
+    )
     if not nearest.tried:
         return None, f"no way launched {courses} is long enough to climb to the start, {goal - ground:.0f} m over home"
     return None, f"none of {nearest.tried} ways launched {courses} is free; the nearest: {nearest.problem}"
@@ -290,8 +293,12 @@ def _certified_climb(site: _Site, course: float, spots: list[Spot], up: float) -
     return found
 
 
-# A launch: its course (rad), and where its first leg ends.
-_Start = tuple[float, Spot]
+class _Start(NamedTuple):
+    """A launch: its course (rad), where its take-off is over, and where its first leg ends."""
+
+    course: float
+    over: Spot
+    end: Spot
 
 
 def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[list[_Start], str]:
@@ -320,13 +327,15 @@ def _launches(site: _Site, launch: Launch, over: float, high: float) -> tuple[li
                 said = f"the nearest, {where}, is {-worst:.0f} m too low over the ground {at:.0f} m from home"
                 best = max(best, (worst, said))
                 break
-            end = (home[0] + last * math.sin(course), home[1] + last * math.cos(course))
+            east, north = math.sin(course), math.cos(course)
+            end = (home[0] + last * east, home[1] + last * north)
+            risen_at = _OVER * over / climb
             ground = float(site.home[2])
             entered = site.entered([(*home, ground), (*end, ground + climb * last)])
             if entered:
                 best = max(best, (-1e6, f"{where} it is {entered}"))
                 break
-            found.append((course, end))
+            found.append(_Start(course, (home[0] + risen_at * east, home[1] + risen_at * north), end))
     whose = "the launch course leads" if launch.course is not None else f"none of {len(courses)} launch courses leads"
     no = "" if launch.course is None else "not "
     return found, f"{whose} {no}free of ground, missiles and zones at {SHARE:.0%} of the steepest climb: {best[1]}"
@@ -339,13 +348,13 @@ def _ways_up(site: _Site, launches: Sequence[_Start], laps: int) -> Iterator[tup
     end, home = (float(first[0]), float(first[1])), (float(site.home[0]), float(site.home[1]))
     after = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
     least = site.least_length(float(first[2] - site.home[2]), 0) + math.dist(end, after)
-    for course, begin in launches:
+    for course, over, begin in launches:
         tail = site.scenario.wind.along(course, float(site.home[2]))[0]
         for corners in chains(begin, course, end, onward, site.radius, laps):
             spots = [home, begin, *corners, end]
-            way = measure([*spots, after], site.turning)
-            if way.fits and way.length >= least:
-                yield way.cost + (_TAIL_COST if tail > _TAIL else 0.0), course, spots
+            way, before = measure([over, *spots[1:], after], site.turning), math.dist(home, over)
+            if way.fits and before + way.length >= least:
+                yield before + way.cost + (_TAIL_COST if tail > _TAIL else 0.0), course, spots
 
 
 def _lap_counts(site: _Site, rise: float, side: int) -> list[int]:

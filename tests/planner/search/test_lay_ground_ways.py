@@ -99,6 +99,21 @@ def test_the_climb_is_flown_from_the_ground_at_seven_tenths_of_the_steepest() ->
     assert leg_runs(way)[0] * climb.gradient > 40.0
 
 
+@pytest.mark.parametrize("course_deg", [60.0, 120.0, 180.0, 215.0, 270.0, 330.0])
+def test_what_the_take_off_leaves_of_its_leg_holds_the_turn_at_its_end(course_deg: float) -> None:
+    """It is over after four fifths of the way to its height; a turn by 90 degrees takes its radius of the leg."""
+    plan = laid(launch={"method": "catapult", "course_deg": course_deg})
+    assert plan.ways is not None
+    climb = plan.ways.climb
+    assert climb is not None
+    way = np.concatenate([climb.home[None], climb.waypoints, PATH[:1]])
+    left = leg_runs(way)[0] - 0.8 * (climb.up - BASE) / climb.gradient
+    turn = abs(math.remainder(float(np.diff(leg_courses(way))[0]), math.tau))
+    made = limits()
+    radius = made.airspeed**2 / (9.80665 * math.tan(made.max_bank))
+    assert left >= radius * math.tan(0.5 * turn)
+
+
 def test_a_stated_launch_course_is_flown_and_an_own_one_has_no_wind_from_behind() -> None:
     stated = laid(launch={"method": "catapult", "course_deg": 215.0}).ways
     assert stated is not None
