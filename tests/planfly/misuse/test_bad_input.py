@@ -237,6 +237,7 @@ def test_a_malformed_log(name: str, command: str, tmp_path: Path, capsys: pytest
         ["export", "missing.json", "out.plan"],
         ["fly", "missing.waypoints"],
         ["check", "missing.mcap"],
+        ["studio", "missing.waypoints", "--no-browser"],
         ["check", "nowhere.waypoints", "--fence", "missing.fence"],
         ["check", "nowhere.waypoints", "--fence", "missing.kml"],
         ["replay", "missing.mcap"],

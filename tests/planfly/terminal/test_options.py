@@ -78,7 +78,7 @@ def test_run_takes_what_fly_takes_of_a_flight() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in build_parser().commands if name not in ("serve", "help", "completion")]
+    "name", [name for name in build_parser().commands if name not in ("studio", "serve", "help", "completion")]
 )
 def test_every_command_with_a_result_answers_in_json_or_in_silence(name: str) -> None:
     assert {"--json", "--quiet"} <= set(build_parser().commands[name].options())
