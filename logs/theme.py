@@ -121,6 +121,13 @@ LOOKS = {
     "glide-middle": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.4),
     "glide-far": Look(_BLUE, "#7cc0f5", width=0.0, fill=0.22),
     "landable": Look(_YELLOW, _YELLOW, width=0.0, fill=0.45, hatch="..."),
+    "front-other": Look(_GREY, _PALE_GREY, width=0.9, size=4.0, halo=True),
+    "front-shortest": Look(_BLUE, "#7cc0f5", width=2.2, size=7.0, halo=True),
+    "front-unseen": Look(_PURPLE, "#e87cc4", width=2.2, dash=(8.0, 2.0), size=7.0, marker="triangle", halo=True),
+    "front-high": Look(_ORANGE, "#ffb938", width=2.2, dash=(4.0, 1.5), size=9.0, marker="star", halo=True),
+    "front-sparing": Look(
+        _FLOWN.light, _FLOWN.dark, width=2.2, dash=(8.0, 1.5, 1.5, 1.5), size=7.0, marker="cross", halo=True
+    ),
     "comes-down": Look("#333333", "#e8e8ea", width=1.0, size=3.4, face="paper"),
 }
 

@@ -10,6 +10,7 @@
     planfly.report(flown, "report")
 
 plan, replan, what_blocks            make a path; plan again in flight; why there is no feasible path
+plan_front                           a choice of paths: short, unseen, high above ground, sparing
 fly, plan_then_fly, run              fly a plan or a mission file; both at once; the whole chain into a folder
 fly_by_each                          fly it by the laws of several autopilots
 check, judge, read_log               judge a log, a plan or a mission; read a log, its track as a table
@@ -72,6 +73,7 @@ if TYPE_CHECKING:
     from planfly.api.flying import fly_by_each as fly_by_each
     from planfly.api.flying import judge as judge
     from planfly.api.flying import plan_then_fly as plan_then_fly
+    from planfly.api.fronts import plan_front as plan_front
     from planfly.api.identifying import IdentifiedAircraft as IdentifiedAircraft
     from planfly.api.identifying import identify_aircraft as identify_aircraft
     from planfly.api.imported import Reflown as Reflown
@@ -115,6 +117,8 @@ if TYPE_CHECKING:
     from planfly.stages import progress as progress
     from planfly.studio.open_studio import open_studio as open_studio
     from planner.plan import Plan as Plan
+    from planner.search.plan_front import Front as Front
+    from planner.search.plan_front import FrontPlan as FrontPlan
     from world.errors import ArgumentError as ArgumentError
     from world.errors import FlightError as FlightError
     from world.errors import LogError as LogError
@@ -170,6 +174,7 @@ _HOMES = {
             "judge",
             "plan_then_fly",
         ),
+        "planfly.api.fronts": ("plan_front",),
         "planfly.api.imported": (
             "Reflown",
             "import_log",
@@ -229,6 +234,10 @@ _HOMES = {
         "planfly.pipeline": ("PlanThenFly",),
         "planfly.stages": ("progress",),
         "planner.plan": ("Plan",),
+        "planner.search.plan_front": (
+            "Front",
+            "FrontPlan",
+        ),
         "world.errors": (
             "ArgumentError",
             "FlightError",

@@ -48,6 +48,7 @@ RANGES: Mapping[str, Range] = {
     "refine": Range(0, 20, "a whole number from 0 to 20 is expected", integer=True),
     "budget": Range(4, 10**10, "a whole number of evaluations, 4..10^10, is expected", integer=True),
     "seconds": Range(0.0, 1e6, "a number of seconds above 0, up to 1,000,000, is expected", above=True),
+    "front": Range(2, 100, "a whole number of plans, 2 to 100, is expected", integer=True),
     "at_leg": Range(0, 10_000, "a leg's number is expected, from 0", integer=True),
     "airspeed": _POSITIVE,
     "max_hours": _POSITIVE,
@@ -111,7 +112,7 @@ def check_arguments(**given: Any) -> None:
 
 
 # Where one keyword has another range in another call.
-_KEYWORDS = {"served_speed": "speed"}
+_KEYWORDS = {"served_speed": "speed", "front": "count"}
 
 
 # mm.  The largest side of a sensor, across the way and along it, and the longest focal length.

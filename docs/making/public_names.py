@@ -8,6 +8,7 @@ import planfly
 _ORDER = (
     *(
         "plan",
+        "plan_front",
         "replan",
         "what_blocks",
         "fly",

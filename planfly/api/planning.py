@@ -284,7 +284,7 @@ def _planned(
     if out is not None:
         read = None if isinstance(source, Scenario) else Path(source)
         target = file_target(out, world.name, number, overwrite=overwrite, source=read)
-    airframe, ends = load_airframe(world), _stop_condition(seconds, stop)
+    airframe, ends = load_airframe(world), stop_condition(seconds, stop)
     limits = airframe.limits.surely()
     with stage(f"planning {world.name}", "planning") as advance:
         if flown is None:
@@ -299,7 +299,7 @@ def _planned(
     return made
 
 
-def _stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
+def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
     """What a search asks between generations: "interrupted", "budget" after so many seconds, or "" to go on."""
     deadline = None if seconds is None else time.monotonic() + seconds
 

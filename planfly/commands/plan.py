@@ -31,6 +31,7 @@ def plan_options(line: LineParser) -> None:
         "plan a path, or plan again in flight, without flying it",
         "planfly plan jacksboro --seed 3 --out plan.json",
         "planfly plan jacksboro --from plan.json --at-leg 4 --add-threat -2000,1500,800,1500",
+        "planfly plan hard-30 --front 20 --out front",
     )
     parser.more = _algorithms
     parser.alias("seconds", "--budget")
@@ -46,6 +47,12 @@ def plan_options(line: LineParser) -> None:
         "--budget", metavar="N|Xs", type=budget,
         help="stop after N evaluations or X seconds with the best plan so far (as Ctrl-C does); a plan under a budget "
         "in seconds may differ from run to run",
+    )  # fmt: skip
+    planning.add_argument(
+        "--front", metavar="N", type=number("front"),
+        help="a choice of up to N plans (2 to 100), none better than another in length, exposure to radars, height "
+        "above ground and energy at once (time for energy with [planner] objective = \"time\"); --out is then a folder "
+        "of plan-1.json ..., front.csv, front.json and pictures (default: runs/<name>-seed<N>-front, replaced)",
     )  # fmt: skip
     again = parser.group("planning again in flight")
     completed(
@@ -71,6 +78,8 @@ def _algorithms() -> str:
 def plan(args: argparse.Namespace) -> int:
     """Plan, and write the plan file; 4 where the plan is not safe."""
     _check_replanning(args)
+    if args.front is not None:
+        return _front(args)
     name = "plan.json" if args.old is None else "replan.json"
     out = f"{RUN_FOLDER}/{name}" if args.out is None else args.out
     evaluations, seconds = args.budget or (None, None)
@@ -88,9 +97,36 @@ def plan(args: argparse.Namespace) -> int:
     return code
 
 
+def _front(args: argparse.Namespace) -> int:
+    """Plan a front and write its folder; 4 where there is no safe plan."""
+    from planfly.api.fronts import FRONT_FOLDER
+    from planfly.terminal.plan_answers import front_answer, front_lines
+
+    for name in ("old", "algorithm"):
+        if (value := getattr(args, name)) is not None:
+            raise ScenarioError.of_argument(name, value, "not with `front` N, which plans anew by its own search")
+    evaluations, seconds = args.budget or (None, None)
+    if evaluations is not None:
+        allowed = "with `front` N a number of seconds is expected, as in 10s"
+        raise ScenarioError.of_argument("budget", evaluations, allowed)
+    out = FRONT_FOLDER if args.out is None else args.out
+    with _best_so_far() as stop:
+        made = call(
+            planfly.plan_front, args, count=args.front, seconds=seconds, out=out,
+            overwrite=args.overwrite or args.out is None, stop=stop,
+        )  # fmt: skip
+    default = made.default.plan
+    folder = filled_pattern(out, default.scenario.name, default.seed)
+    print_warnings(default.scenario.notes)
+    print("\n".join(front_lines(made, folder)))
+    code = FLYABLE if made.plans else NOT_FLYABLE
+    give_answer(args, lambda: front_answer(made, folder, code))
+    return code
+
+
 def _answer(made: "Plan", target: "Path", code: int) -> object:
     from planfly.api.planning import conditions_of_plan
-    from planfly.terminal.answers import PlanAnswer
+    from planfly.terminal.plan_answers import PlanAnswer
     from planfly.terminal.verdict_answers import conditions_document
     from planner.plan import Objective
 

@@ -43,7 +43,7 @@ _MANY, _AIRCRAFT, _HELP = "many flights", "aircraft, scenarios and terrain", "he
 
 COMMANDS = (
     Command("run", _FLY, "RunAnswer"),
-    Command("plan", _FLY, "PlanAnswer"),
+    Command("plan", _FLY, "plan_answers.PlanDocument"),
     Command("export", _FLY, "ExportAnswer"),
     Command("fly", _FLY, "FlyAnswer"),
     Command("studio", _FLY),

@@ -264,30 +264,6 @@ class RunAnswer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
-class PlanAnswer:
-    """planfly plan: the plan file, and what it comes to."""
-
-    schema: Literal["planfly.plan-answer/1"] = "planfly.plan-answer/1"
-    exit_code: int
-    scenario: str
-    seed: int
-    file: str
-    safe: bool
-    feasible: bool
-    waypoints: int
-    length_ratio: float
-    """Length over that of the straight line."""
-    algorithm: str
-    evaluations: int
-    ended: str
-    """completed, budget or interrupted."""
-    problems: list[str]
-    """What of the plan is not feasible."""
-    conditions: ConditionsDocument
-    """What it is for."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class FlyAnswer:
     """planfly fly: the log and the verdict."""
 

@@ -13,7 +13,7 @@ from planfly.commands.registry import build_parser
 # The functions that each command calls.
 FUNCTIONS = {
     "run": ("run",),
-    "plan": ("plan", "replan"),
+    "plan": ("plan", "replan", "plan_front"),
     "export": ("export",),
     "fly": ("fly",),
     "studio": ("open_studio",),
@@ -39,6 +39,7 @@ FUNCTIONS = {
 }
 # Options whose keyword has another name in the function named.
 RENAMED = {
+    ("plan", "front"): ("plan_front", "count"),
     ("report", "log"): ("report", "source"),
     ("report", "layout"): ("foxglove_layout", "file"),
     ("replay", "movie"): ("movie", "out"),

@@ -17,6 +17,7 @@ ROOT = Path(planfly.__file__).parents[1]
 VERBS = {
     *(
         "plan",
+        "plan_front",
         "replan",
         "what_blocks",
         "fly",
@@ -58,7 +59,7 @@ VERBS = {
 }
 RESULTS = {
     *("AircraftNumbers", "BestFound", "CampaignFlight", "CampaignResult", "Comparison", "ExportedFiles", "FlightLog"),
-    "IdentifiedAircraft",
+    *("Front", "FrontPlan", "IdentifiedAircraft"),
     *("FlownMission", "ImportedFlight", "Instruments", "Judged", "Optimiser", "PaperTables", "Plan", "PlanThenFly"),
     *(
         "Reflown",

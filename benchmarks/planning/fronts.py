@@ -1,0 +1,250 @@
+"""Fronts of 20 plans beside those of pymoo's NSGA-II and MOEA/D, by hypervolume.
+
+``python -m benchmarks.planning.fronts [--seeds N] [--from SEED] [--problems NAME,...] [--whole] [--json FILE]`` plans a
+front of 20 (`planner.search.plan_front`) and lets pymoo's algorithms search the same four objectives: length, exposure,
+clearance and energy, under the same graded constraints, with as many evaluations as ours took, and again with as much
+CPU, the default plan, the seeds and the certificates of ours included. NSGA-II takes constraints as it ships them;
+MOEA/D knows none, so violations are added to its objectives. Both search the box of the rotated encoding from random
+samples. A third row gives NSGA-II the paths that ours starts from, which it would not have alone. Of what each returns,
+the 20 certified paths that cover most count; a front without any has hypervolume 0.
+
+The reference point is that of `reference_point`: 1.5 times the length, exposure and energy of the default plan (1 s of
+exposure at least), and the required clearance. Hypervolumes are shares of the box between it and the straight line's
+length, no exposure, the clearance of the lower end, and the default plan's energy times straight / length.
+"""
+
+import argparse
+import json
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planfly.airframe import load_airframe
+from planner.evaluation.certify import certify
+from planner.evaluation.encoding import ENCODINGS, Encoding
+from planner.optimisers.hypervolume import covering_order, hypervolume
+from planner.search.plan_front import Front, FrontTask, front_task, plan_front, seed_paths
+from world.scenario import load_scenario
+
+Floats = NDArray[np.float64]
+
+PROBLEMS, COUNT, FIRST_SEED = ("hard-30", "hard-60", "jacksboro"), 20, 100
+# Populations of pymoo's algorithms, and the neighbours of MOEA/D: its reference directions are those of 7 partitions.
+POPULATION, PARTITIONS, NEIGHBOURS = 120, 7, 15
+# Weight of violations in MOEA/D's objectives, which are shares of the reference box.
+PENALTY = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What one search came to: hypervolume as a share of the box, plans, evaluations and CPU, s."""
+
+    hypervolume: float
+    plans: int
+    evaluations: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Contest:
+    """A problem as every algorithm sees it.
+
+    ideal, reference: corners (4,) of the box of objectives.
+    """
+
+    task: FrontTask
+    encoding: Encoding
+    ideal: Floats
+    reference: Floats
+
+    def share(self, paths: Floats) -> float:
+        """Hypervolume of paths (n, w, 3) as a share of the box."""
+        if not len(paths):
+            return 0.0
+        objectives = self.task.objectives(self.task.values(paths))
+        scaled = np.maximum(0.0, (objectives - self.ideal) / (self.reference - self.ideal))
+        return hypervolume(scaled, np.ones(4))
+
+    def certified(self, paths: Floats) -> Floats:
+        """The 20 certified and safe paths of some (n, w, 3) that cover most."""
+        safe = [path for path in paths if self._is_safe(path)]
+        if not safe:
+            return paths[:0]
+        kept = np.array(safe)
+        order = covering_order(self.task.objectives(self.task.values(kept)), self.reference, COUNT)
+        return np.asarray(kept[order])
+
+    def _is_safe(self, path: Floats) -> bool:
+        made = certify(self.task.problem, path)
+        return made.ok and made.kill_distance > 0.0
+
+
+def make_contest(name: str, front: Front) -> Contest:
+    """The contest of a problem, in the box about its default plan."""
+    scenario = load_scenario(name)
+    task = front_task(scenario, load_airframe(scenario).limits.surely())
+    space, default = task.problem.space, front.default
+    straight = float(np.sqrt(((space.destination - space.start) ** 2).sum()))
+    ends = np.stack([[end, end] for end in (space.start, space.destination)])
+    highest = float(task.values(ends)[:, 2].min())
+    fourth = default.energy if front.fourth == "energy" else default.time
+    ideal = np.array([straight, 0.0, -highest, fourth * straight / default.length])
+    encoding = ENCODINGS["rotated"](space, scenario.planner.waypoints)
+    return Contest(task, encoding, ideal, front.reference)
+
+
+def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
+    """Our front of a problem, its contest and its row."""
+    scenario = load_scenario(name)
+    limits = load_airframe(scenario).limits.surely()
+    began = time.process_time()
+    front = plan_front(scenario, limits, COUNT, seed=seed)
+    seconds = time.process_time() - began
+    contest = make_contest(name, front)
+    paths = np.array([one.plan.waypoints for one in front.plans])
+    evaluations = front.evaluations + front.default.plan.evaluations
+    return front, contest, Row(contest.share(paths), len(paths), evaluations, seconds)
+
+
+def _box(contest: Contest, seeds: Floats) -> tuple[Floats, Floats]:
+    """The encoding's box; with seeds (n, d), which keep to no intervals, the box of these and of it."""
+    low, high = contest.encoding.lower, contest.encoding.upper
+    if not len(seeds):
+        return low, high
+    return np.minimum(low, seeds.min(axis=0)), np.maximum(high, seeds.max(axis=0))
+
+
+def theirs(
+    contest: Contest, algorithm: str, seed: int, evaluations: int | None, seconds: float | None, seeds: Floats
+) -> Row:
+    """A front by one of pymoo's algorithms, until it has had so many evaluations or so much CPU.
+
+    seeds: vectors (n, d) in its first population.
+    """
+    from pymoo.core.problem import Problem as PymooProblem
+
+    task = contest.task
+    low, high = _box(contest, seeds)
+    penalised = algorithm == "MOEA/D"
+    kept_vectors: list[Floats] = []
+    spent = 0
+
+    class Paths(PymooProblem):
+        def _evaluate(self, x: Floats, out: dict[str, Floats], *_args: object, **_more: object) -> None:
+            nonlocal spent
+            spent += len(x)
+            objectives, violations = task.scores(task.paths(x))
+            scaled = (objectives - contest.ideal) / (contest.reference - contest.ideal)
+            scaled = np.nan_to_num(scaled, nan=1e6, posinf=1e6, neginf=-1.0)
+            met = (violations <= 0.0).all(axis=1)
+            kept_vectors.extend(x[met & (objectives < contest.reference).all(axis=1)])
+            out["F"] = scaled + PENALTY * violations.sum(axis=1, keepdims=True) if penalised else scaled
+            if not penalised:
+                out["G"] = violations
+
+    problem = Paths(n_var=low.size, n_obj=4, n_ieq_constr=0 if penalised else 5, xl=low, xu=high)
+    engine = _engine(algorithm, seeds, low, high, seed)
+    began = time.process_time()
+    engine.setup(problem, termination=("n_eval", 10**9), seed=seed, verbose=False)
+    while (evaluations is None or spent < evaluations) and (seconds is None or time.process_time() - began < seconds):
+        engine.next()
+    took = time.process_time() - began
+    # What it has seen at all that meets the constraints counts, which is more than its last population.
+    if not kept_vectors:
+        return Row(0.0, 0, spent, took)
+    paths = _thinned(contest, np.array(kept_vectors))
+    chosen = contest.certified(paths)
+    return Row(contest.share(chosen), len(chosen), spent, took)
+
+
+def _thinned(contest: Contest, vectors: Floats) -> Floats:
+    """The paths of vectors (n, d) that cover most, five times as many as are wanted."""
+    paths = contest.task.paths(vectors[-20_000:])
+    objectives = contest.task.objectives(contest.task.values(paths))
+    chosen: list[int] = []
+    # In parts, whose tables fit the memory.
+    for first in range(0, len(paths), 2000):
+        chosen += (first + covering_order(objectives[first : first + 2000], contest.reference, 5 * COUNT)).tolist()
+    order = covering_order(objectives[chosen], contest.reference, 5 * COUNT)
+    return np.asarray(paths[np.array(chosen)[order]])
+
+
+def _engine(algorithm: str, seeds: Floats, low: Floats, high: Floats, seed: int) -> Any:
+    """One of pymoo's algorithms, ready to be set up."""
+    from pymoo.algorithms.moo.moead import MOEAD
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.util.ref_dirs import get_reference_directions
+
+    if algorithm == "MOEA/D":
+        return MOEAD(get_reference_directions("uniform", 4, n_partitions=PARTITIONS), n_neighbors=NEIGHBOURS)
+    first = np.random.default_rng(seed).uniform(low, high, (POPULATION, low.size))
+    first[: min(POPULATION, len(seeds))] = seeds[:POPULATION]
+    return NSGA2(pop_size=POPULATION, sampling=first)
+
+
+def measure(name: str, seeds: range, *, whole: bool) -> dict[str, Any]:
+    """All algorithms on a problem; prints a line a seed and the medians."""
+    print(f"\n{name}: hypervolume as a share of the box; CPU s")
+    record: dict[str, list[dict[str, Any]]] = {}
+    for seed in seeds:
+        rows, front = _rows(name, seed, whole=whole)
+        mine = rows["planfly"]
+        for key, row in rows.items():
+            record.setdefault(key, []).append(asdict(row))
+        text = "  ".join(f"{key}: {row.hypervolume:.4f}" for key, row in rows.items())
+        spent = f"{mine.evaluations} evaluations, {mine.seconds:.1f} s"
+        print(f"  seed {seed}: {len(front.plans)} plans, {spent};  {text}", flush=True)
+    _sum_up(record)
+    return record
+
+
+def _rows(name: str, seed: int, *, whole: bool) -> tuple[dict[str, Row], Front]:
+    """What each algorithm came to on a problem with one seed, and our front."""
+    front, contest, mine = ours(name, seed)
+    own = contest.task.vectors(np.array(list(seed_paths(contest.task, np.array(front.default.plan.waypoints)))))
+    start = contest.certified(contest.task.paths(own))
+    rows = {"planfly": mine, "our seeds alone": Row(contest.share(start), len(start), len(own), 0.0)}
+    for algorithm in ("NSGA-II", "MOEA/D"):
+        rows[f"{algorithm}, equal CPU"] = theirs(contest, algorithm, seed, None, mine.seconds, own[:0])
+        if algorithm == "NSGA-II" or whole:
+            rows[f"{algorithm}, equal evaluations"] = theirs(contest, algorithm, seed, mine.evaluations, None, own[:0])
+    rows["NSGA-II from our seeds, equal CPU"] = theirs(contest, "NSGA-II", seed, None, mine.seconds, own)
+    return rows, front
+
+
+def _sum_up(record: dict[str, list[dict[str, Any]]]) -> None:
+    """Print medians, and ours over each."""
+    own_share = np.array([row["hypervolume"] for row in record["planfly"]])
+    for key, found in record.items():
+        shares = np.array([row["hypervolume"] for row in found])
+        none_found = int((shares == 0.0).sum())
+        middle = float(np.median(shares))
+        ratio = f"{np.median(own_share) / middle:.2f}" if middle > 0.0 else "no front to divide by"
+        seconds = np.median([row["seconds"] for row in found])
+        print(
+            f"  {key:<36} median {middle:.4f}, least {shares.min():.4f}; ours / this {ratio};"
+            f" {none_found} of {len(shares)} without a plan; CPU {seconds:.1f} s"
+        )
+
+
+def main() -> None:
+    """Measure every problem."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.planning.fronts")
+    parser.add_argument("--problems", default=",".join(PROBLEMS))
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--from", dest="first", type=int, default=FIRST_SEED)
+    parser.add_argument("--whole", action="store_true", help="MOEA/D at equal evaluations, too: half a minute a seed")
+    parser.add_argument("--json", type=Path, help="file for the rows")
+    args = parser.parse_args()
+    seeds = range(args.first, args.first + args.seeds)
+    record = {name: measure(name, seeds, whole=args.whole) for name in args.problems.split(",")}
+    if args.json:
+        args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

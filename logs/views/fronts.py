@@ -1,0 +1,99 @@
+"""A front of plans: all of them from above, and what each gains for its length."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from logs.views.charts import Chart, Label, Layer, Panel
+from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_map
+from planner.search.plan_front import Front
+
+_WATT_HOUR = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """The best plan in one objective: its number from 0, what it is called, and its role."""
+
+    row: int
+    name: str
+    role: str
+
+
+def _named(front: Front) -> list[_Named]:
+    """The best plan in each objective; one that is best in two is named once, for the first."""
+    rows = front.objectives()
+    names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")
+    roles = ("front-shortest", "front-unseen", "front-high", "front-sparing")
+    found: dict[int, _Named] = {}
+    for k, (name, role) in enumerate(zip(names, roles, strict=True)):
+        if np.ptp(rows[:, k]) > 0.0 or k == 0:
+            row = int(np.argmin(rows[:, k]))
+            found.setdefault(row, _Named(row, name, role))
+    return list(found.values())
+
+
+def front_map(front: Front) -> MapChart:
+    """All plans of a front with at least one from above; the best in each objective stand out, with their numbers."""
+    scenario, named = front.plans[0].plan.scenario, _named(front)
+    marked = {one.row for one in named}
+    layers, labels = [], []
+    for row, one in enumerate(front.plans):
+        if row not in marked:
+            path = one.plan.waypoints
+            layers.append(Layer("line", "other plans", "front-other", path[:, 0], path[:, 1], quiet=True))
+    for best in named:
+        path = front.plans[best.row].plan.waypoints
+        name = f"{best.row + 1}: {best.name}"
+        layers.append(Layer("line", name, best.role, path[:, 0], path[:, 1], quiet=True))
+        middle = path[len(path) // 2]
+        labels.append(Label(str(best.row + 1), float(middle[0]), float(middle[1]), "number", best.role))
+    ways = [one.plan.waypoints for one in front.plans]
+    shortest = ways[0]
+    return world_map(
+        scenario,
+        f"front of {len(ways)} plans from above",
+        layers,
+        [*labels, *end_labels(scenario, None)],
+        map_extent(scenario, None, ways),
+        route=shortest,
+        winds=(NamedWind(scenario.wind),),
+    )
+
+
+def front_chart(front: Front) -> Chart:
+    """Exposure, height above ground, and energy or time of each plan over its length."""
+    named, plans = _named(front), front.plans
+    along = np.array([one.length for one in plans]) / 1e3
+    rest = np.setdiff1d(np.arange(len(plans)), [one.row for one in named])
+    columns = [
+        ("exposure to radars", "s", np.array([one.exposure for one in plans])),
+        ("height above ground", "m", np.array([one.clearance for one in plans])),
+        ("energy", "Wh", np.array([one.energy for one in plans]) / _WATT_HOUR),
+        ("time of flight", "s", np.array([one.time for one in plans])),
+    ]
+    panels = []
+    for title, unit, values in columns:
+        layers = [Layer("dots", "other plans", "front-other", along[rest], values[rest])]
+        layers += [
+            Layer("dots", f"{one.row + 1}: {one.name}", one.role, along[[one.row]], values[[one.row]]) for one in named
+        ]
+        labels = tuple(
+            Label(str(row + 1), float(along[row]), float(values[row]), "number")
+            for row in [*(one.row for one in named), *rest]
+            if math.isfinite(values[row])
+        )
+        panels.append(Panel(title, unit, tuple(layers), min_span=1e-3, labels=labels))
+    margin = 0.03 * max(float(np.ptp(along)), 1e-3)
+    reach = (float(along.min()) - margin, float(along.max()) + margin)
+    name = plans[0].plan.scenario.name
+    return Chart(
+        f"{name}: what each plan of the front gains for its length",
+        "length",
+        "km",
+        tuple(panels),
+        reach=reach,
+        tall=220,
+        inches=1.9,
+    )

@@ -1,0 +1,144 @@
+"""A front of plans: planned, and written as plans, a table and pictures."""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from planfly.airframe import choose_seed, laid_from_the_ground, load_airframe
+from planfly.api.planning import Wind, changed_scenario, opened_scenario, stop_condition
+from planfly.arguments import RANGES, check_arguments
+from planfly.first_start import with_warm_up
+from planfly.kernel_units.unit_kernels import PLANNING
+from planfly.stages import stage
+from planfly.targets import RUN_FOLDER, clean_folder, filled_pattern
+from planner.plan import plan_json
+from planner.search.plan_front import Front, FrontPlan
+from planner.search.plan_front import plan_front as find_front
+from world.files import write_whole
+from world.scenario import Scenario
+from world.scenario_tables import Guidance, Navigation
+
+# Where a front goes that nobody named a place for.
+FRONT_FOLDER = f"{RUN_FOLDER}-front"
+TABLE_SCHEMA = "planfly.front/1"
+WATT_HOUR = 3600.0
+COLUMNS = ("plan", "length_m", "exposure_s", "clearance_m", "energy_wh", "time_s")
+PICTURES = ("front-map.png", "front-values.png")
+FRONT_FILES = (
+    *(f"plan-{number}.json" for number in range(1, int(RANGES["front"].high) + 1)),
+    *("front.csv", "front.json", *PICTURES),
+)
+
+
+@with_warm_up(*PLANNING)
+def plan_front(
+    scenario: Scenario | str | Path,
+    count: int = 20,
+    *,
+    seed: int | None = None,
+    seconds: float | None = None,
+    wind: Wind | None = None,
+    turbulence: str | None = None,
+    at: str | None = None,
+    aircraft: str | Path | None = None,
+    airspeed: float | None = None,
+    params: str | Path | None = None,
+    guidance: Guidance | None = None,
+    autopilot_law: str | None = None,
+    nav: Navigation | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = True,
+    stop: Callable[[], bool] | None = None,
+) -> Front:
+    """Plan a choice of ways: plans of which none is better than another in all of what they are compared by.
+
+    They are compared by length, exposure to radars, least height above ground, and energy; by time in place of energy
+    where the scenario's ``[planner] objective`` is "time" or the aircraft's power is not known.  Each has its own
+    certificate and is safe.  There may be fewer than asked for; where no safe plan is found there is none.
+
+    count: plans at most, 2 to 100.
+    out: a folder for plan-1.json, plan-2.json, ..., the shortest first, their table as front.csv and front.json, and
+    two pictures; {name} and {seed} in it stand for the scenario's name and the seed.
+    The other keywords are as of `planfly.plan`.
+
+    >>> import planfly
+    >>> front = planfly.plan_front("tight", 3, seed=1)
+    >>> 1 <= len(front.plans) <= 3, all(one.plan.safe for one in front.plans)
+    (True, True)
+    """
+    change = partial(
+        changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft, airspeed=airspeed, params=params,
+        guidance=guidance, autopilot_law=autopilot_law, nav=nav,
+    )  # fmt: skip
+    check_arguments(front=count, seed=seed, seconds=seconds)
+    world = change(opened_scenario(scenario))
+    number = choose_seed(world, seed)
+    airframe = load_airframe(world)
+    folder = None
+    if out is not None:
+        folder = clean_folder(filled_pattern(out, world.name, number), FRONT_FILES, overwrite=overwrite)
+    with stage(f"planning a front of {world.name}", "planning a front") as advance:
+        found = find_front(
+            world,
+            airframe.limits.surely(),
+            count,
+            seed=number,
+            progress=advance,
+            stop=stop_condition(seconds, stop),
+            finish=lambda plan: laid_from_the_ground(plan, airframe),
+        )
+    if folder is not None:
+        _write(found, world, folder)
+    return found
+
+
+def _write(front: Front, world: Scenario, folder: Path) -> None:
+    """Write plans, tables and pictures; of a front without plans the empty tables alone."""
+    for number, one in enumerate(front.plans, 1):
+        write_whole(folder / f"plan-{number}.json", plan_json(one.plan))
+    rows = table_rows(front)
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(COLUMNS)
+    table.writerows([["" if value is None else value for value in row.values()] for row in rows])
+    write_whole(folder / "front.csv", text.getvalue())
+    data = {
+        "schema": TABLE_SCHEMA,
+        "scenario": world.name,
+        "objectives": [
+            "length_m",
+            "exposure_s",
+            "clearance_m",
+            f"{front.fourth}_{'s' if front.fourth == 'time' else 'wh'}",
+        ],
+        "default": {key: value for key, value in _row(0, front.default).items() if key != "plan"},
+        "plans": [row | {"file": f"plan-{row['plan']}.json"} for row in rows],
+    }
+    write_whole(folder / "front.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
+    if front.plans:
+        # Imported here: matplotlib takes most of a second.
+        from logs.views.draw_map import draw_map
+        from logs.views.drawing import draw_chart, png_bytes
+        from logs.views.fronts import front_chart, front_map
+
+        write_whole(folder / PICTURES[0], png_bytes(draw_map(front_map(front))))
+        write_whole(folder / PICTURES[1], png_bytes(draw_chart(front_chart(front))))
+
+
+def table_rows(front: Front) -> list[dict[str, Any]]:
+    """Rows of a front's table, by `COLUMNS`; None for energy that is not known."""
+    return [_row(number, one) for number, one in enumerate(front.plans, 1)]
+
+
+def _row(number: int, one: FrontPlan) -> dict[str, Any]:
+    values = (one.length, one.exposure, one.clearance, one.energy / WATT_HOUR, one.time)
+    digits = (1, 3, 2, 3, 2)
+    rounded = [
+        round(value, places) if math.isfinite(value) else None for value, places in zip(values, digits, strict=True)
+    ]
+    return dict(zip(COLUMNS, (number, *rounded), strict=True))

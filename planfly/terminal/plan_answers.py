@@ -1,0 +1,121 @@
+"""What ``planfly plan`` answers with ``--json``, and how it prints a front."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from pydantic.dataclasses import dataclass
+
+from planfly.terminal.verdict_answers import STRICT, ConditionsDocument
+
+if TYPE_CHECKING:
+    from planner.search.plan_front import Front
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class PlanAnswer:
+    """planfly plan: the plan file, and what it comes to."""
+
+    schema: Literal["planfly.plan-answer/1"] = "planfly.plan-answer/1"
+    exit_code: int
+    scenario: str
+    seed: int
+    file: str
+    safe: bool
+    feasible: bool
+    waypoints: int
+    length_ratio: float
+    """Length over that of the straight line."""
+    algorithm: str
+    evaluations: int
+    ended: str
+    """completed, budget or interrupted."""
+    problems: list[str]
+    """What of the plan is not feasible."""
+    conditions: ConditionsDocument
+    """What it is for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class FrontEntry:
+    """One plan of a front, and what it is compared by."""
+
+    file: str
+    length_m: float
+    exposure_s: float
+    """To radars: the density of detection over the time of flight."""
+    clearance_m: float
+    """Least height above ground."""
+    energy_wh: float | None
+    """Null where the aircraft's power is not known."""
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class FrontAnswer:
+    """planfly plan --front: the plans, the shortest first; none where there is no safe plan."""
+
+    schema: Literal["planfly.front-answer/1"] = "planfly.front-answer/1"
+    exit_code: int
+    scenario: str
+    seed: int
+    folder: str
+    fourth: Literal["energy", "time"]
+    """What they are compared by beside length, exposure and clearance."""
+    plans: list[FrontEntry]
+    problems: list[str]
+    """Why there is no plan."""
+    conditions: ConditionsDocument
+    """What they are for."""
+
+
+PlanDocument = PlanAnswer | FrontAnswer
+
+
+def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
+    """The answer of a front in a folder."""
+    from planfly.api.fronts import table_rows
+    from planfly.api.planning import conditions_of_plan
+    from planfly.terminal.verdict_answers import conditions_document
+
+    default = front.default.plan
+    entries = []
+    for row in table_rows(front):
+        number = row.pop("plan")
+        entries.append(FrontEntry(file=str(folder / f"plan-{number}.json"), **row))
+    return FrontAnswer(
+        exit_code=code,
+        scenario=default.scenario.name,
+        seed=default.seed,
+        folder=str(folder),
+        fourth="time" if front.fourth == "time" else "energy",
+        plans=entries,
+        problems=[] if front.plans else list(default.certificate.problems),
+        conditions=conditions_document(conditions_of_plan(default)),
+    )
+
+
+def front_lines(front: "Front", folder: Path) -> list[str]:
+    """A front on the terminal: a line a plan, and what was written."""
+    from logs.verdict.conditions import autopilot_line, condition_lines
+    from planfly.api.fronts import PICTURES
+    from planfly.api.planning import conditions_of_plan
+
+    default = front.default.plan
+    if not front.plans:
+        reasons = [f"  failed  {problem}" for problem in default.certificate.problems]
+        return ["no safe plan, so no front", *reasons, f"front     {folder}/ (front.csv, front.json)"]
+    conditions = conditions_of_plan(default)
+    lines = [
+        f"front of {len(front.plans)} safe plans, none better than another in length, exposure, height above ground "
+        f"and {front.fourth} at once",
+        *condition_lines(conditions),
+        autopilot_line(conditions, flown=False),
+        "  plan   length km  exposure s  above ground m  energy Wh   time s",
+    ]
+    for number, one in enumerate(front.plans, 1):
+        energy = f"{one.energy / 3600.0:11.2f}" if math.isfinite(one.energy) else "          -"
+        values = f"{one.length / 1e3:>12.3f}{one.exposure:>12.2f}{one.clearance:>16.1f}{energy}{one.time:>9.1f}"
+        lines.append(f"  {number:>4}{values}")
+    names = f"plan-1.json ... plan-{len(front.plans)}.json" if len(front.plans) > 1 else "plan-1.json"
+    return [*lines, f"front     {folder}/ ({names}, front.csv, front.json, {', '.join(PICTURES)})"]

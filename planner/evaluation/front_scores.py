@@ -1,0 +1,103 @@
+"""What the plans of a front are compared by: length, exposure to radars, height above ground, time and energy.
+
+Exposure is the paper's detection density (eq. 10 of Yang, Tang and Lozano, CEC 2014), integrated over the time of
+flight in the mean wind: seconds at full density. The least height above ground is that at samples of each leg.
+"""
+
+import math
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.evaluation.problem import ProblemArrays
+from planner.evaluation.travel_cost import LENGTH, TravelCost, leg_cost
+from world.frames import polymap
+from world.geometry import window_exposure
+from world.kernels import Record, compiled, inner
+from world.terrain import pixel_height
+
+Floats = NDArray[np.float64]
+
+_LENGTH, _EXPOSURE, _CLEARANCE, _TIME, _ENERGY = range(5)
+SECONDS = LENGTH._replace(length=0.0, time=1.0)
+
+
+class Value(IntEnum):
+    """Columns of a path's values."""
+
+    LENGTH = 0
+    EXPOSURE = 1
+    CLEARANCE = 2
+    TIME = 3
+    ENERGY = 4
+
+
+def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) -> Floats:
+    """Values (n, 5) of paths (n, w, 3) by `Value`: m, s, m, s, J; energy NaN where `energy` is None.
+
+    energy: the cost of energy, with whatever weight (`make_travel_cost`).
+    """
+    out = np.zeros((len(paths), len(Value)))
+    joules = SECONDS if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
+    _fill(data, SECONDS, joules, np.ascontiguousarray(paths), out)
+    if energy is None:
+        out[:, Value.ENERGY] = np.nan
+    return out
+
+
+@compiled
+def _fill(
+    data: ProblemArrays, of_time: TravelCost, joules: TravelCost, paths: Floats, out: Floats
+) -> None:  # pragma: no cover - compiled
+    for n in range(paths.shape[0]):
+        path = paths[n]
+        lowest = math.inf
+        for i in range(path.shape[0] - 1):
+            a, b = path[i], path[i + 1]
+            dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+            seconds = leg_cost(of_time, data.aircraft, a, b)
+            out[n, _LENGTH] += math.sqrt(dx * dx + dy * dy + dz * dz)
+            out[n, _EXPOSURE] += seconds * _detection(data, a, dx, dy, dz)
+            lowest = min(lowest, _lowest(data, a, dx, dy, dz))
+            out[n, _TIME] += seconds
+            out[n, _ENERGY] += leg_cost(joules, data.aircraft, a, b)
+        out[n, _CLEARANCE] = lowest
+
+
+@inner
+def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:  # pragma: no cover - compiled
+    """Mean detection density along the leg d from a."""
+    total, length2 = 0.0, dx * dx + dy * dy + dz * dz
+    if length2 < 1e-12:
+        return 0.0
+    for k in range(data.threats.shape[0]):
+        unit: Record = data.threats[k]
+        radius = unit.detection_radius
+        if radius <= 0.0:
+            continue
+        x, y, z = a[0] - unit.east, a[1] - unit.north, a[2] - unit.up
+        along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
+        middle = -along / length2
+        inside = middle * middle - (start2 - radius * radius) / length2
+        if inside <= 0.0:
+            continue
+        half = math.sqrt(inside)
+        enter, leave = max(0.0, middle - half), min(1.0, middle + half)
+        if leave > enter:
+            total += window_exposure(enter, leave, length2, along, start2, unit.detection_scale)
+    return total
+
+
+@inner
+def _lowest(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:  # pragma: no cover - compiled
+    """Least height above ground at samples of the leg d from a, m; -inf off the terrain."""
+    count = 1 + int(math.sqrt(dx * dx + dy * dy) / data.sample_pitch)
+    lowest = math.inf
+    for k in range(count + 1):
+        share = k / count
+        column, row = polymap(data.to_pixel, a[0] + share * dx, a[1] + share * dy)
+        height = a[2] + share * dz - pixel_height(data.heights, column, row)
+        if not height >= lowest:
+            lowest = -math.inf if math.isnan(height) else height
+    return lowest

@@ -1,0 +1,361 @@
+"""A front of plans: none of them is better than another in length, exposure, clearance and time or energy at once.
+
+An estimation of distribution finds them (`planner.optimisers.front_sampling`), over the coordinates along, across and
+up of all waypoints in the rotated frame. It starts from the planner's own paths: the default plan, and routes past the
+obstacles, shortened for various preferences, each a bound or a cost that shortening knows: more height above ground,
+more distance from radars, and time or energy in place of length. All paths meet the graded constraints of a search, and
+every plan of the front has its own certificate.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from planner.airspace.zone_limits import is_limited
+from planner.evaluation.certify import certify
+from planner.evaluation.encoding import RotatedFrame, rotated_frame
+from planner.evaluation.front_scores import Value, front_values
+from planner.evaluation.graded_scores import graded_scores
+from planner.evaluation.paper_scores import paper_scores
+from planner.evaluation.problem import Problem, ProblemArrays, make_problem, threat_records
+from planner.evaluation.threat_index import make_missile_index
+from planner.evaluation.travel_cost import TravelCost, energy_cost, time_cost
+from planner.optimisers.front_sampling import FrontSampling
+from planner.optimisers.hypervolume import covering_order
+from planner.plan import Objective, Plan
+from planner.search.algorithms import find_algorithm, limits_for
+from planner.search.plan_path import plan_path
+from planner.search.search_state import SearchProgress, StopCondition
+from planner.seeding.first_samples import bridge_modes
+from planner.seeding.shortening import resample, shorten_path
+from planner.seeding.side_routes import optimistic_grid, side_routes
+from world.random_streams import PLANNER, stream
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+# Preferences of the seeds: shares of the height above ground that the fixed ends allow, and shares of the radars'
+# reach that are kept out of.
+CLEARANCE_SHARES, RADAR_SHARES = (0.0, 0.25, 0.5, 0.75, 0.95), (0.0, 0.35, 0.5, 0.65, 0.8, 1.0)
+# Routes past the obstacles that are tried for each preference beside the default plan's: grids as of
+# `planner.search.seeds`.
+STAGES, SPREAD, RATIO, SHRINK, MAX_ROUTES, SLACK = 50, 0.2, 1.0 / 3.0, 0.3, 3, 1.25
+# Solutions that the search keeps, samples of a generation, and generations.
+ARCHIVE, POPULATION, GENERATIONS = 160, 120, 200
+# Largest deviations of the noise: a whole path's along, across and up, as shares of an interval, of the straight line
+# and of the height range.
+ALONG, ACROSS, UP = 0.3, 0.1, 0.3
+# Values beyond these do not count: length and time or energy by those of the default plan, and exposure by its own.
+MOST_LENGTH, MOST_EXPOSURE = 1.5, 1.5
+# Exposure that counts where the default plan has less, s.
+LEAST_EXPOSURE = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class FrontPlan:
+    """One plan of a front, and its values in SI units: m, s, m, s, J (NaN where the aircraft's power is unknown)."""
+
+    plan: Plan
+    length: float
+    exposure: float
+    clearance: float
+    time: float
+    energy: float
+
+
+@dataclass(frozen=True, slots=True)
+class Front:
+    """Plans none of which is better than another in every objective, the shortest first.
+
+    fourth: what the fourth objective is, beside length, exposure and clearance: "time" or "energy".
+    default: the shortest plan that the planner finds alone, and its values.
+    reference: (4,) values beyond which a plan does not count, clearance negated.
+    evaluations: paths evaluated, beside the default plan's.
+    """
+
+    plans: tuple[FrontPlan, ...]
+    fourth: str
+    default: FrontPlan
+    reference: Floats
+    evaluations: int
+
+    def objectives(self) -> Floats:
+        """Objectives (n, 4) of the plans, all smaller is better."""
+        return np.array([_row(one, self.fourth) for one in self.plans]).reshape(-1, 4)
+
+
+def _row(one: FrontPlan, fourth: str) -> list[float]:
+    return [one.length, one.exposure, -one.clearance, one.time if fourth == "time" else one.energy]
+
+
+def plan_front(
+    scenario: Scenario,
+    limits: Limits,
+    count: int,
+    *,
+    seed: int,
+    progress: SearchProgress | None = None,
+    stop: StopCondition | None = None,
+    finish: Callable[[Plan], Plan] = lambda plan: plan,
+    generations: int = GENERATIONS,
+) -> Front:
+    """Up to `count` plans of a front; none where the default planner finds no safe plan.
+
+    The fourth objective is energy; time where the scenario asks for time or the aircraft's power is unknown.
+    finish: completes a plan, as with ways from the ground; only plans that are safe after it are taken.
+    The same scenario, limits, count and seed give the same front.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> front = plan_front(scenario, load_airframe(scenario).limits, 4, seed=1, generations=5)
+    >>> len(front.plans), all(one.plan.safe for one in front.plans)
+    (4, True)
+    """
+    task = front_task(scenario, limits)
+    default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
+    first = _valued(task, default)
+    reference = reference_point(task, first)
+    if not default.safe:
+        return Front((), task.fourth, first, reference, 0)
+    search, evaluations = _search(
+        task, default.waypoints, reference, stream(seed, PLANNER), progress, stop, generations
+    )
+    plans = _certified(task, search, count - 1, replace(default, evaluations=evaluations), finish)
+    ordered = sorted(_undominated([first, *plans], task.fourth), key=lambda one: one.length)
+    return Front(tuple(ordered), task.fourth, first, reference, evaluations)
+
+
+# --- The problem ---
+
+
+class FrontTask(NamedTuple):
+    """A problem with several objectives.
+
+    scored: with margins between those of a search and those of the certificate: shortening ends at a search's margins,
+        give or take what a certificate forgives.
+    frame: in which waypoints are sampled. energy: cost of energy, None where power is unknown.
+    fourth: "time" or "energy". travel: the cost of this fourth objective.
+    """
+
+    problem: Problem
+    scored: ProblemArrays
+    frame: RotatedFrame
+    energy: TravelCost | None
+    fourth: str
+    travel: TravelCost
+
+    def values(self, paths: Floats) -> Floats:
+        """Values (n, 5) of paths (n, w, 3)."""
+        return front_values(self.problem.search, self.energy, paths)
+
+    def scores(self, paths: Floats) -> tuple[Floats, Floats]:
+        """Objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles."""
+        violations, graded = graded_scores(self.scored, paths)
+        kill = graded[:, Objective.KILL_EXPOSURE, None]
+        return self.objectives(self.values(paths)), np.concatenate([violations, kill], axis=1)
+
+    def objectives(self, values: Floats) -> Floats:
+        """Objectives (n, 4) of values (n, 5): length, exposure, clearance negated, and time or energy."""
+        fourth = Value.TIME if self.fourth == "time" else Value.ENERGY
+        out = values[:, [Value.LENGTH, Value.EXPOSURE, Value.CLEARANCE, fourth]]
+        out[:, 2] *= -1.0
+        return np.asarray(out)
+
+    def vectors(self, paths: Floats) -> Floats:
+        """Waypoints between the ends in the rotated frame, (n, 3 (w - 2)), of paths (n, w, 3)."""
+        return np.asarray(self.frame.rotate(paths[:, 1:-1]).reshape(len(paths), -1))
+
+    def paths(self, vectors: Floats) -> Floats:
+        """Paths (n, w, 3) of vectors (n, 3 (w - 2))."""
+        data, count = self.problem.search, len(vectors)
+        inside = self.frame.restore(vectors.reshape(count, -1, 3))
+        ends = [np.broadcast_to(end, (count, 1, 3)) for end in (data.start, data.destination)]
+        return np.ascontiguousarray(np.concatenate([ends[0], inside, ends[1]], axis=1))
+
+
+def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
+    """The problem of a scenario with several objectives, with the margins of the default planner's search."""
+    chosen = find_algorithm(None, scenario.name)
+    problem = make_problem(scenario, limits_for(chosen, limits))
+    table = problem.search.aircraft
+    energy = energy_cost(limits.envelope, table)
+    by_energy = energy is not None and scenario.planner.objective != "time"
+    travel = energy if energy is not None and by_energy else time_cost(table)
+    frame = rotated_frame(problem.space.start, problem.space.destination)
+    search, certified = problem.search, problem.certified
+    scored = search._replace(
+        buffer=0.5 * (search.buffer + certified.buffer),
+        start_buffer=0.5 * (search.start_buffer + certified.start_buffer),
+        destination_buffer=0.5 * (search.destination_buffer + certified.destination_buffer),
+        kill_margin=0.5 * (search.kill_margin + certified.kill_margin),
+    )
+    return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)
+
+
+def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
+    """Objectives (4,) beyond which a plan does not count.
+
+    1.5 times the default plan's length, exposure and time or energy, and the required clearance.
+    """
+    length, exposure, _, fourth = _row(default, task.fourth)
+    most = max(LEAST_EXPOSURE, MOST_EXPOSURE * exposure)
+    required = -task.problem.certified.clearance
+    return np.array([MOST_LENGTH * length, most, required, MOST_LENGTH * fourth])
+
+
+def _valued(task: FrontTask, plan: Plan) -> FrontPlan:
+    """A plan with its values; its clearance is that of the certificate."""
+    row = task.values(np.array(plan.waypoints)[None])[0]
+    required = task.problem.certified.clearance
+    clearance = plan.certificate.clearance + required
+    return FrontPlan(plan, row[Value.LENGTH], row[Value.EXPOSURE], clearance, row[Value.TIME], row[Value.ENERGY])
+
+
+# --- Seeds ---
+
+
+def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
+    """Paths (w, 3) for various preferences, from the default plan's path (w, 3) and from routes past the obstacles."""
+    yield default
+    count = len(default)
+    routes = [default, *(resample(route, count) for route in _routes(task, default))]
+    for wanted in _preferences(task):
+        for route in routes:
+            path, _ = shorten_path(wanted, route)
+            # Again from equal legs, as the default plan's.
+            path, _ = shorten_path(wanted, resample(path, count))
+            yield path
+
+
+def _routes(task: FrontTask, default: Floats) -> list[Floats]:
+    """Routes (k, 3) on other sides of the obstacles; none among zones, which they do not know."""
+    data, frame = task.problem.search, task.frame
+    if is_limited(data.airspace):
+        return []
+    half = 0.5 * SLACK * frame.length
+    grid = optimistic_grid(data, frame, (-half, half), STAGES, shrink=SHRINK, spread=SPREAD, ratio=RATIO)
+    bound = SLACK * float(np.sqrt((np.diff(default, axis=0) ** 2).sum(axis=1)).sum())
+    return [frame.restore(route.points) for route in side_routes(data, frame, grid, bound, MAX_ROUTES)]
+
+
+def _preferences(task: FrontTask) -> Iterator[ProblemArrays]:
+    """The problem with more clearance required, with radars kept out of, and with another cost."""
+    data, scenario = task.problem.search, task.problem.scenario
+    at_ends = np.stack([[end, end] for end in (data.start, data.destination)])
+    spare = max(0.0, float(task.values(at_ends)[:, Value.CLEARANCE].min()) - data.clearance)
+    radars = RADAR_SHARES if (scenario.threats.detection_radius > 0.0).any() else RADAR_SHARES[:1]
+    for radar in radars:
+        units = threat_records(scenario.threats).copy()
+        units["kill_radius"] = np.maximum(units["kill_radius"], radar * units["detection_radius"])
+        index = make_missile_index(units)
+        for share in CLEARANCE_SHARES:
+            more = max(data.buffer, share * spare)
+            stricter = data._replace(missiles=index, buffer=more)
+            yield stricter
+            yield stricter._replace(travel=task.travel)
+
+
+# --- The search ---
+
+
+def _search(
+    task: FrontTask,
+    default: Floats,
+    reference: Floats,
+    rng: np.random.Generator,
+    progress: SearchProgress | None,
+    stop: StopCondition | None,
+    generations: int,
+) -> tuple[FrontSampling, int]:
+    """Sample from the seeds on; the search, and the number of paths evaluated."""
+    search = make_sampling(task, len(default), reference, rng)
+    seeds = np.array(list(seed_paths(task, np.array(default))))
+    search.tell(task.vectors(seeds), *task.scores(seeds))
+    evaluations = len(seeds)
+    for generation in range(generations):
+        if len(search.vectors) == 0 or (stop is not None and stop()):
+            break
+        vectors = search.ask()
+        search.tell(vectors, *task.scores(task.paths(vectors)))
+        evaluations += len(vectors)
+        if progress is not None:
+            progress(generation + 1, generations, f"{len(search.vectors)} paths that no other dominates")
+    return search, evaluations
+
+
+def make_sampling(task: FrontTask, waypoints: int, reference: Floats, rng: np.random.Generator) -> FrontSampling:
+    """The estimation of distribution for paths of so many waypoints."""
+    data, frame, inner = task.problem.search, task.frame, waypoints - 2
+    corners = np.array([[x, y, 0.0] for x in (data.west, data.east) for y in (data.south, data.north)])
+    rotated = frame.rotate(corners)
+    low = np.array([rotated[:, 0].min(), rotated[:, 1].min(), data.floor])
+    high = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
+    scales = np.array([ALONG * frame.length / (inner + 1), ACROSS * frame.length, UP * (high[2] - low[2])])
+    return FrontSampling(
+        np.tile(low, inner), np.tile(high, inner), directions(inner, scales), reference, ARCHIVE, POPULATION, rng
+    )
+
+
+def directions(inner: int, scales: Floats) -> Floats:
+    """Directions (k, 3 inner) of the noise: smooth modes of the whole path, and bumps of one to four waypoints.
+
+    scales: (3,) largest deviations along, across and up.
+    """
+    modes, deviations = bridge_modes(inner)
+    waves = (modes * deviations / np.abs(modes[:, 0]).max()).T
+    bumps = [
+        np.where((np.arange(inner) >= begin) & (np.arange(inner) < begin + width), 1.0, 0.0)
+        for width in (1, 2, 4)
+        for begin in range(max(1, inner - width + 1))
+    ]
+    shapes = np.array([*waves, *bumps])
+    out = np.zeros((len(shapes), 3, inner, 3))
+    for axis in range(3):
+        out[:, axis, :, axis] = shapes * scales[axis]
+    return out.reshape(3 * len(shapes), 3 * inner)
+
+
+def _certified(
+    task: FrontTask, search: FrontSampling, count: int, template: Plan, finish: Callable[[Plan], Plan]
+) -> list[FrontPlan]:
+    """Plans of the solutions that cover most, each certified and completed; one that is not safe is passed over."""
+    found: list[FrontPlan] = []
+    left = np.arange(len(search.vectors))
+    while left.size and len(found) < count:
+        order = covering_order(search.objectives[left], search._reference, count - len(found))
+        if not order.size:
+            break
+        for row in left[order]:
+            path = task.paths(search.vectors[row][None])[0]
+            plan = finish(_plan(task, path, template))
+            if plan.safe:
+                found.append(_valued(task, plan))
+        left = np.setdiff1d(left, left[order])
+    return found
+
+
+def _undominated(found: list[FrontPlan], fourth: str) -> list[FrontPlan]:
+    """The plans that no other is better than, by the values of their certificates; of equal ones the first."""
+    rows = np.array([_row(one, fourth) for one in found])
+    order = np.arange(len(rows))
+    less = (rows[:, None] < rows[None]).any(axis=2) | (order[:, None] < order)
+    below = (rows[:, None] <= rows[None]).all(axis=2) & less
+    beaten = np.asarray(below.any(axis=0)).tolist()
+    return [one for one, worse in zip(found, beaten, strict=True) if not worse]
+
+
+def _plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
+    counts, objectives = paper_scores(task.problem.certified, path[None])
+    return replace(
+        template,
+        waypoints=path,
+        violations=counts[0],
+        objectives=objectives[0],
+        certificate=certify(task.problem, path),
+        ways=None,
+    )

@@ -1,0 +1,56 @@
+"""``planfly plan --front``: a folder of plans with their table and pictures; what it refuses."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from planfly.cli import main
+from planner.plan import read_plan
+
+
+def test_a_front_is_a_folder_of_plans_with_their_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, answer = tmp_path / "front", tmp_path / "answer.json"
+    assert main(["plan", "tight", "--front", "3", "--seed", "2", "--out", str(folder), "--json", str(answer)]) == 0
+    text = capsys.readouterr().out
+    made = json.loads(answer.read_text(encoding="utf-8"))
+    plans = [read_plan(Path(one["file"])) for one in made["plans"]]
+    assert 1 <= len(plans) <= 3
+    assert all(plan.safe for plan in plans)
+    names = {f"plan-{number}.json" for number in range(1, len(plans) + 1)}
+    pictures = {"front-map.png", "front-values.png"}
+    assert {file.name for file in folder.iterdir()} == names | pictures | {"front.csv", "front.json"}
+    assert "front-values.png" in text
+    table = json.loads((folder / "front.json").read_text(encoding="utf-8"))
+    with (folder / "front.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["file"] for row in table["plans"]] == [f"plan-{row['plan']}.json" for row in rows]
+    for row, entry, one, plan in zip(rows, table["plans"], made["plans"], plans, strict=True):
+        for name in ("length_m", "exposure_s", "clearance_m", "energy_wh", "time_s"):
+            assert float(row[name]) == entry[name] == one[name]
+        legs = plan.waypoints[1:] - plan.waypoints[:-1]
+        assert float(row["length_m"]) == pytest.approx(((legs**2).sum(axis=1) ** 0.5).sum(), abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (["--front", "1"], "argument --front: '1': a whole number of plans, 2 to 100, is expected"),
+        (["--front", "101"], "argument --front: '101': a whole number of plans, 2 to 100, is expected"),
+        (["--front", "5", "--algorithm", "umda"], "--algorithm umda: not with --front N"),
+        (["--front", "5", "--budget", "900"], "--budget 900: with --front N a number of seconds is expected"),
+    ],
+)
+def test_what_does_not_go_with_a_front_is_refused_in_a_line(
+    options: list[str], line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        code: object = main(["plan", "tight", *options, "--out", str(tmp_path / "front")])
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert line in error
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,45 @@
+"""What plans of a front are compared by, against plain sums along fine points of their legs."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from planner.evaluation.front_scores import Value, front_values
+from planner.evaluation.problem import Problem
+from planner.evaluation.travel_cost import LENGTH
+
+
+def test_the_values_of_a_path_are_plain_sums(problem: Problem) -> None:
+    data = problem.search
+    path = np.array([data.start, [1500.0, 900.0, 320.0], [4100.0, 800.0, 300.0], data.destination])
+    heights = np.ones(len(data.aircraft.amsl))
+    # 200 W whatever the climb.
+    power = LENGTH._replace(level=200.0 * heights, linear=0.0 * heights, square=0.0 * heights)
+    values = front_values(data, power._replace(lowest=-heights, highest=heights), path[None])[0]
+    steps = (np.arange(40_000) + 0.5) / 40_000
+    points = np.concatenate([a + steps[:, None] * (b - a) for a, b in itertools.pairwise(path)])
+    lengths = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    assert values[Value.LENGTH] == pytest.approx(lengths.sum(), rel=1e-12)
+    # Still air, and the airspeed of the limits.
+    seconds = lengths / data.aircraft.airspeed
+    assert values[Value.TIME] == pytest.approx(seconds.sum(), rel=1e-12)
+    assert values[Value.ENERGY] == pytest.approx(200.0 * seconds.sum(), rel=1e-12)
+    unit = problem.scenario.threats
+    away = np.linalg.norm(points - unit.position[0], axis=1)
+    density = np.where(away <= unit.detection_radius[0], (unit.detection_scale[0] / away) ** 4, 0.0)
+    exposure = (density.reshape(3, -1).mean(axis=1) * seconds).sum()
+    assert exposure > 1.0
+    assert values[Value.EXPOSURE] == pytest.approx(exposure, rel=1e-3)
+    terrain = problem.scenario.terrain
+    assert terrain is not None
+    lowest = (points[:, 2] - terrain.height(points[:, 0], points[:, 1])).min()
+    assert values[Value.CLEARANCE] == pytest.approx(lowest, abs=1.5)
+
+
+def test_without_power_energy_is_not_known_and_off_the_terrain_there_is_no_clearance(problem: Problem) -> None:
+    data = problem.search
+    path = np.array([data.start, [1e6, 0.0, 300.0], data.destination])
+    values = front_values(data, None, path[None])[0]
+    assert np.isnan(values[Value.ENERGY])
+    assert values[Value.CLEARANCE] == -np.inf

@@ -1,0 +1,73 @@
+"""Fronts of plans: each certified, none better than another, the same from the same seed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.path_limits import Limits
+from planner.plan import Plan, plan_json
+from planner.search.plan_front import Front, plan_front
+from world.scenario import Scenario
+
+GENERATIONS = 4
+
+
+@pytest.fixture(scope="module")
+def front(scenario: Scenario, limits: Limits) -> Front:
+    return plan_front(scenario, limits, 6, seed=3, generations=GENERATIONS)
+
+
+def test_every_plan_is_safe_and_has_a_certificate_of_its_own(front: Front) -> None:
+    assert 3 <= len(front.plans) <= 6
+    assert all(one.plan.safe for one in front.plans)
+    assert len({one.plan.certificate for one in front.plans}) == len(front.plans)
+    for one in front.plans:
+        legs = np.linalg.norm(np.diff(one.plan.waypoints, axis=0), axis=1)
+        assert one.length == pytest.approx(legs.sum())
+        # Over 30 m that the scenario requires.
+        assert one.clearance == pytest.approx(one.plan.certificate.clearance + 30.0)
+
+
+def test_no_plan_is_better_than_another_in_everything(front: Front) -> None:
+    rows = front.objectives()
+    for k, row in enumerate(rows):
+        others = np.delete(rows, k, axis=0)
+        assert not ((others <= row).all(axis=1) & (others < row).any(axis=1)).any()
+    assert (rows < front.reference).all()
+    # The envelope written by hand knows no power.
+    assert front.fourth == "time"
+    assert [one.length for one in front.plans] == sorted(one.length for one in front.plans)
+
+
+def test_the_front_offers_what_the_shortest_plan_does_not(front: Front) -> None:
+    rows, default = front.objectives(), front.default
+    assert rows[:, 0].min() < 1.001 * default.length
+    assert rows[:, 1].min() < 0.5 * default.exposure
+    assert -rows[:, 2].min() > default.clearance + 10.0
+
+
+def test_the_same_seed_gives_the_same_front(scenario: Scenario, limits: Limits, front: Front) -> None:
+    again = plan_front(scenario, limits, 6, seed=3, generations=GENERATIONS)
+    assert [plan_json(one.plan) for one in again.plans] == [plan_json(one.plan) for one in front.plans]
+
+
+def test_a_plan_that_is_not_safe_when_it_is_finished_is_left_out(scenario: Scenario, limits: Limits) -> None:
+    def refuse_long(plan: Plan) -> Plan:
+        if plan.objectives[0] < 1.04:
+            return plan
+        return replace(plan, certificate=replace(plan.certificate, problems=("too long",)))
+
+    found = plan_front(scenario, limits, 6, seed=3, generations=1, finish=refuse_long)
+    assert found.plans
+    straight = float(np.linalg.norm(scenario.destination - scenario.start))
+    assert all(one.length < 1.04 * straight for one in found.plans)
+
+
+def test_without_a_safe_plan_there_is_no_front(scenario: Scenario, limits: Limits) -> None:
+    def refuse(plan: Plan) -> Plan:
+        return replace(plan, certificate=replace(plan.certificate, problems=("no way down",)))
+
+    found = plan_front(scenario, limits, 6, seed=3, generations=1, finish=refuse)
+    assert found.plans == ()
+    assert not found.default.plan.safe
