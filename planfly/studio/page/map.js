@@ -67,10 +67,22 @@ export class MapView {
     this.layOut();
   }
 
+  // What a drag's verdict has changed, and nothing else: legs and corners that are as they were stay.
+  update(model) {
+    if (!this.model || this.model.path.length !== model.path.length || this.model.items.length !== model.items.length) return this.show(model);
+    this.model = model;
+    this.at = new Map(model.items.map((item) => [item.k, item.at]));
+    this.colour();
+    this.straight.setAttribute("d", this.straightLine());
+    return this.placeMarks();
+  }
+
   build(model) {
     clear(this.legs);
     clear(this.legsUnder);
     clear(this.markers);
+    this.drawn = model.path.map(() => [null, ""]);
+    this.marked = model.items.map(() => "");
     this.legParts = model.path.map(() => [svg("path", {}, this.legsUnder), svg("path", {}, this.legs)]);
     this.marks = model.items.map((item) => {
       const group = svg("g", { class: "mark", tabindex: -1, role: "button", "data-k": item.k }, this.markers);
@@ -84,10 +96,11 @@ export class MapView {
     const { model } = this;
     const bad = { threats: new Set(model.violated.threats), zones: new Set(model.violated.zones) };
     this.legParts.forEach(([under, over], k) => {
-      const flat = model.path[k], parts = [];
+      const flat = model.path[k], parts = [], drawn = this.drawn[k], state = model.states.legs[k][0];
+      if (drawn[0] === flat && drawn[1] === state) return;
+      this.drawn[k] = [flat, state];
       for (let i = 0; i < flat.length; i += 3) parts.push(`${flat[i]} ${flat[i + 1]}`);
       const d = parts.length ? `M${parts.join("L")}` : "";
-      const state = model.states.legs[k][0];
       under.setAttribute("d", d);
       over.setAttribute("d", d);
       under.setAttribute("class", `leg-under ${state}`);
@@ -98,6 +111,9 @@ export class MapView {
     const worst = cornerStates(model);
     this.marks.forEach((group, i) => {
       const item = model.items[i], state = worst.get(item.k)?.[0] || "ok";
+      const shown = `${item.k} ${state} ${item.k === this.selected} ${item.at[2]}`;
+      if (this.marked[i] === shown) return;
+      this.marked[i] = shown;
       group.setAttribute("class", `mark ${state}${item.k === this.selected ? " selected" : ""}`);
       group.setAttribute("data-k", item.k);
       group.setAttribute("aria-label", spoken(item, state));
@@ -106,6 +122,7 @@ export class MapView {
 
   select(k) {
     this.selected = k;
+    this.marked?.fill("");
     this.marks.forEach((group, i) => {
       const own = this.model.items[i].k === k;
       group.classList.toggle("selected", own);

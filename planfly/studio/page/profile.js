@@ -5,6 +5,8 @@ import { cornerStates } from "/map.js";
 
 const SIDES = { left: 52, right: 14, top: 12, bottom: 24 };
 const SAMPLES = 360;
+// Beyond so many items a state's dots are one shape.
+const MANY = 60;
 
 export class Profile {
   constructor(root) {
@@ -125,11 +127,13 @@ export class Profile {
   }
 
   way() {
-    const { route, states } = this.model;
+    const { route, states } = this.model, parts = { ok: [], near: [], open: [], fail: [] };
     for (let i = 0; i + 1 < route.length; i++) {
-      const d = `M${this.x(this.at[i])} ${this.y(route[i][2])}L${this.x(this.at[i + 1])} ${this.y(route[i + 1][2])}`;
-      svg("path", { d, class: `leg-under ${states.legs[i][0]}` }, this.front);
-      svg("path", { d, class: `leg ${states.legs[i][0]}` }, this.front);
+      const ends = [i, i + 1].map((k) => `${this.x(this.at[k]).toFixed(1)} ${this.y(route[k][2]).toFixed(1)}`);
+      parts[states.legs[i][0]].push(`M${ends.join("L")}`);
+    }
+    for (const kind of ["leg-under", "leg"]) for (const [state, legs] of Object.entries(parts)) {
+      if (legs.length) svg("path", { d: legs.join(""), class: `${kind} ${state}` }, this.front);
     }
     if (this.flown?.track?.length) {
       const points = this.flown.track.map((p, i) => `${this.x(Math.min(this.length, this.flown.along[i])).toFixed(1)} ${this.y(p[2]).toFixed(1)}`);
@@ -140,7 +144,7 @@ export class Profile {
   // A dot an item, where the way first passes it.
   drawDots() {
     clear(this.dots);
-    const worst = cornerStates(this.model), seen = new Set();
+    const worst = cornerStates(this.model), seen = new Set(), many = this.model.items.length > MANY ? {} : null;
     this.places = [];
     this.model.of.forEach((k, i) => {
       if (k < 0 || seen.has(k)) return;
@@ -148,8 +152,10 @@ export class Profile {
       const x = this.x(this.at[i]), y = this.y(this.model.route[i][2]);
       this.places.push({ k, x, y, up: this.model.route[i][2] });
       const state = worst.get(k)?.[0] || "ok";
-      svg("circle", { cx: x, cy: y, r: this.model.items.length > 150 ? 3 : 5.5, class: `dot ${state}${k === this.selected ? " selected" : ""}` }, this.dots);
+      if (many && k !== this.selected) (many[state] ||= []).push(`M${x.toFixed(1)} ${y.toFixed(1)}h.01`);
+      else svg("circle", { cx: x, cy: y, r: 5.5, class: `dot ${state}${k === this.selected ? " selected" : ""}` }, this.dots);
     });
+    for (const [state, points] of Object.entries(many || {})) svg("path", { d: points.join(""), class: `dot many ${state}` }, this.dots);
     const item = this.places.find((one) => one.k === this.selected);
     if (item) {
       const text = svg("text", { x: Math.min(this.width - 60, item.x + 9), y: item.y - 8, class: "number" }, this.dots);

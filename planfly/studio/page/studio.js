@@ -76,7 +76,8 @@ function onPreview(message) {
     now.model = merged(now.model, message.windows);
   }
   hold();
-  map.show(now.model);
+  if (message.sheet) map.show(now.model);
+  else map.update(now.model);
   profile.show(now.model, now.world, now.grid, shownFlight());
   answers();
   hands.again();
