@@ -1,8 +1,9 @@
 """Fresh random instances that no tuning has seen: ``python -m benchmarks.planning.fresh_instances --from 7001``.
 
-Of `tests.instances`: 60 threats, each instance one that a grid can pass.  Best known is the shortest certified path of
-`benchmarks.planning.lattice_search` and of everything that is measured here.  What the lattice finds is kept in
-``runs/fresh-instances.json``, for it takes the longest.
+60 threats each.  ``--family passable``: of `tests.instances`, draws that a coarse grid can pass; ``drawn``: the first
+draw of each seed, whether or not there is a path; ``wild``: of `benchmarks.planning.wild_instances`.  ``--autopilot``
+says for whom plans leave room.  Best known is the shortest certified path of `benchmarks.planning.reference_search` and
+of everything that is measured here.  What the reference finds is kept in ``--kept FILE``, for it takes the longest.
 """
 
 import argparse
@@ -13,54 +14,68 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from benchmarks.planning.lattice_search import lattice_search
-from benchmarks.task import Task, exact_airframe
+from benchmarks.planning.reference_search import reference_search
+from benchmarks.planning.wild_instances import wild_scenario
+from benchmarks.task import Task
+from planfly.airframe import load_airframe
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.problem import make_problem
 from planner.plan import Objective
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
-from tests.instances import random_scenario
+from tests.instances import SEED, Instance, draw_threats, random_scenario, scenario_text
 from world.scenario import from_spec
 from world.scenario_file import parse_scenario
 
+Floats = NDArray[np.float64]
+
 KEPT = Path("runs") / "fresh-instances.json"
 THREATS = 60
+FAMILIES = ("passable", "drawn", "wild")
+# A path is long if it exceeds the best known by more than this share; a run is slow if it takes more CPU than this, s.
+LONG, SLOW = 0.02, 1.0
 
 
-def random_task(seed: int, threats: int = THREATS) -> Task:
+def random_task(seed: int, threats: int = THREATS, family: str = "passable", autopilot: str = "ideal") -> Task:
     """The task of a random instance."""
-    scenario = from_spec(parse_scenario(random_scenario(seed, threats), "random"), "random")
-    airframe = exact_airframe(scenario)
+    if family == "wild":
+        scenario = wild_scenario(seed, autopilot)
+    else:
+        text = random_scenario(seed, threats) if family == "passable" else _drawn(seed, threats)
+        flown = text.replace("[flight]\n", f'[flight]\nautopilot = "{autopilot}"\n')
+        scenario = from_spec(parse_scenario(flown, "random"), "random")
+    airframe = load_airframe(scenario)
     problem = make_problem(scenario, airframe.limits)
     return Task(scenario, airframe, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
 
 
-def lattice_ratios(seeds: Sequence[int]) -> dict[str, dict[str, float]]:
-    """Length ratio (0 for none) and CPU time of the lattice search of each instance, kept from earlier runs."""
-    KEPT.parent.mkdir(exist_ok=True)
-    known: dict[str, dict[str, float]] = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
-    for seed in seeds:
-        if str(seed) in known:
+def _drawn(seed: int, threats: int) -> str:
+    """The first draw of a seed as a scenario file's text."""
+    positions, radii = draw_threats(np.random.default_rng([SEED, threats, seed, 0]), threats)
+    return scenario_text(f"drawn-{threats}-{seed}", Instance(positions, radii, 0), f"drawn instance {seed}")
+
+
+def reference_ratios(names: Sequence[str], tasks: Sequence[Task], kept: Path) -> Floats:
+    """Length ratio of the reference of each task (n,), NaN for none; kept from earlier runs by name."""
+    kept.parent.mkdir(exist_ok=True)
+    known: dict[str, dict[str, float]] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+    for name, task in zip(names, tasks, strict=True):
+        if name in known:
             continue
         began = time.process_time()
-        ratio, _ = lattice_search(random_task(seed))
-        known[str(seed)] = {"ratio": ratio if np.isfinite(ratio) else 0.0, "cpu_s": time.process_time() - began}
-        KEPT.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
-    return {str(seed): known[str(seed)] for seed in seeds}
+        ratio, _ = reference_search(task)
+        known[name] = {"ratio": ratio if np.isfinite(ratio) else 0.0, "cpu_s": time.process_time() - began}
+        kept.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+    return np.array([known[name]["ratio"] or np.nan for name in names])
 
 
-def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int, *, with_lattice: bool = True) -> dict[str, Any]:
-    """Runs of each algorithm on each instance; prints a table and returns it.
-
-    with_lattice: whether the lattice is searched too; without it best known is the best of the runs.
-    """
-    lattice = lattice_ratios(seeds) if with_lattice else {}
-    ratios = np.full((len(algorithms), len(seeds), runs), np.nan)
+def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str], runs: int) -> dict[str, Any]:
+    """Runs of each algorithm on each task beside the reference's ratios (n,); prints a table and returns it."""
+    ratios = np.full((len(algorithms), len(tasks), runs), np.nan)
     seconds = np.zeros(ratios.shape)
-    for at, seed in enumerate(seeds):
-        task = random_task(seed)
+    for at, task in enumerate(tasks):
         for row, name in enumerate(algorithms):
             for run in range(runs):
                 began = time.process_time()
@@ -68,46 +83,65 @@ def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int, *, with_
                 seconds[row, at, run] = time.process_time() - began
                 if plan.safe:
                     ratios[row, at, run] = plan.objectives[Objective.LENGTH_RATIO]
-    other = np.array([item["ratio"] or np.nan for item in lattice.values()] or [np.nan] * len(seeds))
-    best = np.fmin(other, np.fmin.reduce(ratios, axis=(0, 2)))
-    solvable = np.isfinite(best)
-    print(f"\n{len(seeds)} instances from seed {seeds[0]}, {runs} runs each; {solvable.sum()} solved by any method")
-    print(f"  {'method':<24}{'solved':>10}{'/ best: median':>16}{'90 %':>8}{'worst':>8}{'CPU s':>8}{'most':>7}")
-    record: dict[str, Any] = {"seeds": list(seeds), "runs": runs, "solvable": int(solvable.sum())}
+    best = np.fmin(reference, np.fmin.reduce(ratios, axis=(0, 2)))
+    solvable, by_reference = np.isfinite(best), np.isfinite(reference)
+    print(
+        f"\n{len(tasks)} instances, {runs} runs each; {by_reference.sum()} solved by the reference,"
+        f" {solvable.sum()} by any method"
+    )
+    print(
+        f"  {'method':<16}{'solved':>9}{'and more':>9}{'/ best: median':>16}{'90 %':>8}{'worst':>8}"
+        f"{f'over {LONG:.0%}':>9}{'CPU s':>8}{'most':>7}"
+    )
+    record: dict[str, Any] = {"instances": len(tasks), "runs": runs, "solvable": int(solvable.sum())}
     rows = [(name, ratios[row], seconds[row]) for row, name in enumerate(algorithms)]
-    if lattice:
-        rows.append(("lattice, many starts", other[:, None], np.array([[item["cpu_s"]] for item in lattice.values()])))
-    for name, found, spent in rows:
-        over = (found / best[:, None])[solvable].ravel()
-        safe = over[np.isfinite(over)]
-        record[name] = {
-            "solved": int(safe.size), "of": int(over.size), "median": float(np.median(safe)),
-            "p90": float(np.quantile(safe, 0.9)), "worst": float(safe.max()),
-            "cpu_s": float(np.median(spent)), "cpu_s_most": float(spent.max()),
-            "worst_seed": int(np.array(seeds)[solvable].repeat(found.shape[1])[np.nanargmax(over)]),
+    for name, found, spent in [*rows, ("the reference", reference[:, None], np.full((len(tasks), 1), np.nan))]:
+        over = found / best[:, None]
+        safe, solved = over[np.isfinite(over)], np.isfinite(over[by_reference])
+        entry = record[name] = {
+            "solved": int(solved.sum()), "of": int(solved.size), "more": int(safe.size - solved.sum()),
+            "median": float(np.median(safe)), "p90": float(np.quantile(safe, 0.9)), "worst": float(safe.max()),
+            "long": int((safe > 1.0 + LONG).sum()), "cpu_s": float(np.median(spent)), "cpu_s_most": float(spent.max()),
+            "ratios": over.round(5).tolist(), "seconds": spent.round(3).tolist(),
         }  # fmt: skip
-        row_of = record[name]
         print(
-            f"  {name:<24}{row_of['solved']:>6}/{row_of['of']:<4}{row_of['median']:>15.4f}{row_of['p90']:>8.4f}"
-            f"{row_of['worst']:>8.4f}{row_of['cpu_s']:>8.2f}{row_of['cpu_s_most']:>7.2f}"
+            f"  {name:<16}{entry['solved']:>5}/{entry['of']:<3}{entry['more']:>9}{entry['median']:>16.4f}"
+            f"{entry['p90']:>8.4f}{entry['worst']:>8.4f}{entry['long']:>9}{entry['cpu_s']:>8.2f}"
+            f"{entry['cpu_s_most']:>7.2f}",
+            flush=True,
         )
     return record
+
+
+def print_worst(names: Sequence[str], record: dict[str, Any], algorithm: str) -> None:
+    """One line for each instance that an algorithm solves by a long path, slowly, or not at all."""
+    entry, solved = record[algorithm], np.isfinite(record["the reference"]["ratios"])[:, 0]
+    for name, over, spent, known in zip(names, entry["ratios"], entry["seconds"], solved, strict=True):
+        if max(spent) > SLOW or (known and not max(over) <= 1.0 + LONG):
+            print(f"    {name}: / best {' '.join(f'{ratio:.4f}' for ratio in over)}; CPU {max(spent):.2f} s")
 
 
 def main() -> None:
     """Measure what the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.planning.fresh_instances")
+    parser.add_argument("--family", choices=FAMILIES, default="drawn", help="which instances")
     parser.add_argument("--from", dest="first", type=int, default=7001, help="seed of the first instance")
     parser.add_argument("--count", type=int, default=60, help="instances")
     parser.add_argument("--runs", type=int, default=1, help="seeds of each algorithm on each")
-    parser.add_argument("--without-lattice", action="store_true", help="best known is the best of the runs")
-    parser.add_argument("--algorithms", nargs="+", default=[DEFAULT, "fda"])
+    parser.add_argument("--autopilot", default="ideal", help="for whom plans leave room")
+    parser.add_argument("--kept", type=Path, default=KEPT, help="file that keeps what the reference finds")
+    parser.add_argument("--without-reference", action="store_true", help="best known is the best of the runs")
+    parser.add_argument("--algorithms", nargs="+", default=[DEFAULT])
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.count)
-    if args.algorithms == ["none"]:
-        lattice_ratios(seeds)
-        return
-    measure(list(seeds), args.algorithms, args.runs, with_lattice=not args.without_lattice)
+    tasks = [random_task(seed, family=args.family, autopilot=args.autopilot) for seed in seeds]
+    suffix = "" if args.autopilot == "ideal" else f" {args.autopilot}"
+    names = [f"{args.family} {seed}{suffix}" for seed in seeds]
+    nothing = np.full(len(tasks), np.nan)
+    reference = nothing if args.without_reference else reference_ratios(names, tasks, args.kept)
+    if args.algorithms != ["none"]:
+        record = measure(tasks, reference, args.algorithms, args.runs)
+        print_worst(names, record, args.algorithms[0])
 
 
 if __name__ == "__main__":

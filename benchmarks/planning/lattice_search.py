@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from benchmarks.task import Task, is_safe, scalar
 from planner.evaluation.encoding import rotated_frame, rotated_vectors
+from planner.evaluation.leg_constraints import slope_limits
+from planner.evaluation.problem import ProblemArrays
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.waypoint_chains import free_points
 from planner.seeding.waypoint_fitting import fit_waypoints, tighten
@@ -24,8 +26,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Between the lattice's places, m; and steps that climb or sink so many layers at most.
-PITCH, LAYER, MAX_LAYERS = 66.0, 20.0, 4
+# Between the lattice's places, m; largest and least distance between its layers, m, so that the longest steps climb
+# one; and steps that climb or sink so many layers at most.
+PITCH, LAYER, LEAST_LAYER, MAX_LAYERS = 66.0, 20.0, 6.0, 4
 # Steps on the map: to the eight neighbours, and a knight's.
 STEPS = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3) if math.gcd(i, j) == 1])
 # Ways that are tightened, and how much longer than the best on the lattice they may be.
@@ -36,9 +39,10 @@ PATTERNS = 1500
 
 
 class Lattice(NamedTuple):
-    """Places of a lattice: which are open (columns, rows, layers), and the position of the first, m."""
+    """Places of a lattice: which are open (columns, rows, layers), layers' distance and position of the first, m."""
 
     open: Flags
+    layer: float
     west: float
     south: float
     bottom: float
@@ -48,117 +52,159 @@ def make_lattice(task: Task) -> Lattice:
     """The lattice of a problem's map, from its floor to its ceiling; the ceiling is a layer."""
     data = task.problem.search
     columns, rows = int((data.east - data.west) / PITCH) + 1, int((data.north - data.south) / PITCH) + 1
-    layers = int((data.ceiling - max(0.0, data.floor)) / LAYER) + 1
-    bottom = data.ceiling - (layers - 1) * LAYER
+    layer = min(LAYER, max(LEAST_LAYER, 0.99 * min(_gentlest(data)) * PITCH * float(np.hypot(*STEPS.T).max())))
+    layers = int((data.ceiling - max(0.0, data.floor)) / layer) + 1
+    bottom = data.ceiling - (layers - 1) * layer
     east, north, up = np.meshgrid(
         data.west + PITCH * np.arange(columns),
         data.south + PITCH * np.arange(rows),
-        bottom + LAYER * np.arange(layers),
+        bottom + layer * np.arange(layers),
         indexing="ij",
     )
     places = np.stack([east, north, up], axis=-1)
     free = free_points(data, places.reshape(-1, 3)).reshape(places.shape[:3])
-    return Lattice(free, data.west, data.south, bottom)
+    return Lattice(free, layer, data.west, data.south, bottom)
+
+
+class Tree(NamedTuple):
+    """Shortest ways between one place and all others of a lattice; arrays are flat.
+
+    lengths: m, inf for none.  parents: next place towards the first, -1 for none.  classes: sums of the missiles'
+    weights for the sides on which the way passes them.
+    """
+
+    lengths: Floats
+    parents: Ints
+    classes: Ints
 
 
 @njit
-def _lengths(free: Flags, steps: Ints, home: Ints, climb: float, dive: float, forward: bool) -> Floats:
-    """Length of the shortest way between home and each open place, m: Dijkstra's algorithm.
+def _tree(
+    free: Flags,
+    layer: float,
+    steps: Ints,
+    home: Ints,
+    climb: float,
+    dive: float,
+    forward: bool,
+    units: Floats,
+    weights: Ints,
+) -> tuple[Floats, Ints, Ints]:
+    """The `Tree` of a lattice by Dijkstra's algorithm.
 
-    climb, dive: tangents.  forward: from home, or to it.
+    layer: distance between layers, m.  climb, dive: tangents.  forward: ways from home, or to it.  units, weights: of
+    the missiles, as `_units` makes them.
     """
     columns, rows, layers = free.shape
-    out = np.full(free.shape, np.inf)
-    out[home[0], home[1], home[2]] = 0.0
-    heap = [(0.0, home[0], home[1], home[2])]
+    lengths, parents = np.full(free.size, np.inf), np.full(free.size, -1)
+    classes, done = np.zeros(free.size, dtype=np.int64), np.zeros(free.size, dtype=np.bool_)
+    first = (home[0] * rows + home[1]) * layers + home[2]
+    lengths[first] = 0.0
+    heap = [(0.0, first)]
     while heap:
-        length, i, j, k = heapq.heappop(heap)
-        if length > out[i, j, k]:
+        length, place = heapq.heappop(heap)
+        if done[place]:
             continue
+        done[place] = True
+        i, j, k = place // (rows * layers), place // layers % rows, place % layers
+        before = parents[place]
+        if before >= 0:
+            x, y = before // (rows * layers), before // layers % rows
+            change = _passed(x, y, i, j, units, weights)
+            classes[place] = classes[before] + (change if forward else -change)
         for s in range(steps.shape[0]):
             x, y = i + steps[s, 0], j + steps[s, 1]
             if x < 0 or y < 0 or x >= columns or y >= rows:
                 continue
             run = PITCH * math.sqrt(steps[s, 0] ** 2 + steps[s, 1] ** 2)
-            up = min(MAX_LAYERS, int((climb if forward else dive) * run / LAYER))
-            down = min(MAX_LAYERS, int((dive if forward else climb) * run / LAYER))
+            up = min(MAX_LAYERS, int((climb if forward else dive) * run / layer))
+            down = min(MAX_LAYERS, int((dive if forward else climb) * run / layer))
             for z in range(max(0, k - down), min(layers - 1, k + up) + 1):
                 if not free[x, y, z]:
                     continue
-                total = length + math.sqrt(run * run + (LAYER * (z - k)) ** 2)
-                if total < out[x, y, z]:
-                    out[x, y, z] = total
-                    heapq.heappush(heap, (total, x, y, z))
-    return out
+                total, to = length + math.sqrt(run * run + (layer * (z - k)) ** 2), (x * rows + y) * layers + z
+                if total < lengths[to]:
+                    lengths[to], parents[to] = total, place
+                    heapq.heappush(heap, (total, to))
+    return lengths, parents, classes
 
 
 @njit
-def _descend(lengths: Floats, steps: Ints, place: Ints, climb: float, dive: float, forward: bool) -> Ints:
-    """Places (n, 3) from one down to the home of `_lengths`."""
-    out = [(place[0], place[1], place[2])]
-    columns, rows, layers = lengths.shape
-    i, j, k = place
-    while lengths[i, j, k] > 0.0:
-        best, to = np.inf, (i, j, k)
-        for s in range(steps.shape[0]):
-            x, y = i + steps[s, 0], j + steps[s, 1]
-            if x < 0 or y < 0 or x >= columns or y >= rows:
-                continue
-            run = PITCH * math.sqrt(steps[s, 0] ** 2 + steps[s, 1] ** 2)
-            up = min(MAX_LAYERS, int((dive if forward else climb) * run / LAYER))
-            down = min(MAX_LAYERS, int((climb if forward else dive) * run / LAYER))
-            for z in range(max(0, k - down), min(layers - 1, k + up) + 1):
-                total = lengths[x, y, z] + math.sqrt(run * run + (LAYER * (z - k)) ** 2)
-                if total < best:
-                    best, to = total, (x, y, z)
-        if not lengths[to] < lengths[i, j, k]:
-            break
-        i, j, k = to
-        out.append(to)
+def _passed(a: int, b: int, c: int, d: int, units: Floats, weights: Ints) -> int:
+    """Sum of the weights of the missiles that a step from column a, row b to c, d passes, against the course negative.
+
+    A missile is passed where the step crosses the line through it across the course from start to destination.
+    """
+    total = 0
+    for m in range(units.shape[0]):
+        along, across, radius = units[m, 0], units[m, 1], units[m, 2]
+        before, after = units[m, 3] * a + units[m, 4] * b - along, units[m, 3] * c + units[m, 4] * d - along
+        if (before < 0.0) == (after < 0.0):
+            continue
+        share = before / (before - after)
+        aside = units[m, 3] * (b + share * (d - b)) - units[m, 4] * (a + share * (c - a)) - across
+        weight = weights[m, 1] if abs(aside) < 0.5 * radius else weights[m, 0] if aside > 0.0 else 0
+        total += weight if after > before else -weight
+    return total
+
+
+@njit
+def _trace(parents: Ints, place: int) -> Ints:
+    """Flat places from one to the home of a `Tree`."""
+    out = [place]
+    while parents[out[-1]] >= 0:
+        out.append(parents[out[-1]])
     return np.array(out)
 
 
-def lattice_ways(task: Task) -> list[Floats]:
-    """Ways (n, 3) world m on different sides of the missiles, shortest first; none where the lattice is closed."""
+def _units(task: Task, lattice: Lattice) -> tuple[Floats, Ints]:
+    """Arguments `units` (m, 5) and `weights` (m, 2) of `_tree`: along and across in steps, radius, cosine and sine."""
+    frame = rotated_frame(task.problem.search.start, task.problem.search.destination)
+    threats = task.scenario.threats
+    east, north = ((threats.position[:, axis] - low) / PITCH for axis, low in enumerate((lattice.west, lattice.south)))
+    cosine, sine = (np.full(len(east), value) for value in (frame.cosine, frame.sine))
+    along, across = cosine * east + sine * north, cosine * north - sine * east
+    weights = np.random.default_rng(1).integers(1, 2**55, (len(east), 2))
+    return np.column_stack([along, across, threats.kill_radius / PITCH, cosine, sine]), weights
+
+
+def _gentlest(data: ProblemArrays) -> tuple[float, float]:
+    """Tangents of the steepest climb and dive on the course on which these are least, from the start's height."""
+    courses = np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
+    ends = data.start + 100.0 * np.column_stack([np.sin(courses), np.cos(courses), np.zeros(16)])
+    slopes = np.array([slope_limits(data, np.array(data.start), end) for end in ends])
+    climb, dive = np.tan(slopes.min(axis=0)).tolist()
+    return climb, dive
+
+
+def lattice_ways(task: Task, most: int = WAYS) -> list[Floats]:
+    """Ways (n, 3) world m on different sides of the missiles, shortest first; none where the lattice is closed.
+
+    Each is the shortest of its sides that leads through some place by the shortest ways on both sides of that place.
+    """
     data, lattice = task.problem.search, make_lattice(task)
-    climb, dive = math.tan(data.max_climb - data.angle_margin), math.tan(data.max_dive - data.angle_margin)
+    climb, dive = _gentlest(data)
     first = np.array([lattice.west, lattice.south, lattice.bottom])
-    pitch = np.array([PITCH, PITCH, LAYER])
+    pitch = np.array([PITCH, PITCH, lattice.layer])
     ends = [np.rint((end - first) / pitch).astype(np.int64) for end in (data.start, data.destination)]
     for end in ends:
         lattice.open[tuple(end)] = True
-    from_start = _lengths(lattice.open, STEPS, ends[0], climb, dive, True)
-    to_end = _lengths(lattice.open, STEPS, ends[1], climb, dive, False)
-    through = from_start + to_end
+    sides = _units(task, lattice)
+    trees = [Tree(*_tree(lattice.open, lattice.layer, STEPS, end, climb, dive, end is ends[0], *sides)) for end in ends]
+    through = trees[0].lengths + trees[1].lengths
     if not through.min() < math.inf:
         return []
-    places = np.argwhere(through <= LONGER * through.min())
-    order = np.argsort(through[tuple(places.T)], kind="stable")
-    ways: dict[bytes, Floats] = {}
-    # Places are looked at thinned out: those beside each other share their way.
-    for place in places[order]:
-        if (place % 3).any() and len(ways):
-            continue
-        before = _descend(from_start, STEPS, place, climb, dive, True)
-        after = _descend(to_end, STEPS, place, climb, dive, False)
-        way = first + pitch * np.concatenate([before[::-1], after[1:]])
+    places = np.flatnonzero(through <= LONGER * through.min())
+    places = places[np.argsort(through[places], kind="stable")]
+    _, firsts = np.unique(trees[0].classes[places] + trees[1].classes[places], return_index=True)
+    ways = []
+    for place in places[np.sort(firsts)[:most]]:
+        before, after = (_trace(tree.parents, place) for tree in trees)
+        cells = np.unravel_index(np.concatenate([before[::-1], after[1:]]), lattice.open.shape)
+        way = first + pitch * np.column_stack(cells)
         way[0], way[-1] = data.start, data.destination
-        sides = _sides(task, way)
-        ways.setdefault(sides, way)
-        if len(ways) >= WAYS:
-            break
-    return list(ways.values())
-
-
-def _sides(task: Task, way: Floats) -> bytes:
-    """On which side of each missile a way passes: left, right, or above and below it."""
-    data = task.problem.search
-    frame = rotated_frame(data.start, data.destination)
-    units, points = frame.rotate(task.scenario.threats.position), frame.rotate(way)
-    order = np.argsort(points[:, 0], kind="stable")
-    across = np.interp(units[:, 0], points[order, 0], points[order, 1]) - units[:, 1]
-    over = np.abs(across) < 0.5 * task.scenario.threats.kill_radius
-    return bytes(np.where(over, 2, across > 0.0).astype(np.uint8))
+        ways.append(way)
+    return ways
 
 
 def lattice_search(task: Task) -> tuple[float, Floats | None]:

@@ -1,0 +1,107 @@
+"""The reference of fresh instances: every side that a fine lattice sees, screened, and the best of them polished.
+
+`benchmarks.planning.lattice_search.lattice_ways` proposes sides of the missiles, hundreds where the planner looks at
+some 15, without a frame, without stages and with all heights; then the paths found are cut and joined with each other.
+Each is shortened in a millisecond or two, by the planner's own shortening but with the certificate's margins, which are
+smaller than those that the planner's search keeps.  The shortest are polished by SciPy's SLSQP
+(`benchmarks.planning.smooth_search`), which shares nothing with it, where limits are in degrees.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.planning.lattice_search import lattice_ways
+from benchmarks.planning.smooth_search import Programme
+from benchmarks.task import Task, is_safe
+from planner.evaluation.problem import SEARCH_KILL_MARGIN
+from planner.seeding.shortening import resample, shorten_path
+
+Floats = NDArray[np.float64]
+
+# Ways of the lattice; margins that each is shortened with, m; and shortest paths that are polished, this different in
+# length at least, as a share.
+WAYS, MARGINS, POLISHED, APART = 400, (0.1, 2.0, 5.0), 5, 1e-4
+# What the search keeps beside the certificate's margins, m.
+SPARE = 0.5
+# Paths that are cut and joined with each other, rounds of it, and how near to each other they have to pass, m.
+POOL, ROUNDS, NEAR = 12, 2, 300.0
+
+
+def reference_search(task: Task) -> tuple[float, Floats | None]:
+    """Length ratio and waypoints (w, 3) of the best certified path that is found; inf and None for none."""
+    task = _with_least_margins(task)
+    pool = [found for way in lattice_ways(task, WAYS) if (found := _screened(task, way)) is not None]
+    for _ in range(ROUNDS):
+        pool = _distinct(pool)[:POOL]
+        joined = [found for way in _joined([path for _, path in pool]) if (found := _screened(task, way)) is not None]
+        if not joined or min(joined, key=lambda item: item[0])[0] >= pool[0][0]:
+            break
+        pool += joined
+    pool = _distinct(pool)
+    best: tuple[float, Floats | None] = pool[0] if pool else (math.inf, None)
+    # The programme knows limits in degrees alone.
+    programme = None if task.problem.search.legs_hold_turns else Programme(task)
+    for _, path in pool[:POLISHED] if programme else []:
+        found = programme.shortened(path)  # type: ignore[union-attr]
+        ratio = task.length_ratio(found)
+        if ratio < best[0] and is_safe(task.certificate(found)):
+            best = ratio, found
+    return best
+
+
+def _with_least_margins(task: Task) -> Task:
+    """The task with the margins of the certificate in its search, not the larger ones of the planner's search."""
+    problem = task.problem
+    more, certified = SPARE, problem.certified
+    reserve = problem.search.kill_margin - SEARCH_KILL_MARGIN
+    tight = problem.search._replace(
+        kill_margin=certified.kill_margin + reserve + more,
+        buffer=min(problem.search.buffer, certified.buffer + more),
+        start_buffer=min(problem.search.start_buffer, certified.start_buffer + more),
+        destination_buffer=min(problem.search.destination_buffer, certified.destination_buffer + more),
+    )
+    return replace(task, problem=replace(problem, search=tight))
+
+
+def _screened(task: Task, way: Floats) -> tuple[float, Floats] | None:
+    """Length ratio and waypoints of a way (k, 3) once it is shortened; None where it is not safe then."""
+    for margin in MARGINS:
+        path = resample(way, task.encoding.waypoints)
+        for _ in range(2):
+            path, _ = shorten_path(task.problem.search, path, extra_margin=margin)
+            if is_safe(task.certificate(path)):
+                again, _ = shorten_path(task.problem.search, resample(path, len(path)), extra_margin=margin)
+                shorter = task.length_ratio(again) < task.length_ratio(path) and is_safe(task.certificate(again))
+                path = again if shorter else path
+                return task.length_ratio(path), path
+    return None
+
+
+def _distinct(pool: list[tuple[float, Floats]]) -> list[tuple[float, Floats]]:
+    """Paths of different length, shortest first."""
+    out: list[tuple[float, Floats]] = []
+    for ratio, path in sorted(pool, key=lambda item: item[0]):
+        if not out or ratio > (1.0 + APART) * out[-1][0]:
+            out.append((ratio, path))
+    return out
+
+
+def _joined(paths: list[Floats]) -> list[Floats]:
+    """Each path up to where another passes near, and the other one from there on."""
+    out = []
+    for one in paths:
+        for other in paths:
+            if one is other:
+                continue
+            a, b = resample(one, 100), resample(other, 100)
+            gaps = np.sqrt(((a[:, None] - b[None]) ** 2).sum(axis=2))
+            near = gaps.min(axis=1) < NEAR
+            # Once for each stretch along which they are near each other, but not before the first and after the last.
+            middles = [
+                int(run.mean()) for run in np.split(np.arange(100), np.flatnonzero(np.diff(near)) + 1) if near[run[0]]
+            ]
+            out += [np.concatenate([a[: at + 1], b[int(gaps[at].argmin()) + 1 :]]) for at in middles[1:-1]]
+    return out
