@@ -2,7 +2,8 @@
 
 `explain_failure` collects lines for the user. It looks for lines across the map where ground and clearance reach the
 ceiling, or missiles cover the remaining heights; for zones that separate the start from the destination on a coarse
-grid (connected components); and for bands of heights that the required margins close.
+grid (connected components); for bands of heights that the required margins close; and for missiles of which
+`planner.search.closed_ways` proves that they leave no path.
 """
 
 import itertools
@@ -18,6 +19,7 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import BUFFER_GROWTH, Problem, make_problem
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS, limits_for
+from planner.search.closed_ways import closing_missiles
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.kernels import compiled
 from world.scenario import Scenario
@@ -197,8 +199,8 @@ def max_altitude(problem: Problem) -> tuple[float, str]:
 
 # Points along and across the direct line.
 ALONG, ACROSS = 200, 400
-# Maximum number of zones named; and spacing of points on a path that is tested against them, m.
-MAX_NAMES, ZONE_PITCH = 4, 20.0
+# Maximum number of zones, and of missiles, named; and spacing of points on a path that is tested against them, m.
+MAX_NAMES, MAX_CLOSING, ZONE_PITCH = 4, 12, 20.0
 
 
 def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
@@ -223,6 +225,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     if limits is not None:
         problem = make_problem(scenario, limits if chosen is None else limits_for(chosen, limits))
         lines += closed_bands(problem) or ([] if lines else _margin_walls(problem))
+        lines += _closing(problem)
     closed = separating_zones(scenario)
     if closed is not None:
         names = ", ".join(closed.zones[:MAX_NAMES]) + (" and more" if len(closed.zones) > MAX_NAMES else "")
@@ -314,6 +317,21 @@ def _outside_missiles(scenario: Scenario, points: np.ndarray, lowest: np.ndarray
         if free.any():
             return True
     return math.isinf(scenario.ceiling)
+
+
+def _closing(problem: Problem) -> list[str]:
+    """A line that names the missiles which leave no path at all, if that can be proven."""
+    found = closing_missiles(problem.certified)
+    if found is None:
+        return []
+    if not found:
+        return ["no path exists: the ground closes every way below the ceiling"]
+    named = [problem.scenario.threats.names[k] for k in found[:MAX_CLOSING]]
+    more = f" and {len(found) - MAX_CLOSING} more" if len(found) > MAX_CLOSING else ""
+    return [
+        f"no path exists: {', '.join(named)}{more} close every way between ground, ceiling and the edges of the map;"
+        " without any one of them there may be one"
+    ]
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:

@@ -2,8 +2,9 @@
 
 A seeded search tries the straight line first, then fits waypoints to grid routes, shortens the best, tries other sides
 of the obstacles, and runs generations of samples if no path is safe. If the certificate fails, up to two more attempts
-use finer grids, larger populations and a larger clearance buffer. If no safe path exists in the straight frame, or only
-a long one, a lattice search looks for routes that turn back.
+use finer grids, larger populations, a larger clearance buffer and a smaller margin to missiles. If no safe path exists
+in the straight frame, or only a long one, a lattice search looks for routes that turn back. Where it is proven that no
+path exists, the search ends.
 """
 
 import numpy as np
@@ -16,9 +17,19 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
+from planner.search.closed_ways import is_closed
 from planner.search.generations import path_generations, waypoint_generations
 from planner.search.search_cheapest import search_cheapest, wanted_cost
-from planner.search.search_state import Archive, Improved, Search, SearchEnded, SearchProgress, StopCondition, no_scores
+from planner.search.search_state import (
+    Archive,
+    Improved,
+    Search,
+    SearchEnded,
+    SearchProgress,
+    StopCondition,
+    no_scores,
+    with_narrow_margins,
+)
 from planner.search.seeds import (
     may_turn_back,
     search_other_sides,
@@ -26,6 +37,7 @@ from planner.search.seeds import (
     shorten_best,
     starting_vectors,
     straight_line,
+    straight_vectors,
 )
 from world.errors import ScenarioError
 from world.random_streams import PLANNER, stream
@@ -120,9 +132,9 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
         # A later attempt replaces an earlier result only if it is better.
         if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):
             best = found
-        if number == 0 and may_turn_back(search, best[1]):
+        if number == 0 and not search.is_closed and may_turn_back(search, best[1]):
             best = search_turning_back(search, best)
-        if search.finished(best[1]) or search.must_end():
+        if search.finished(best[1]) or search.is_closed or search.must_end():
             break
     if best is None:  # pragma: no cover - the loop always runs
         raise ScenarioError(
@@ -169,8 +181,8 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
 
 
 def _retry(search: Search, number: int) -> None:
-    """Increase the clearance buffer and re-evaluate the archive."""
-    search.problem = make_problem(search.problem.scenario, search.problem.limits, number)
+    """Increase the clearance buffer, pass missiles more closely, and re-evaluate the archive."""
+    search.problem = with_narrow_margins(make_problem(search.problem.scenario, search.problem.limits, number))
     vectors = search.archive.vectors
     search.archive = Archive(vectors[:0], no_scores())
     search.evaluate(vectors)
@@ -191,6 +203,14 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
         return
     if algorithm.seeded:
         search_other_sides(search)
+        if number == 0 and not search.has_safe() and is_closed(search.problem.certified):
+            search.is_closed = True
+            if not len(search.archive.scores):
+                # A result is needed all the same.
+                search.evaluate(straight_vectors(search))
+            search.record()
+            search.report(0)
+            return
     last = None
     if algorithm.optimiser == "waypoints":
         # With a safe path and other sides tried, generations would shorten it by only 1e-4.

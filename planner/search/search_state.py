@@ -6,7 +6,7 @@ evaluations against the budget, applies local searches, and decides when the sea
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
+from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, SEARCH_KILL_MARGIN, Problem
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
@@ -75,12 +75,21 @@ Improved = Callable[[Floats], None]
 ARCHIVE_SIZE = 24
 # Additional margins to spheres and ground, m, with which a path is shortened until it is certified.
 EXTRA_MARGINS = (0.1, 2.0)
+# What a search keeps from missiles in gaps that are too narrow for its usual margin, beside the certificate's, m.
+NARROW_RESERVE = 1.0
 # Evaluations that `tighten` may take: with less budget left it is skipped.
 TIGHTENING_EVALUATIONS = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
 # Certificates made before the stop condition is checked: some 10 ms if none passes.
 CERTIFICATES_AT_ONCE = 4
+
+
+def with_narrow_margins(problem: Problem) -> Problem:
+    """A problem whose search passes missiles more closely, but with the certificate's margin and a little more."""
+    usual = SEARCH_KILL_MARGIN - CERTIFIED_KILL_MARGIN
+    data = problem.search
+    return replace(problem, search=data._replace(kill_margin=data.kill_margin - (usual - NARROW_RESERVE)))
 
 
 class SearchEnded(Exception):
@@ -139,6 +148,7 @@ class Search:
     shortest: the shortest finished path (w, 3) from shortening and its certificate; its waypoints need not lie in their
     intervals.
     budget_exhausted: whether the budget is too small for another shortening.
+    is_closed: whether it is proven that no safe path exists.
     """
 
     problem: Problem
@@ -158,6 +168,7 @@ class Search:
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
     budget_exhausted: bool = False
+    is_closed: bool = False
 
     def __post_init__(self) -> None:
         """Create an empty archive."""

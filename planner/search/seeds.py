@@ -43,15 +43,20 @@ BAND_EFFORT = 3
 MAX_FOLLOWED = 2
 
 
-def straight_line(search: Search) -> bool:
-    """Whether the straight line is a safe path: no path is shorter, and the search is finished."""
+def straight_vectors(search: Search) -> Floats:
+    """The straight line as a vector (1, d) of the rotated encoding."""
     encoding, space = search.encoding, search.problem.space
-    if encoding.name != "rotated":
-        return False
     edges = encoding.lower[0::3], encoding.upper[0::3]
     share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
     path = space.start + np.concatenate([[0.0], share, [1.0]])[:, None] * (space.destination - space.start)
-    vectors = rotated_vectors(space, encoding, path[None])
+    return rotated_vectors(space, encoding, path[None])
+
+
+def straight_line(search: Search) -> bool:
+    """Whether the straight line is a safe path: no path is shorter, and the search is finished."""
+    if search.encoding.name != "rotated":
+        return False
+    vectors = straight_vectors(search)
     scores = search.score(vectors)
     if not safe(scores[0]):
         return False

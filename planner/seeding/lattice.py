@@ -282,7 +282,7 @@ MIN_STEP, MAX_STEP = 100.0, 2000.0
 # Layers that the gentler slope limit climbs or descends in a step along.
 LAYERS_PER_STEP = 2
 # Maximum number of states of a lattice, and of expanded states.
-MAX_LATTICE_STATES, MAX_EXPANDED = 4_000_000, 600_000
+MAX_LATTICE_STATES, MAX_EXPANDED = 4_000_000, 60_000
 # States expanded between two calls of `pause`: some 10 ms.
 STATES_AT_ONCE = 2000
 
