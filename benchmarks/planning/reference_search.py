@@ -45,10 +45,10 @@ def reference_search(task: Task) -> tuple[float, Floats | None]:
     # The programme knows limits in degrees alone.
     programme = None if task.problem.search.legs_hold_turns else Programme(task)
     for _, path in pool[:POLISHED] if programme else []:
-        found = programme.shortened(path)  # type: ignore[union-attr]
-        ratio = task.length_ratio(found)
-        if ratio < best[0] and is_safe(task.certificate(found)):
-            best = ratio, found
+        shorter = programme.shortened(path)  # type: ignore[union-attr]
+        ratio = task.length_ratio(shorter)
+        if ratio < best[0] and is_safe(task.certificate(shorter)):
+            best = ratio, shorter
     return best
 
 
