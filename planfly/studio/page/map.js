@@ -164,6 +164,10 @@ export class MapView {
   // Everything that depends on the view.
   layOut() {
     this.world.setAttribute("transform", this.view.transform());
+    // Where waypoints stand closer than their dots are wide, small ones leave the legs and their colours to be seen.
+    const { route } = this.model, apart = route.slice(1).map((p, i) => Math.hypot(p[0] - route[i][0], p[1] - route[i][1]));
+    const middle = apart.sort((a, b) => a - b)[apart.length >> 1] || 0;
+    this.markers.classList.toggle("dense", middle * this.view.scale < 13);
     this.placeMarks();
     this.placeDiamonds();
     this.placeNames();
