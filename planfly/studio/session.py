@@ -5,7 +5,6 @@ grows; an edit of an older one is refused, so that two pages never change what t
 """
 
 import json
-import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -296,7 +295,7 @@ class Session:
         if self.kept_rev == self.rev:
             return
         file.parent.mkdir(parents=True, exist_ok=True)
-        data = {"schema": _KEPT, "name": self.document.name, "at": time.time(), "mission": mission_data(self.mission)}
+        data = {"schema": _KEPT, "name": self.document.name, "mission": mission_data(self.mission)}
         write_whole(file, json.dumps({**data, "first": mission_data(self.history.first)}))
         self.kept_rev = self.rev
 

@@ -198,11 +198,12 @@ def _state(state: State) -> list[str]:
 def verdict_json(verdict: Verdict) -> Json:
     """The answer and its lines."""
     state = "ok" if verdict.flyable else "open" if verdict.undecided else "fail"
+    _, *lines = verdict.lines
     return {
         "state": state,
         "answer": verdict.answer,
         "headline": verdict.headline,
-        "lines": list(verdict.lines[1:]),
+        "lines": lines,
         "level": verdict.level,
         "failed": len(verdict.failed),
     }
