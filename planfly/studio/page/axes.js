@@ -69,7 +69,9 @@ export function ticks(low, high, parts) {
   return found;
 }
 
+// A number as text; a dash for one that is not known.
 export function plain(value, digits = 0) {
+  if (value === null || !Number.isFinite(value)) return "\u2013";
   return value.toFixed(digits).replace("-", "\u2212");
 }
 

@@ -45,10 +45,10 @@ export class Hands {
     if (this.pointers.size === 2) return this.pinch();
     const hit = map.hit(x, y, event.pointerType === "touch");
     if (hit && hit.item !== undefined) {
-      this.drag = { k: hit.item, from: [x, y], moved: false };
+      this.drag = { k: hit.item, rev: this.app.rev(), from: [x, y], moved: false };
       this.app.select(hit.item);
     } else if (hit) {
-      this.drag = { after: hit.after, from: [x, y], to: [x, y], moved: false };
+      this.drag = { after: hit.after, rev: this.app.rev(), from: [x, y], to: [x, y], moved: false };
     } else {
       this.drag = { pan: true, last: [x, y], from: [x, y], moved: false };
     }
@@ -70,7 +70,7 @@ export class Hands {
       this.drop = { k: drag.k, east: map.view.eastAt(x), north: map.view.northAt(y) };
       app.begin(drag.k);
       map.dragged(drag.k, this.drop.east, this.drop.north);
-      app.link.drag({ rev: app.rev(), ...this.drop });
+      app.link.drag({ rev: drag.rev, ...this.drop });
       this.words(drag.k, x, y, this.drop);
     } else {
       drag.to = [x, y];
@@ -89,15 +89,32 @@ export class Hands {
     if (!drag) return;
     if (drag.k !== undefined && drag.moved) {
       if (cancelled) return app.cancel();
-      app.commit({ kind: "move", ...this.drop });
+      app.commit({ kind: "move", rev: drag.rev, ...this.drop });
     } else if (drag.after !== undefined && !cancelled) {
       const [x, y] = drag.to;
       app.selectAfter(drag.after);
-      app.commit({ kind: "insert", after: drag.after, east: app.map.view.eastAt(x), north: app.map.view.northAt(y) });
+      app.commit({ kind: "insert", rev: drag.rev, after: drag.after, east: app.map.view.eastAt(x), north: app.map.view.northAt(y) });
     } else if (drag.pan && !drag.moved) {
       app.select(null);
     }
     app.hint(null);
+  }
+
+  // A sheet has come: a drag goes on where it has the same items, and else ends.  Whether one goes on.
+  onSheet(same, rev) {
+    const held = [this.drag, this.side].filter((one) => one && one.rev !== undefined);
+    if (same) for (const one of held) one.rev = rev;
+    else if (held.length) {
+      this.stopDrag();
+      this.app.complain("The mission has changed meanwhile: what was dragged is as it was.");
+    }
+    return same && held.some((one) => one.moved);
+  }
+
+  stopDrag() {
+    this.drag = this.side = null;
+    this.app.profile.hold(false);
+    this.app.hint(null);
   }
 
   pinch() {
@@ -144,12 +161,13 @@ export class Hands {
     const { app } = this, model = app.model(), item = model.items.find((one) => one.k === k);
     if (!item) return;
     const [east, north] = place ? [place.east, place.north] : item.at;
+    const unseen = model.of.includes(k) || item.at[2] === null ? [] : ["not flown"];
     const rows = model.states.corners.filter((_, i) => model.of[i] === k).concat(legStates(model, k));
     const order = ["fail", "open", "near", "ok"];
     const worst = rows.reduce((a, b) => (order.indexOf(b[0]) < order.indexOf(a) ? b[0] : a), "ok");
     const lines = [...new Set(rows.filter((row) => row[1]).sort((a, b) => order.indexOf(a[0]) - order.indexOf(b[0])).map((row) => row[1]))];
     const fault = app.dragFault();
-    app.hint([`${item.seq}: ${heightWords(app.grid(), east, north, place?.up ?? item.at[2])}`, ...(fault ? [fault] : lines.slice(0, 3))], x, y, fault ? "fail" : worst);
+    app.hint([`${item.seq}: ${heightWords(app.grid(), east, north, place?.up ?? item.at[2])}`, ...(fault ? [fault] : unseen.concat(lines.slice(0, 3)))], x, y, fault ? "fail" : worst);
   }
 
   // The numbers of a drag anew, when its verdict has come.
@@ -166,7 +184,7 @@ export class Hands {
     if (!hit) return;
     profile.root.setPointerCapture(event.pointerId);
     this.app.select(hit.k);
-    this.side = { ...hit, from: y, moved: false };
+    this.side = { ...hit, rev: this.app.rev(), from: y, moved: false };
   }
 
   sideMove(event) {
@@ -186,7 +204,7 @@ export class Hands {
     app.begin(side.k);
     app.raised(side.k, side.to);
     const place = { k: side.k, east: item.at[0], north: item.at[1], up: side.to };
-    app.link.drag({ rev: app.rev(), ...place });
+    app.link.drag({ rev: side.rev, ...place });
     const box = app.map.root.getBoundingClientRect();
     this.words(side.k, event.clientX - box.left, event.clientY - box.top, place);
   }
@@ -198,7 +216,7 @@ export class Hands {
     app.hint(null);
     if (!side || !side.moved) return;
     if (cancelled) app.cancel();
-    else app.commit({ kind: "move", k: side.k, up: side.to });
+    else app.commit({ kind: "move", rev: side.rev, k: side.k, up: side.to });
   }
 
   // ---- keys
@@ -208,11 +226,11 @@ export class Hands {
     const typing = event.target.closest?.("input, select, textarea");
     if (control && event.key.toLowerCase() === "z" && !typing) {
       event.preventDefault();
-      return app.link.send({ kind: event.shiftKey ? "redo" : "undo" });
+      return app.send({ kind: event.shiftKey ? "redo" : "undo" });
     }
     if (control && event.key.toLowerCase() === "y" && !typing) {
       event.preventDefault();
-      return app.link.send({ kind: "redo" });
+      return app.send({ kind: "redo" });
     }
     if (control && event.key.toLowerCase() === "s") {
       event.preventDefault();
@@ -220,15 +238,25 @@ export class Hands {
     }
     if (event.key === "Escape") {
       if (this.drag?.moved || this.side?.moved) {
-        this.drag = this.side = null;
-        app.profile.hold(false);
+        this.stopDrag();
         app.cancel();
       }
       return app.hint(null);
     }
-    const k = app.selected(), item = app.model()?.items.find((one) => one.k === k);
-    if (typing || control || event.altKey || !item || !event.target.closest?.("svg, body")) return;
-    if (event.target.closest("aside, header")) return;
+    // All other keys are for the map and the profile: a key that is meant for a field changes no waypoint.
+    if (control || event.altKey || !app.model() || !event.target.closest?.("#map, #profile")) return undefined;
+    return this.keyOnMap(event);
+  }
+
+  keyOnMap(event) {
+    const { app } = this, { items } = app.model(), k = app.selected(), i = items.findIndex((one) => one.k === k), item = items[i];
+    const others = { n: Math.min(i + 1, items.length - 1), p: Math.max(i - 1, 0), Home: 0, End: items.length - 1 };
+    const other = others[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (other !== undefined) {
+      event.preventDefault();
+      return app.select(items[other].k);
+    }
+    if (!item) return undefined;
     const far = event.shiftKey ? FAR : STEP;
     const sides = { ArrowUp: [0, far], ArrowDown: [0, -far], ArrowLeft: [-far, 0], ArrowRight: [far, 0] };
     if (sides[event.key]) {
@@ -239,7 +267,8 @@ export class Hands {
     if (event.key === "PageUp" || event.key === "PageDown") {
       event.preventDefault();
       const by = (event.key === "PageUp" ? 1 : -1) * (event.shiftKey ? 50 : UP);
-      return app.nudge(k, { up: item.at[2] + by });
+      if (item.at[2] === null) return app.complain(`Item ${item.seq} is not flown: it has no height here.`);
+      return app.nudge(k, { up: Math.max(-500, Math.min(9000, item.at[2] + by)) });
     }
     if (event.key === "Delete" || event.key === "Backspace") {
       event.preventDefault();
@@ -247,7 +276,7 @@ export class Hands {
     }
     if (event.key === "Insert") {
       event.preventDefault();
-      const { items } = app.model(), i = items.indexOf(item), next = items[i + 1];
+      const next = items[i + 1];
       if (!next) return undefined;
       app.selectAfter(k);
       return app.commit({ kind: "insert", after: k, east: (item.at[0] + next.at[0]) / 2, north: (item.at[1] + next.at[1]) / 2 });

@@ -12,6 +12,17 @@ function token() {
   return sessionStorage.getItem(KEY) || "";
 }
 
+// Numbers that the server takes: m, but for the seed.
+const RANGES = { east: [-6e5, 6e5], north: [-6e5, 6e5], up: [-500, 9000], by: [-9000, 9000], seed: [0, 2 ** 31 - 1] };
+
+function bounded(message) {
+  const copy = { ...message };
+  for (const [name, [low, high]] of Object.entries(RANGES)) {
+    if (typeof copy[name] === "number") copy[name] = Math.min(high, Math.max(low, copy[name]));
+  }
+  return copy;
+}
+
 export class Link {
   // handlers: by kind of message; "picture" and "heights" of the ground, "open" and "lost" of the connection.
   constructor(handlers) {
@@ -52,7 +63,7 @@ export class Link {
 
   send(message) {
     if (this.socket && this.socket.readyState === 1) {
-      this.socket.send(JSON.stringify(message));
+      this.socket.send(JSON.stringify(bounded(message)));
       return true;
     }
     return false;
@@ -68,6 +79,8 @@ export class Link {
     if (message.kind === "preview") return this.previewed(message);
     const handler = this.handlers[message.kind];
     if (handler) handler(message);
+    // Of what kind the message before was: a work that has failed is stopped, then says why.
+    this.before = message.kind;
   }
 
   binary(data) {
@@ -97,15 +110,16 @@ export class Link {
       this.next = message;
       return;
     }
-    this.waiting = message.n;
     this.next = null;
-    this.send(message);
+    this.waiting = this.send(message) ? message : null;
   }
 
+  // An answer of an older sheet (stale) says nothing of what is shown; the next place is asked about all the same.
   previewed(message) {
+    const k = this.waiting?.k;
     this.waiting = null;
     if (this.next) this.ask(this.next);
-    if (this.next0) this.handlers.preview(message);
+    if (this.next0 && !message.stale) this.handlers.preview({ ...message, k });
   }
 
   // The drag has ended, however it did.

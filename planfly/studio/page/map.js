@@ -50,10 +50,12 @@ export class MapView {
   }
 
   setPicture(picture) {
+    if (!picture) return this.ground.removeAttribute("href");
     const [[w, e], [s, n]] = [picture.east, picture.north];
     for (const [key, value] of Object.entries({ x: w, y: -n, width: e - w, height: n - s, href: picture.url })) {
       this.ground.setAttribute(key, value);
     }
+    return undefined;
   }
 
   // The mission as it is drawn: route, path of each leg, states, items.
@@ -108,15 +110,15 @@ export class MapView {
     });
     this.threatShapes?.forEach((group, k) => group.classList.toggle("entered", bad.threats.has(k)));
     this.zoneShapes?.forEach((path, k) => path.classList.toggle("entered", bad.zones.has(k)));
-    const worst = cornerStates(model);
+    const worst = cornerStates(model), all = cornerStates(model, true);
     this.marks.forEach((group, i) => {
-      const item = model.items[i], state = worst.get(item.k)?.[0] || "ok";
-      const shown = `${item.k} ${state} ${item.k === this.selected} ${item.at[2]}`;
+      const item = model.items[i], state = worst.get(item.k)?.[0] || "ok", heard = all.get(item.k)?.[0];
+      const shown = `${item.k} ${item.seq} ${item.what} ${state} ${heard} ${item.k === this.selected} ${item.at[2]}`;
       if (this.marked[i] === shown) return;
       this.marked[i] = shown;
       group.setAttribute("class", `mark ${state}${item.k === this.selected ? " selected" : ""}`);
       group.setAttribute("data-k", item.k);
-      group.setAttribute("aria-label", spoken(item, state));
+      group.setAttribute("aria-label", spoken(item, heard));
     });
   }
 
@@ -159,6 +161,10 @@ export class MapView {
       const d = `M${way.points.map((p) => `${p[0]} ${p[1]}`).join("L")}`;
       svg("path", { d, class: `way${k === shown ? " shown" : ""}` }, this.ways);
     });
+  }
+
+  focus(k) {
+    this.marks.find((mark) => Number(mark.dataset.k) === k)?.focus({ preventScroll: true });
   }
 
   // Everything that depends on the view.
@@ -300,12 +306,15 @@ export class MapView {
 
 const ORDER = ["fail", "open", "near", "ok"];
 
-// The worst state of the corners and legs at each item, by its number.
-export function cornerStates(model) {
-  const found = new Map();
+// The worst state of the corners at each item, by its number, and with the legs to and from it; none where no stop is.
+export function cornerStates(model, withLegs) {
+  const found = new Map(), { corners, legs } = model.states;
   model.of.forEach((k, i) => {
-    const mine = model.states.corners[i] || ["ok", ""], old = found.get(k);
-    if (!old || ORDER.indexOf(mine[0]) < ORDER.indexOf(old[0]) || (mine[0] === old[0] && mine[1] && !old[1])) found.set(k, mine);
+    const states = [corners[i] || ["ok", ""], ...(withLegs ? [legs[i - 1], legs[i]] : [])];
+    for (const mine of states.filter(Boolean)) {
+      const old = found.get(k);
+      if (!old || ORDER.indexOf(mine[0]) < ORDER.indexOf(old[0]) || (mine[0] === old[0] && mine[1] && !old[1])) found.set(k, mine);
+    }
   });
   return found;
 }
@@ -324,10 +333,12 @@ export function legStates(model, k) {
 const WORDS = { ok: "passes", near: "near a limit", open: "not judged in full", fail: "fails" };
 
 export function spoken(item, state) {
-  return `${item.what} ${item.seq}, ${plain(item.at[2] ?? NaN)} m, ${WORDS[state]}`;
+  const height = item.at[2] === null ? "" : `, ${plain(item.at[2])} m`;
+  return `${item.what} ${item.seq}${height}, ${WORDS[state] || "not flown"}`;
 }
 
 export function heightWords(grid, east, north, up) {
+  if (up === null || up === undefined) return "not flown";
   const ground = groundAt(grid, east, north);
   const above = Number.isNaN(ground) ? "" : `, ${plain(up - ground)} m above ground`;
   return `${plain(up)} m AMSL${above}`;

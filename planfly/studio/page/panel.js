@@ -1,7 +1,7 @@
 // The panels beside the map: verdict with suggestions, table of waypoints, planner, settings, files.
 
 import { clear, element, groundAt, plain } from "/axes.js";
-import { cornerStates, legStates } from "/map.js";
+import { cornerStates } from "/map.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = ["verdict", "items", "plan", "settings", "files"];
@@ -24,6 +24,11 @@ export class Panel {
         this.tabs[next].focus();
       });
     });
+    // A number that was entered gives way to what comes of it; one that is being typed stays.
+    for (const box of Object.values(this.boxes)) {
+      box.addEventListener("input", (event) => { event.target.entered = false; });
+      box.addEventListener("change", (event) => { event.target.entered = true; });
+    }
     this.shown = "verdict";
     this.files = [];
     this.saveForm = "waypoints";
@@ -53,8 +58,18 @@ export class Panel {
     this.drawSettings();
   }
 
+  // Another mission was opened: what was found of the one before is of no use.
+  forget() {
+    this.flight = this.home = this.odds = undefined;
+  }
+
   sheet(sheet) {
     this.now = sheet;
+    if (this.waysOf !== undefined && this.waysOf !== sheet.rev) {
+      this.waysOf = undefined;
+      this.app.ways([]);
+      clear(this.wayBox);
+    }
     this.drawVerdict();
     this.drawItems();
     this.drawPlanEnds();
@@ -73,6 +88,10 @@ export class Panel {
   // ---- verdict
 
   drawVerdict() {
+    keepFocus(this.boxes.verdict, () => this.buildVerdict());
+  }
+
+  buildVerdict() {
     const { now, flight } = this;
     if (!now) return;
     const box = clear(this.boxes.verdict), stale = flight && flight.rev !== now.rev;
@@ -94,7 +113,8 @@ export class Panel {
       this.ask("returns", "Does it come home?", "a return to launch from everywhere on the way"),
       this.ask("campaign", "How likely in this weather?", "24 flights, each somewhat different"));
     box.append(long);
-    for (const one of [this.home, this.odds]) if (one) box.append(one);
+    if (this.home) box.append(this.result("Return to launch", this.home));
+    if (this.odds) box.append(this.result("Flights in this weather", this.odds));
   }
 
   ask(job, words, more) {
@@ -114,8 +134,8 @@ export class Panel {
   }
 
   finding(one, quiet) {
-    const suggestions = quiet ? [] : one.suggestions.map((each, which) => element("li", {},
-      each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", finding: one.number, which }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
+    const { rev } = this.now, suggestions = quiet ? [] : one.suggestions.map((each, which) => element("li", {},
+      each.apply ? element("button", { type: "button", class: "apply", onclick: () => this.app.commit({ kind: "apply", rev, finding: one.number, which }) }, "Apply") : element("span", { class: "hand" }, "by hand"),
       element("span", {}, each.text)));
     const whole = ["flight", "mission", "plan"].includes(one.kind) && !/\d/.test(one.where);
     const place = whole ? "" : one.index === null ? element("b", {}, one.where) : element("button", { type: "button", class: "place", title: "Show it on the map", onclick: () => this.app.goTo(one) }, one.where);
@@ -127,20 +147,23 @@ export class Panel {
   // ---- waypoints
 
   drawItems() {
-    const { now, app } = this;
-    if (!now || this.shown !== "items") return;
-    const by = element("input", { type: "number", value: "10", step: "5", "aria-label": "Metres to raise or lower by", id: "raise-by" });
+    if (this.now && this.shown === "items") keepFocus(this.boxes.items, () => this.buildItems());
+  }
+
+  buildItems() {
+    const { now, app } = this, { rev } = now;
+    const by = element("input", { type: "number", value: this.raiseBy || "10", step: "5", onchange: () => { this.raiseBy = by.value; }, "aria-label": "Metres to raise or lower by", id: "raise-by" });
     const raise = (sign, all) => () => {
       const value = sign * Math.abs(Number(by.value));
       if (!Number.isFinite(value) || !value) return;
       const ks = all ? null : [app.selected()];
       if (!all && ks[0] === null) return app.complain("Choose a waypoint first.");
-      app.commit({ kind: "raise", by: value, ...(all ? {} : { ks }) });
+      app.commit({ kind: "raise", rev, by: value, ...(all ? {} : { ks }) });
     };
     const box = clear(this.boxes.items);
     box.append(element("div", { class: "bar" }, element("label", { for: "raise-by" }, "Heights of all"), by, " m",
       element("button", { type: "button", onclick: raise(1, true) }, "Raise"), element("button", { type: "button", onclick: raise(-1, true) }, "Lower")));
-    const worst = cornerStates(now), grid = app.grid();
+    const worst = cornerStates(now, true), grid = app.grid();
     const rows = now.items.slice(0, MOST_ROWS).map((item) => this.row(item, worst, grid));
     const head = element("tr", {}, ...["#", "What", "Height, m AMSL", "Over ground", "Closest to a limit", ""].map((text) => element("th", { scope: "col" }, text)));
     box.append(element("div", { class: "scroll" }, element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows))));
@@ -149,16 +172,14 @@ export class Panel {
 
   row(item, worst, grid) {
     const { app, now } = this, ground = groundAt(grid, item.at[0], item.at[1]);
-    const states = [worst.get(item.k) || ["ok", ""], ...legStates(now, item.k)];
-    const order = ["fail", "open", "near", "ok"];
-    const [state, text] = states.sort((a, b) => order.indexOf(a[0]) - order.indexOf(b[0]) || Boolean(b[1]) - Boolean(a[1]))[0];
+    const { rev } = now, [state, text] = worst.get(item.k) || ["open", "not flown"];
     const height = element("input", { type: "number", step: "1", value: item.at[2] === null ? "" : Math.round(item.at[2] * 10) / 10, "aria-label": `Height of item ${item.seq}, metres above mean sea level` });
     height.addEventListener("change", () => {
       const up = Number(height.value);
-      if (height.value !== "" && Number.isFinite(up)) app.commit({ kind: "move", k: item.k, up: Math.max(-500, Math.min(9000, up)) });
+      if (height.value !== "" && Number.isFinite(up)) app.commit({ kind: "move", rev, k: item.k, up });
     });
     const go = element("button", { type: "button", class: "place", onclick: () => { app.select(item.k, true); } }, String(item.seq));
-    const remove = element("button", { type: "button", class: "remove", "aria-label": `Delete item ${item.seq}`, title: "Delete", onclick: () => app.commit({ kind: "delete", ks: [item.k] }) }, "\u00d7");
+    const remove = element("button", { type: "button", class: "remove", "aria-label": `Delete item ${item.seq}`, title: "Delete", onclick: () => app.commit({ kind: "delete", rev, ks: [item.k] }) }, "\u00d7");
     return element("tr", { "data-k": item.k, "data-state": state, class: item.k === app.selected() ? "selected" : "" },
       element("td", {}, go), element("td", {}, item.what), element("td", {}, height),
       element("td", { class: "number" }, Number.isNaN(ground) || item.at[2] === null ? "\u2013" : plain(item.at[2] - ground)),
@@ -177,9 +198,10 @@ export class Panel {
     this.last = element("select", { id: "plan-last" });
     const plan = () => {
       const asked = { kind: "plan", seed: Math.max(0, Math.round(Number(this.seed.value) || 0)), ways: Number(this.number.value) };
+      if ((this.first.value === "") !== (this.last.value === "")) return app.complain("Choose both ends of the part to plan, or none for the whole mission.");
       if (this.algorithm.value) asked.algorithm = this.algorithm.value;
       if (this.first.value !== "" && this.last.value !== "") Object.assign(asked, { first: Number(this.first.value), last: Number(this.last.value) });
-      app.send(asked);
+      return app.send(asked);
     };
     this.wayBox = element("div", { class: "ways" });
     box.append(element("p", { class: "more" }, "The planner searches a path that the aircraft can fly, clear of ground, threats and zones."),
@@ -199,12 +221,13 @@ export class Panel {
     }
   }
 
-  ways({ ways, at_once: atOnce }) {
+  ways({ ways, rev, at_once: atOnce }) {
     this.stopped("plan");
     if (atOnce || !this.wayBox) return;
     const { app } = this, box = clear(this.wayBox);
     app.ways(ways, 0);
     if (!ways.length) return;
+    this.waysOf = rev ?? this.now?.rev;
     box.append(element("h2", {}, ways.length === 1 ? "Found" : `${ways.length} ways found`));
     ways.forEach((way, k) => {
       const rows = [["Length", `${way.length.toFixed(3)} times straight`], ["Exposure to missiles", way.exposure.toFixed(3)], ["Least clearance to spare", way.clearance === null ? "\u2013" : `${plain(way.clearance, 1)} m`]];
@@ -219,13 +242,18 @@ export class Panel {
   // ---- settings
 
   drawSettings() {
+    if (this.about && this.offered) keepFocus(this.boxes.settings, () => this.buildSettings());
+  }
+
+  buildSettings() {
     const { about, offered, app } = this, box = clear(this.boxes.settings);
-    if (!about || !offered) return;
     const { settings } = about;
     const list = (name, values, chosen) => element("select", { id: `set-${name}`, onchange: (event) => app.send({ kind: "settings", [name]: event.target.value }) }, ...values.map((one) => element("option", { value: one, selected: one === chosen }, one)));
     const number = (name, value, low, high, step) => element("input", { id: `set-${name}`, type: "number", min: low, max: high, step, value, onchange: (event) => {
-      const given = Number(event.target.value);
-      if (event.target.value !== "" && Number.isFinite(given)) app.send({ kind: "settings", [name]: given });
+      const given = Math.max(low, Math.min(high, Number(event.target.value)));
+      if (event.target.value === "" || !Number.isFinite(given)) return;
+      event.target.value = given;
+      app.send({ kind: "settings", [name]: given });
     } });
     const laws = [...new Set([settings.autopilot, ...offered.autopilots])].filter(Boolean);
     const craft = [...new Set([settings.aircraft, ...offered.aircraft])];
@@ -239,6 +267,10 @@ export class Panel {
   // ---- files
 
   drawFiles() {
+    keepFocus(this.boxes.files, () => this.buildFiles());
+  }
+
+  buildFiles() {
     const box = clear(this.boxes.files), { app, now } = this;
     const over = now?.over ? element("p", {}, element("button", { type: "button", class: "main", onclick: () => this.save() }, `Save over ${now.name}`), element("small", {}, "Ctrl+S")) : null;
     box.append(element("h2", {}, "Save"), over, ...FORMS.map(([form, name, more]) => element("p", {}, element("button", { type: "button", onclick: () => app.send({ kind: "save", form }) }, name), element("small", {}, more))));
@@ -289,19 +321,35 @@ export class Panel {
 
   returns(message) {
     this.stopped("returns");
-    this.home = this.result("It comes home", message);
+    this.home = message;
     this.drawVerdict();
   }
 
   campaign(message) {
     this.stopped("campaign");
-    this.odds = this.result("In this weather", message);
+    this.odds = message;
     this.drawVerdict();
   }
 
-  result(title, { state, headline, lines }) {
-    return element("section", { class: "card", "data-state": state }, element("h2", {}, title), element("p", {}, headline), ...lines.slice(0, 6).map((line) => element("p", { class: "line" }, line)));
+  result(title, { rev, state, headline, lines }) {
+    const stale = rev !== this.now.rev;
+    return element("section", { class: stale ? "card stale" : "card", "data-state": state }, element("h2", {}, title),
+      stale ? element("p", { class: "more" }, "before the last change") : null, element("p", {}, headline), ...lines.slice(0, 6).map((line) => element("p", { class: "line" }, line)));
   }
+}
+
+// Builds a box anew; what takes the place of what had the focus has it then, with what was typed and not yet entered.
+function keepFocus(box, build) {
+  const had = document.activeElement, name = (one) => one.id || one.getAttribute("aria-label") || one.textContent;
+  if (!box.contains(had) || had === box) return build();
+  const tools = () => [...box.querySelectorAll("button, input, select, summary")];
+  const at = tools().indexOf(had), typed = had.localName === "input" && had.type === "number" && had.value !== had.defaultValue ? had.value : null;
+  build();
+  const all = tools(), alike = all.filter((one) => one.localName === had.localName && name(one) === name(had));
+  const next = alike.sort((a, b) => Math.abs(all.indexOf(a) - at) - Math.abs(all.indexOf(b) - at))[0];
+  if (next && typed !== null && !had.entered) next.value = typed;
+  (next || box).focus({ preventScroll: true });
+  return undefined;
 }
 
 function field(words, input) {

@@ -18,18 +18,38 @@ let fitted = "", scene = null;
 function onWorld(world) {
   now.world = world;
   map.setWorld(world);
+  setGround();
   panel.world(world);
   if (now.model) drawAll();
 }
 
+// Ground that came for another world is not shown in this one.
+function setGround() {
+  const { world, heights, picture } = now;
+  const own = (one) => one && world?.ground && JSON.stringify([one.east, one.north]) === JSON.stringify(world.shown);
+  now.grid = own(heights) ? heights : null;
+  map.setPicture(own(picture) ? picture : null);
+  scene?.show(now);
+}
+
 function onSheet(sheet) {
   const before = now.sheet;
+  const same = sameItems(before, sheet), opened = before && isOther(before, sheet);
   now.sheet = now.model = sheet;
-  now.fault = "";
-  link.settle();
-  now.dragging = null;
-  map.root.classList.remove("dragging");
-  $("panel-verdict").classList.remove("before");
+  now.committed = false;
+  if (opened) {
+    now.flown = null;
+    panel.forget();
+  }
+  catchUp(before, sheet, same);
+  if (hands.onSheet(same, sheet.rev)) hold();
+  else {
+    now.fault = "";
+    link.settle();
+    now.dragging = null;
+    map.root.classList.remove("dragging");
+    $("panel-verdict").classList.remove("before");
+  }
   if (now.after !== undefined) {
     const items = sheet.items, i = items.findIndex((one) => one.k === now.after);
     if (i >= 0 && items[i + 1] && before && before.items.length < items.length) now.selected = items[i + 1].k;
@@ -52,13 +72,64 @@ function onSheet(sheet) {
   }
   say(`Geometry: ${sheet.verdict.headline}`);
   document.documentElement.dataset.rev = sheet.rev;
-  now.committed = false;
-  if (now.queue.length) app.commit(now.queue.shift());
+  if (now.nudged && !now.queue.length) app.flush();
+  else pump();
+}
+
+// Whether both have the same items, but for one that may stand elsewhere: numbers of items mean the same in both.
+function sameItems(before, sheet) {
+  if (!before || before.name !== sheet.name || before.items.length !== sheet.items.length) return false;
+  let moved = 0;
+  return before.items.every((one, i) => {
+    const other = sheet.items[i];
+    moved += one.lat !== other.lat || one.lon !== other.lon;
+    return one.k === other.k && one.what === other.what && moved < 2;
+  });
+}
+
+// Another mission was opened: nothing is there to undo or to redo, and something was.
+function isOther(before, sheet) {
+  return before.name !== sheet.name || (!sheet.undo && !sheet.redo && Boolean(before.undo || before.redo));
+}
+
+// What waits was meant for the sheet before: it goes on to this one where its numbers mean the same, and else is left.
+function catchUp(before, sheet, same) {
+  const waiting = now.queue.length;
+  now.queue = now.queue.filter((one) => one.rev === undefined || (same && one.rev === before.rev && one.kind !== "apply"));
+  for (const one of now.queue) if (one.rev !== undefined) one.rev = sheet.rev;
+  let left = now.queue.length < waiting;
+  if (now.nudged && same) {
+    now.nudged.rev = sheet.rev;
+    now.model = placed(sheet, now.nudged.k, now.nudged);
+  } else if (now.nudged) {
+    now.nudged = null;
+    left = true;
+  }
+  if (left) complain("The mission has changed meanwhile: the last edit was not made.");
+}
+
+// A model with an item elsewhere.
+function placed(model, k, to) {
+  return { ...model, items: model.items.map((one) => (one.k === k ? { ...one, at: [to.east ?? one.at[0], to.north ?? one.at[1], to.up ?? one.at[2]] } : one)) };
+}
+
+// One edit at a time is on its way; what follows it waits for the sheet that it comes to.
+function pump() {
+  while (!now.committed && now.queue.length) {
+    const message = now.queue.shift();
+    if (!link.send(message)) {
+      now.queue = [];
+      return app.cancel();
+    }
+    now.committed = message.rev !== undefined;
+  }
+  return undefined;
 }
 
 // A verdict on a drag: of all, or of the legs about the item, which are put in their places.
 function onPreview(message) {
-  if (!now.dragging || message.rev !== now.sheet.rev) return;
+  const { dragging } = now;
+  if (!dragging || message.rev !== now.sheet.rev || message.k !== dragging.k || message.n < dragging.since) return;
   now.fault = message.fault || "";
   if (message.fault) {
     document.documentElement.dataset.shown = message.n;
@@ -69,11 +140,9 @@ function onPreview(message) {
     now.checking = false;
   } else {
     now.checking = true;
-    if (message.total_legs !== now.model.path.length) {
-      document.documentElement.dataset.shown = message.n;
-      return answers();
-    }
-    now.model = merged(now.model, message.windows);
+    // Other legs than the sheet's are coloured when all is judged.
+    if (message.total_legs !== now.sheet.path.length) return answers();
+    now.model = merged(now.sheet, message.windows);
   }
   hold();
   if (message.sheet) map.show(now.model);
@@ -100,7 +169,7 @@ function merged(model, windows) {
 function hold() {
   const drop = now.dragging?.drop;
   if (!drop) return;
-  now.model = { ...now.model, items: now.model.items.map((item) => (item.k === now.dragging.k ? { ...item, at: [drop.east, drop.north, drop.up ?? item.at[2]] } : item)) };
+  now.model = placed(now.model, now.dragging.k, drop);
 }
 
 function onFlown(flown) {
@@ -125,6 +194,17 @@ function onWorking(work) {
   panel.working(work);
 }
 
+// What fails beside the edits (a flight, a plan, a disk that is full) leaves them as they are.
+function onFault({ text, job }) {
+  complain(text);
+  if (job !== undefined || link.before === "stopped") return;
+  app.refused();
+  if (now.dragging) {
+    hands.stopDrag();
+    app.cancel();
+  }
+}
+
 function onStopped({ job }) {
   now.work[job] = null;
   progress();
@@ -143,8 +223,13 @@ function shownFlight() {
 function drawAll() {
   if (!now.world || !now.model) return;
   profile.selected = now.selected;
+  const held = map.markers.contains(document.activeElement);
   map.show(now.model);
   map.select(now.selected);
+  if (held && !map.markers.contains(document.activeElement)) {
+    if (now.selected === null) map.root.focus({ preventScroll: true });
+    else map.focus(now.selected);
+  }
   map.setTrack(now.flown?.track, isStale());
   profile.show(now.model, now.world, now.grid, shownFlight());
   scene?.show(now);
@@ -215,17 +300,18 @@ const app = {
   selected: () => now.selected,
   dragFault: () => now.fault,
   select(k, focused) {
-    if (now.selected === k) return;
-    now.selected = k;
-    map.select(k);
-    profile.select(k);
-    panel.select(k);
-    if (!focused && k !== null) map.marks.find((mark) => Number(mark.dataset.k) === k)?.focus({ preventScroll: true });
+    if (now.selected !== k) {
+      now.selected = k;
+      map.select(k);
+      profile.select(k);
+      panel.select(k);
+    }
+    if (!focused && k !== null) map.focus(k);
   },
   selectAfter(k) { now.after = k; },
   begin(k) {
-    if (!now.dragging) {
-      now.dragging = { k };
+    if (now.dragging?.k !== k) {
+      now.dragging = { k, since: link.number + 1 };
       now.checking = true;
       map.root.classList.add("dragging");
       $("panel-verdict").classList.add("before");
@@ -252,18 +338,25 @@ const app = {
     answers();
     app.hint(null);
   },
-  // One edit at a time is on its way: the next counts from the sheet that it comes to.
+  // An edit of the sheet that it was begun on: rev is taken now where the message has none.
   commit(message) {
     link.settle();
-    if (now.nudged) {
-      const nudged = now.nudged;
-      clearTimeout(now.nudgeTimer);
-      now.nudged = null;
-      app.commit({ kind: "move", ...nudged });
-    }
-    if (now.committed) now.queue.push(message);
-    else if (link.send({ rev: now.sheet.rev, ...message })) now.committed = true;
-    else app.cancel();
+    app.flush();
+    now.queue.push({ rev: now.sheet.rev, ...message });
+    pump();
+  },
+  // Anything else that is asked of the server, after the edits that were made before it.
+  send(message) {
+    app.flush();
+    now.queue.push(message);
+    pump();
+  },
+  // The keys that have added up.
+  flush() {
+    const { nudged } = now;
+    clearTimeout(now.nudgeTimer);
+    now.nudged = null;
+    if (nudged) app.commit({ kind: "move", ...nudged });
   },
   refused() {
     now.committed = false;
@@ -271,16 +364,12 @@ const app = {
   },
   // Keys come faster than answers: they add up, and are sent as one.
   nudge(k, to) {
-    const item = now.model.items.find((one) => one.k === k);
-    now.model = { ...now.model, items: now.model.items.map((one) => (one === item ? { ...one, at: [to.east ?? one.at[0], to.north ?? one.at[1], to.up ?? one.at[2]] } : one)) };
-    now.nudged = { ...(now.nudged?.k === k ? now.nudged : { k }), ...to };
+    if (now.nudged && now.nudged.k !== k) app.flush();
+    now.model = placed(now.model, k, to);
+    now.nudged = { rev: now.sheet.rev, ...now.nudged, k, ...to };
     if (to.east !== undefined) map.dragged(k, to.east, to.north);
     clearTimeout(now.nudgeTimer);
-    now.nudgeTimer = setTimeout(() => {
-      const nudged = now.nudged;
-      now.nudged = null;
-      if (nudged) app.commit({ kind: "move", ...nudged });
-    }, 60);
+    now.nudgeTimer = setTimeout(() => { if (!now.committed) app.flush(); }, 60);
   },
   hint(lines, x, y, state) {
     const box = $("hint");
@@ -300,7 +389,6 @@ const app = {
     const ground = groundAt(now.grid, east, north);
     $("place").textContent = `${plain(east / 1000, 2)} km E, ${plain(north / 1000, 2)} km N${Number.isNaN(ground) ? "" : `, ground ${plain(ground)} m`}`;
   },
-  send: (message) => link.send(message),
   complain,
   save: () => panel.save(),
   now,
@@ -345,16 +433,17 @@ const link = new Link({
   saved: (message) => panel.saved(message),
   returns: (message) => { now.work.returns = null; progress(); panel.returns(message); },
   campaign: (message) => { now.work.campaign = null; progress(); panel.campaign(message); },
-  fault: ({ text }) => { app.refused(); complain(text); if (now.dragging) app.cancel(); },
+  fault: onFault,
   stale: () => { app.refused(); complain("Another page has changed the mission: this is how it is now."); },
-  picture: (picture) => map.setPicture(picture),
-  heights: (grid) => { now.grid = grid; scene?.show(now); },
+  picture: (picture) => { now.picture = picture; setGround(); },
+  heights: (heights) => { now.heights = heights; setGround(); },
 });
 
 // ---- buttons, sizes, files
 
-$("undo").onclick = () => link.send({ kind: "undo" });
-$("redo").onclick = () => link.send({ kind: "redo" });
+$("undo").onclick = () => app.send({ kind: "undo" });
+$("redo").onclick = () => app.send({ kind: "redo" });
+$("fly").onclick = () => app.send({ kind: "fly" });
 $("stop").onclick = () => link.send({ kind: "stop" });
 for (const [id, factor] of [["zoom-in", 1.5], ["zoom-out", 1 / 1.5]]) {
   $(id).onclick = () => { map.view.zoom(factor, map.view.width / 2, map.view.height / 2); map.layOut(); };

@@ -199,6 +199,46 @@ def test_keys_move_raise_and_delete(page: Browser) -> None:
     assert marks(page) == count
 
 
+def test_a_key_for_a_field_changes_no_waypoint(page: Browser) -> None:
+    count = marks(page)
+    page.value("document.querySelectorAll('.mark')[1].focus()")
+    key(page, "n", 78)
+    assert page.value("document.activeElement.getAttribute('aria-label')").startswith("waypoint 3,")
+    page.value("document.activeElement.blur()")
+    key(page, "Delete", 46)
+    page.value("document.getElementById('tab-items').click()")
+    page.value("document.getElementById('tab-items').focus()")
+    key(page, "Backspace", 8)
+    page.value(
+        "(() => { const one = document.querySelectorAll('#panel-items td input')[1]; one.focus(); one.value = 99999;"
+        " one.dispatchEvent(new Event('change', { bubbles: true })); })()"
+    )
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: move item')")
+    assert page.value("document.activeElement.getAttribute('aria-label')").startswith("Height of item 2,")
+    assert page.value("Number(document.activeElement.value)") == pytest.approx(9000.0, abs=1.0)
+    assert marks(page) == count
+    undo_all(page)
+
+
+def test_an_answer_of_an_older_sheet_holds_up_no_drag(page: Browser) -> None:
+    program = """import('/link.js').then(({ Link }) => {
+      const shown = [], sent = [], found = [];
+      const link = Object.assign(Object.create(Link.prototype), {
+        number: 0, waiting: null, next: null, up: true, handlers: { preview: (one) => shown.push(one.n) },
+        send(one) { if (this.up) sent.push(one.n); return this.up; } });
+      link.up = false;
+      link.drag({ k: 1 });
+      found.push(link.waiting);
+      link.up = true;
+      for (let i = 0; i < 3; i++) link.drag({ k: 1 });
+      link.hear(JSON.stringify({ kind: 'preview', n: 2, stale: true }));
+      link.hear(JSON.stringify({ kind: 'preview', n: 4 }));
+      link.settle();
+      return [...found, link.waiting, sent, shown];
+    })"""
+    assert page.value(program) == [None, None, [2, 4], [4]]
+
+
 def test_a_diamond_inserts_and_a_profiles_dot_raises(page: Browser) -> None:
     count = marks(page)
     x, y = centre(page, ".diamonds path")
