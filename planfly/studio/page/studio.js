@@ -159,8 +159,13 @@ function merged(model, windows) {
   for (const one of windows) {
     copy.route.splice(one.first, one.route.length, ...one.route);
     copy.path.splice(one.first, one.path.length, ...one.path);
-    copy.states.legs.splice(one.first, one.states.legs.length, ...one.states.legs);
-    copy.states.corners.splice(one.first, one.states.corners.length, ...one.states.corners);
+    for (const kind of ["legs", "corners"]) {
+      one.states[kind].forEach((state, i) => {
+        const old = model.states[kind][one.first + i];
+        // Bounds are judged with the whole flight: until then what failed by them fails.
+        copy.states[kind][one.first + i] = old[0] === "fail" && old[1].startsWith("bounds") && state[0] !== "fail" ? old : state;
+      });
+    }
   }
   return copy;
 }
