@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Mission
+from flight.mission.items import LANDINGS, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -86,9 +86,9 @@ class _Sheet:
         return np.asarray(self.route.waypoints)
 
     def shift(self, waypoints: Sequence[int], by: Floats) -> None:
-        """Move the items of waypoints, each once, by so many metres east, north and up."""
+        """Move the items of waypoints, each once, by so many metres east, north and up; a landing stays."""
         for index in dict.fromkeys(self.index_of(one) for one in waypoints):
-            if index is None:
+            if index is None or self.mission.items[index].command in LANDINGS:
                 continue
             here = self.desk.points(self.mission)[places(self.mission).index(index)]
             if by[0] or by[1]:

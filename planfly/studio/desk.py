@@ -4,6 +4,7 @@ World and aircraft are loaded once.  A mission that was not changed is judged as
 certificate; a changed one as a mission file is.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,14 +12,14 @@ from numpy.typing import NDArray
 
 from flight.mission.from_plan import acceptance_radii
 from flight.mission.implied_scenario import implied_scenario
-from flight.mission.items import LANDINGS, Command, Mission
+from flight.mission.items import AMSL, LANDINGS, OVER_HOME, Command, Mission, MissionItem
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import Route, lay_route, with_end_courses
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import Airframe, load_airframe
-from planfly.open_mission import OpenedMission
+from planfly.open_mission import NamedFences, OpenedMission
 from planfly.pipeline import make_setup
 from planfly.studio.edits import places
 from planner.plan import Plan
@@ -28,6 +29,7 @@ from world.scenario import Scenario
 Floats = NDArray[np.float64]
 # A mission without a scenario gets a new one around it where it comes so near to the edge of its own, m.
 _RIM = 500.0
+_NO_FENCES = NamedFences()
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,7 @@ class Desk:
     opened: the setup as it was opened, with its plan if it is of one.
     terrain: of a mission that came without a scenario, the elevation file named; None for none.
     planned: whether the acceptance radii are planfly's, and follow the turns.
+    fences: named beside a mission; their zones stand in every world that is made around it.
     """
 
     scenario: Scenario
@@ -55,9 +58,10 @@ class Desk:
     opened: FlightSetup
     terrain: str | None = None
     planned: bool = False
+    fences: NamedFences = _NO_FENCES
 
     @classmethod
-    def of(cls, opened: OpenedMission, terrain: str | None = None) -> "Desk":
+    def of(cls, opened: OpenedMission, terrain: str | None = None, fences: NamedFences = _NO_FENCES) -> "Desk":
         """The desk of an opened mission or plan."""
         setup = opened.setup
         return cls(
@@ -67,14 +71,16 @@ class Desk:
             setup,
             terrain,
             planned=setup.plan is not None,
+            fences=fences,
         )
 
     def flown_as(self, scenario: Scenario) -> "Desk":
-        """The desk with the same mission in another weather, or with another aircraft or autopilot."""
+        """The desk with the same mission in another weather, or with another aircraft or autopilot.
+
+        A plan's certificate is of the world in which it was planned: it does not count in another.
+        """
         airframe = load_airframe(scenario)
-        opened, plan = self.opened, self.opened.plan
-        plan = None if plan is None else replace(plan, scenario=scenario)
-        setup = make_setup(scenario, airframe, opened.mission, self.seed, plan=plan)
+        setup = make_setup(scenario, airframe, self.opened.mission, self.seed)
         return replace(self, scenario=scenario, airframe=airframe, opened=setup)
 
     def of_plan(self, plan: Plan, mission: Mission) -> "Desk":
@@ -94,7 +100,7 @@ class Desk:
         made = implied_scenario(mission, self.terrain, self.scenario.flight, vertical_legs=True).scenario
         spec = made.spec.model_copy(update={"wind": self.scenario.spec.wind, "limits": self.scenario.spec.limits})
         made = replace(made, spec=spec, wind=self.scenario.wind, limits=self.scenario.limits)
-        return replace(self, scenario=made)
+        return replace(self, scenario=self.fences.on_scenario(made))
 
     # ------------------------------------------------------------------
     # Places.
@@ -106,13 +112,38 @@ class Desk:
     def points(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
         """East, north and height above mean sea level of each place of `edits.places`, (n, 3) m.
 
-        The height of one that no flight comes to is NaN.
+        A landing's height is that of its touchdown.  One that no flight comes to has the height that its frame says,
+        NaN where that is not known.
         """
         placed = self.placed(mission) if placed is None else placed
         heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
         items = [mission.items[k] for k in places(mission)]
         east, north = to_map(self.scenario.origin, [one.lat_deg for one in items], [one.lon_deg for one in items])
-        return np.stack([east, north, [heights.get(one.seq, np.nan) for one in items]], axis=1)
+        up = [
+            self._height_by_frame(mission, one, x, y)
+            if one.command in LANDINGS or one.seq not in heights
+            else heights[one.seq]
+            for one, x, y in zip(items, np.asarray(east).tolist(), np.asarray(north).tolist(), strict=True)
+        ]
+        return np.stack([east, north, up], axis=1)
+
+    def _height_by_frame(self, mission: Mission, item: MissionItem, east: float, north: float) -> float:
+        """Height above mean sea level that an item states, m; NaN where it states none, or over unknown ground."""
+        if item.frame in AMSL:
+            return item.alt
+        terrain, home = self.scenario.terrain, mission.home
+        if item.frame in OVER_HOME and home is not None and math.isfinite(home.alt):
+            return home.alt + item.alt
+        if item.frame in OVER_HOME:
+            if home is None:
+                return math.nan
+            x, y = to_map(self.scenario.origin, home.lat_deg, home.lon_deg)
+            east, north = float(x), float(y)
+        return math.nan if terrain is None else float(terrain.height(east, north)) + item.alt
+
+    def flown(self, mission: Mission) -> frozenset[int]:
+        """Numbers of the items that a flight comes to."""
+        return frozenset(stop.stop.item for stop in self.placed(mission).stops)
 
     def geographic(self, east: float, north: float) -> tuple[float, float]:
         """Latitude and longitude of a place on the map, degrees."""

@@ -1,5 +1,6 @@
 """What is opened in the studio, and what a mission under edit is saved as, with what each form leaves out."""
 
+import contextlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,15 +10,17 @@ from typing import Any
 import numpy as np
 
 from flight.mission.from_plan import plan_mission
-from flight.mission.items import AMSL, Mission
+from flight.mission.items import AMSL, LANDINGS, TAKEOFFS, Command, Mission
 from flight.mission_files.formats import mission_text, parse_mission
 from logs.importers.open_log import is_imported_log
+from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks
 from logs.recording.reader import read_log
+from logs.recording.setup_attachments import PLAN_FILE, SCENARIO_FILE
 from logs.views.exports.map_files import kml_text, map_zones, plan_line
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.api.flying import opened_mission
 from planfly.api.imported import read_imported
-from planfly.open_mission import OpenedMission, ScenarioChange, is_log
+from planfly.open_mission import MCAP_MAGIC, OpenedMission, ScenarioChange, is_log
 from planfly.pipeline import make_setup
 from planfly.studio.desk import Desk, Judged
 from planner.evaluation.certify import certify
@@ -43,7 +46,7 @@ class Document:
     name: for people; stem: of files that are saved.
     opened: with its setup and airframe.
     kind: of `KINDS`, "" for what was no mission file; data: its bytes, which an unchanged mission is saved as.
-    path: the file that the command named; None for a scenario, and for a dropped file.
+    path: the file that the command named; None for any other.  on_disk: the bytes that it has, as far as is known.
     to_plan: whether it is a scenario that has no path yet.
     """
 
@@ -53,6 +56,7 @@ class Document:
     kind: str = ""
     data: bytes = b""
     path: Path | None = None
+    on_disk: bytes = b""
     to_plan: bool = False
 
 
@@ -76,7 +80,8 @@ def open_document(target: str, world: World) -> Document:
     opened = _open_file(path, world)
     kind = next((kind for kind, suffix in KINDS.items() if suffix == path.suffix.lower()), "")
     kind = "waypoints" if path.suffix.lower() == ".txt" else "" if kind == "kml" else kind
-    return Document(path.name, path.stem, opened, kind, path.read_bytes() if kind else b"", path)
+    data = path.read_bytes() if kind else b""
+    return Document(path.name, path.stem, opened, kind, data, path, data)
 
 
 def open_dropped(name: str, data: bytes, world: World) -> Document:
@@ -90,11 +95,26 @@ def open_dropped(name: str, data: bytes, world: World) -> Document:
     with temporary_folder("planfly-studio-") as folder:
         file = folder / f"dropped{suffix}"
         file.write_bytes(data)
+        if data.startswith(MCAP_MAGIC):
+            _refuse_log_of_other_files(shown, file)
         try:
             opened = open_document(str(file), world)
         except PlanflyError as error:
             raise PlanflyError(str(error).replace(str(file), shown), file=shown) from None
     return replace(opened, name=shown, stem=Path(shown).stem, path=None)
+
+
+def _refuse_log_of_other_files(name: str, file: Path) -> None:
+    """Refuse a log whose scenario, or that of whose plan, names files of this machine."""
+    found = Container()
+    with file.open("rb") as stream, contextlib.suppress(PlanflyError, *PARSE_ERRORS):
+        stream.seek(len(MAGIC))
+        # What is wrong with a log is said where it is read: what comes before that counts.
+        for _ in read_chunks(stream, found):
+            pass
+    if SCENARIO_FILE in found.attachments:
+        _refuse_other_files(name, b'{"scenario": ' + found.attachments[SCENARIO_FILE] + b"}")
+    _refuse_other_files(name, found.attachments.get(PLAN_FILE, b""))
 
 
 def _refuse_other_files(name: str, data: bytes) -> None:
@@ -173,7 +193,9 @@ def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> 
     An unchanged mission in the form that it was opened in is the file that was opened.
     """
     mission, name = judged.mission, f"{document.stem}{KINDS[kind]}"
-    if kind == document.kind and mission is document.opened.setup.mission:
+    before = document.opened.setup.scenario
+    same = kind != "plan.json" or desk.scenario is before
+    if kind == document.kind and mission is document.opened.setup.mission and same:
         return Saved(name, document.data)
     if kind == "plan.json":
         return _saved_plan(name, desk, judged)
@@ -181,7 +203,8 @@ def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> 
         text = kml_text(desk.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
         return Saved(name, _bytes(text), ("a map only: the commands, speeds and frames of the items are not in it",))
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
-    return Saved(name, text.encode(), _losses(desk, mission, text, name, kind))
+    losses = (*_losses(desk, mission, text, name, kind), *_lost_settings(before, desk.scenario))
+    return Saved(name, text.encode(), losses)
 
 
 def _bytes(text: str | bytes) -> bytes:
@@ -206,6 +229,17 @@ def _losses(desk: Desk, mission: Mission, text: str, name: str, kind: str) -> tu
     return tuple(found)
 
 
+def _lost_settings(before: Scenario, now: Scenario) -> tuple[str, ...]:
+    """What was set here of how a mission is flown, which no ground station's file holds."""
+    differs = {
+        "wind": before.spec.wind != now.spec.wind,
+        "aircraft, autopilot or airspeed": before.spec.flight != now.spec.flight,
+        "clearance": before.limits.min_clearance_m != now.limits.min_clearance_m,
+    }
+    names = [name for name, other in differs.items() if other]
+    return (f"the settings changed here: {', '.join(names)}",) if names else ()
+
+
 def _saved_plan(name: str, desk: Desk, judged: Judged) -> Saved:
     """The mission as a plan of its scenario, with the certificate that its path has now."""
     plan = judged.setup.plan
@@ -217,6 +251,18 @@ def _saved_plan(name: str, desk: Desk, judged: Judged) -> Saved:
         problem = (made.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")
     return Saved(name, plan_json(made).encode(), tuple(losses))
+
+
+def _refuse_what_no_plan_holds(mission: Mission) -> None:
+    """Refuse what a plan of edited waypoints would drop: ways to the ground, and speeds along the way."""
+    first = next((k for k, item in enumerate(mission.items) if item.has_position), 0)
+    for k, item in enumerate(mission.items):
+        lost = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
+        if item.command == Command.DO_CHANGE_SPEED and k > first:
+            lost = "a change of speed along its way"
+        if lost:
+            why = f"a plan.json of edited waypoints does not hold {lost} (item {item.seq}): save a .plan, or plan again"
+            raise MissionError(f"{mission.source}: {why}", file=mission.source, field=f"item {item.seq}")
 
 
 def certified_plan(desk: Desk, judged: Judged) -> Plan:
@@ -237,6 +283,7 @@ def certified_plan(desk: Desk, judged: Judged) -> Plan:
         or any(one.frame not in AMSL and one.has_position for one in mission.items)
     ):
         raise MissionError(f"{name}: a plan holds plain waypoints above mean sea level, once each", file=name)
+    _refuse_what_no_plan_holds(mission)
     waypoints = np.array(route.waypoints)[route.items >= 0]
     limits = desk.airframe.limits.surely()
     problem = make_problem(scenario, limits)

@@ -16,6 +16,7 @@ from flight.mission.items import (
     Frame,
     Mission,
     MissionItem,
+    is_navigation,
     item_problem,
     on_grid,
 )
@@ -23,6 +24,8 @@ from world.errors import MissionError
 
 # Items of a mission under edit at most: a drag is judged in time for the hand, and the page draws them all.
 MAX_EDITED = 2_000
+# What belongs to the place that comes next rather than to the one before.
+_OPENING = (Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.JUMP_TAG)
 
 
 def is_place(item: MissionItem) -> bool:
@@ -86,8 +89,23 @@ def at_height(mission: Mission, index: int, amsl: float, now: float) -> Mission:
     return _with_item(mission, index, replace(item, frame=int(Frame.GLOBAL), alt=_milli(amsl)))
 
 
+def next_index(mission: Mission, after: int) -> int:
+    """Where a waypoint behind a place stands in the list: after what is done at that place, before what is flown next.
+
+    >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
+    >>> next_index(Mission(None, tuple(way)), 0)
+    2
+    """
+    index = after + 1
+    for item in mission.items[index:]:
+        if is_navigation(item.command) or item.command in _OPENING:
+            break
+        index += 1
+    return index
+
+
 def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, height: float | None = None) -> Mission:
-    """A mission with a waypoint more behind a place, in the frame of that place.
+    """A mission with a waypoint more behind a place, at `next_index`, in the frame of that place.
 
     height: in that frame, m; None for that of the place.  Raises MissionError where there is no room for one more.
 
@@ -100,8 +118,9 @@ def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, heigh
     if len(mission.items) >= MAX_EDITED:
         raise MissionError(f"{mission.source}: {MAX_EDITED} items: no more can be edited here", file=mission.source)
     radius = before.params[1] if before.command == Command.NAV_WAYPOINT else 0.0
+    index = next_index(mission, after)
     new = MissionItem(
-        before.seq + 1,
+        mission.items[index - 1].seq + 1,
         int(Command.NAV_WAYPOINT),
         before.frame,
         (0.0, radius, 0.0, 0.0),
@@ -109,7 +128,7 @@ def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, heigh
         on_grid(lon_deg),
         before.alt if height is None else _milli(height),
     )
-    return _with_new(mission, after + 1, new)
+    return _with_new(mission, index, new)
 
 
 def deleted(mission: Mission, index: int) -> Mission:

@@ -50,7 +50,7 @@ class Jobs:
 
     def start(self, session: Session) -> None:
         """Fly what was opened, or plan it where it is a scenario without a path."""
-        if session.document.to_plan:
+        if session.document.to_plan and not session.is_changed:
             self._at_once = True
             self._ask(
                 LONG,
@@ -165,6 +165,10 @@ class Jobs:
             return [{"kind": "stopped", "job": asked.name}]
         if answer.kind == "fault":
             return [{"kind": "stopped", "job": asked.name}, {"kind": "fault", "text": str(answer.value)}]
+        if asked.name == "plan" and asked.rev != session.rev:
+            self._at_once = False
+            edited = "the mission was changed while its path was searched, and is left as it is: plan again for a path"
+            return [{"kind": "stopped", "job": "plan"}, {"kind": "fault", "text": edited}]
         return [self._done(asked, answer.value, session)]
 
     def _done(self, asked: _Asked, value: Any, session: Session) -> Json:
@@ -174,7 +178,7 @@ class Jobs:
             return self._flown
         if asked.name == "plan":
             session.plans = (list(value), session.plans[1])
-            return {"kind": "ways", "ways": [_way(one) for one in value], "at_once": self._at_once}
+            return {"kind": "ways", "rev": asked.rev, "ways": [_way(one) for one in value], "at_once": self._at_once}
         found = {"kind": asked.name, "rev": asked.rev, **value}
         self._others = [*(one for one in self._others if one["kind"] != asked.name), found]
         return found

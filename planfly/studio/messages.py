@@ -1,15 +1,18 @@
 """The messages of the page to the server: strict, bounded, and nothing in them is a path.
 
-Each is one JSON object whose ``kind`` says what it is.  Anything else closes the connection.
+Each is one JSON object whose ``kind`` says what it is.  A value that it may not have is answered with a fault; what
+is no message closes the connection.
 """
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 # A dropped file comes as text in a message; all others are small.
 MAX_MESSAGE = 256 * 1024
 MAX_DROPPED_MESSAGE = 24 * 2**20
+# The first message, from whoever it is.
+MAX_FIRST = 1024
 
 
 class _Message(BaseModel):
@@ -135,6 +138,7 @@ class Choose(_Message):
     """One of the paths that were planned."""
 
     kind: Literal["choose"]
+    rev: _Rev
     which: Annotated[int, Field(ge=0, le=20)]
 
 
@@ -180,6 +184,19 @@ def read_message(text: str | bytes) -> Message:
     if size > MAX_MESSAGE and '"open"' not in str(text[:200]):
         raise ValueError("a message that is too long")
     return _ADAPTER.validate_json(text)
+
+
+def fault_of(error: ValidationError) -> str:
+    """What is wrong with a message of a known kind, in a line; "" for what is no message at all.
+
+    >>> try:
+    ...     read_message('{"kind": "raise", "rev": 1, "by": 1e9}')
+    ... except ValidationError as error:
+    ...     fault_of(error)
+    'raise: by: Input should be less than or equal to 9000'
+    """
+    first = error.errors(include_url=False, include_context=False, include_input=False)[0]
+    return f"{': '.join(map(str, first['loc']))}: {first['msg']}" if len(first["loc"]) > 1 else ""
 
 
 def message_schema() -> dict[str, Any]:

@@ -32,6 +32,8 @@ HOST = "127.0.0.1"
 USUAL_PORT = 8790
 # s between looks at whether to stop, and until what is under way is given up.
 _POLL, _CLOSING = 0.1, 2
+# Connections at a time, of which pages have a few each.
+_CONNECTIONS = 32
 
 
 def _never() -> bool:
@@ -158,7 +160,7 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
         app,
         log_level="critical", access_log=False, server_header=False, date_header=False, lifespan="off",
         ws="websockets-sansio", ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE, timeout_graceful_shutdown=_CLOSING,
-        h11_max_incomplete_event_size=16_384, http="h11",
+        limit_concurrency=_CONNECTIONS, h11_max_incomplete_event_size=16_384, http="h11",
     )  # fmt: skip
     web = Quiet(config)
     serving = asyncio.create_task(web.serve(sockets=[listener]))
@@ -169,5 +171,8 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
     finally:
         web.should_exit = True
         running.cancel()
-        await asyncio.gather(serving, running, return_exceptions=True)
+        ended = await asyncio.gather(serving, running, return_exceptions=True)
         await server.close()
+    for one in ended:
+        if isinstance(one, Exception):
+            raise one

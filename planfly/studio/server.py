@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from planfly.studio import messages
@@ -35,11 +36,13 @@ Given = TypeVar("Given")
 
 # Pages at a time; s until a page has said its token, and between what is kept; frames that wait for a slow page.
 MAX_PAGES, PATIENCE, KEEPING = 4, 5.0, 3.0
+# Sockets at a time that have not given a token yet.
+MAX_UNWELCOMED = 16
 _WAITING = 64
 # Files of a folder that are listed, and their suffixes.
 _MOST_FILES, _LISTED = 200, (".waypoints", ".plan", ".json", ".mcap")
 # Codes with which a websocket is closed.
-NO_TOKEN, TOO_MANY, NOT_UNDERSTOOD = 4403, 4429, 1007
+NO_TOKEN, TOO_MANY, TOO_SLOW, NOT_UNDERSTOOD = 4403, 4429, 1013, 1007
 
 
 @dataclass(eq=False)
@@ -52,12 +55,16 @@ class Page:
     drag: messages.Drag | None = None
     dragged: asyncio.Event = field(default_factory=asyncio.Event)
     seen: tuple[int, bool] = (0, False)
+    full: asyncio.Event = field(default_factory=asyncio.Event)
 
     def send(self, message: Json | bytes) -> None:
         """Send it when the page can take it; one that takes nothing more is closed."""
         frame = message if isinstance(message, bytes) else json.dumps(message, separators=(",", ":"), allow_nan=False)
-        with contextlib.suppress(asyncio.QueueFull):
+        try:
             self.frames.put_nowait(frame)
+        except asyncio.QueueFull:
+            # A page that has missed a frame shows what is not so: it begins anew.
+            self.full.set()
 
 
 class Server:
@@ -74,6 +81,8 @@ class Server:
         self._grounds: dict[tuple[int, bool], tuple[bytes, ...]] = {}
         self.jobs = Jobs(self._answered_elsewhere)
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._taking: asyncio.Future[None] | None = None
+        self._unkept, self._unwelcomed = "", 0
         self.welcomed = threading.Event()
 
     # ------------------------------------------------------------------
@@ -89,9 +98,15 @@ class Server:
 
     async def _keep(self) -> None:
         if self._kept is not None and (self.session.is_changed or self.session.kept_rev):
-            # Without room on the disk the studio goes on, and what is done is not kept.
-            with contextlib.suppress(OSError, PlanflyError):
+            # Without room on the disk the studio goes on, and what is done is not kept: the pages say so once.
+            try:
                 await self._judged(lambda: self.session.keep(self._kept or Path()))
+            except (OSError, PlanflyError) as error:
+                if not self._unkept:
+                    self._broadcast({"kind": "fault", "text": f"what is done here is not kept: {error}"})
+                self._unkept = str(error)
+            else:
+                self._unkept = ""
 
     async def close(self) -> None:
         """End the processes and keep what was done."""
@@ -108,17 +123,28 @@ class Server:
 
     async def serve(self, socket: WebSocket) -> None:
         """Speak with a page until it goes."""
-        await socket.accept()
-        page = await self._welcome(socket)
+        if self._unwelcomed >= MAX_UNWELCOMED:
+            await socket.close(TOO_MANY)
+            return
+        self._unwelcomed += 1
+        try:
+            await socket.accept()
+            page = await self._welcome(socket)
+        finally:
+            self._unwelcomed -= 1
         if page is None:
             return
         self._pages.add(page)
         self.welcomed.set()
         tasks = [asyncio.create_task(self._write(page)), asyncio.create_task(self._preview(page))]
+        hearing, full = asyncio.create_task(self._converse(page)), asyncio.create_task(page.full.wait())
         try:
-            await self._show_all(page)
-            while True:
-                await self._hear(page, await _text(socket))
+            await asyncio.wait((hearing, full), return_when=asyncio.FIRST_COMPLETED)
+            if full.done():
+                with contextlib.suppress(RuntimeError, WebSocketDisconnect, asyncio.TimeoutError):
+                    await asyncio.wait_for(socket.close(TOO_SLOW), PATIENCE)
+            else:
+                hearing.result()
         except WebSocketDisconnect:
             pass
         except ValueError:
@@ -126,15 +152,23 @@ class Server:
                 await socket.close(NOT_UNDERSTOOD)
         finally:
             self._pages.discard(page)
-            for task in tasks:
+            for task in (*tasks, hearing, full):
                 task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+            await asyncio.gather(*tasks, hearing, full, return_exceptions=True)
+
+    async def _converse(self, page: Page) -> None:
+        await self._show_all(page)
+        while True:
+            await self._hear(page, await _text(page.socket))
 
     async def _welcome(self, socket: WebSocket) -> Page | None:
         """The page, if its first message has the token."""
         code = TOO_MANY if len(self._pages) >= MAX_PAGES else NO_TOKEN
         with contextlib.suppress(ValueError, asyncio.TimeoutError, WebSocketDisconnect):
-            first = read_message(await asyncio.wait_for(_text(socket), PATIENCE))
+            text = await asyncio.wait_for(_text(socket), PATIENCE)
+            if len(text) > messages.MAX_FIRST:
+                raise ValueError("a first message that is too long")
+            first = read_message(text)
             given = isinstance(first, messages.Hello) and hmac.compare_digest(
                 first.token.encode(), self._token.encode()
             )
@@ -161,6 +195,8 @@ class Server:
             try:
                 found = await self._judged(lambda asked=asked: self.session.preview(asked))  # type: ignore[misc]
             except StaleEdit:
+                # The page waits for an answer before it asks again.
+                page.send({"kind": "preview", "n": asked.n, "stale": True})
                 continue
             except PlanflyError as error:
                 found = {"fault": str(error)}
@@ -203,7 +239,14 @@ class Server:
 
     async def _hear(self, page: Page, text: str) -> None:
         """Do what a message asks.  Raises ValueError for one that is not understood."""
-        message = read_message(text)
+        try:
+            message = read_message(text)
+        except ValidationError as error:
+            fault = messages.fault_of(error)
+            if not fault:
+                raise
+            page.send({"kind": "fault", "text": fault})
+            return
         if isinstance(message, messages.Drag):
             page.drag = message
             page.dragged.set()
@@ -270,7 +313,7 @@ class Server:
             case messages.Settings():
                 session.change_settings(message)
             case messages.Choose():
-                session.replace_plan(message.which)
+                session.replace_plan(message)
             case messages.Open():
                 session.open(self._opened(message))
                 self.jobs.forget()
@@ -300,8 +343,19 @@ class Server:
         for message in self.jobs.answered(pilot, answer, self.session):
             self._broadcast(message)
         if self.jobs.chosen_at_once(self.session):
-            task = asyncio.ensure_future(self._change(messages.Choose(kind="choose", which=0)))
-            task.add_done_callback(lambda done: done.exception())
+            chosen = messages.Choose(kind="choose", rev=self.session.rev, which=0)
+            self._taking = asyncio.ensure_future(self._take(chosen))
+
+    async def _take(self, chosen: messages.Choose) -> None:
+        """Take the path that was planned when the studio began, unless the mission was edited meanwhile."""
+        try:
+            await self._change(chosen)
+        except StaleEdit:
+            self._broadcast({"kind": "fault", "text": "the mission was edited meanwhile: its first path is not taken"})
+        except PlanflyError as error:
+            self._broadcast({"kind": "fault", "text": str(error)})
+        except INTERNAL as error:
+            self._broadcast({"kind": "fault", "text": internal_text(error)})
 
     def _broadcast(self, message: Json) -> None:
         for page in self._pages:

@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from flight.mission.items import Home, Mission, MissionItem
+from flight.mission.items import LANDINGS, Home, Mission, MissionItem
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.api.planning import changed_scenario
+from planfly.open_mission import read_named_fences
 from planfly.studio import edits
 from planfly.studio.applied import apply_suggestion
 from planfly.studio.desk import Desk, Judged
 from planfly.studio.documents import Document, Saved, World, open_document, planned_mission, save_document
 from planfly.studio.history import History
-from planfly.studio.messages import Apply, Delete, Drag, Insert, Move, Raise, Settings
+from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
 from planfly.studio.sheet import Json, sheet_json, window_json, world_json
 from planfly.studio.windows import judge_windows
 from planner.plan import Plan
@@ -44,6 +45,7 @@ class Session:
     rev: grows with every change.  judged, requirements: of the mission as it is.
     plans: paths that were planned and may be chosen, with the items that they would replace.
     world_rev: grows with every change of the world.
+    named: the file that the command named, the only one that is written over.
     """
 
     document: Document
@@ -56,18 +58,21 @@ class Session:
     world_rev: int = 1
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
     kept_rev: int = 0
+    named: Path | None = None
 
     @classmethod
     def of(cls, document: Document, world: World) -> "Session":
         """A session that begins with what was opened."""
-        desk = Desk.of(document.opened, world.terrain)
+        desk = Desk.of(document.opened, world.terrain, read_named_fences(world.fence))
         judged = desk.judge(document.opened.setup.mission)
         history = History(document.opened.setup.mission)
-        return cls(document, world, desk, history, judged, route_requirements(judged.setup))
+        named = None if document.path is None else document.path.resolve()
+        return cls(document, world, desk, history, judged, route_requirements(judged.setup), named=named)
 
     def open(self, document: Document) -> None:
         """Begin anew with another document."""
-        made = Session.of(document, self.world)
+        named = document.path is not None and document.path.resolve() == self.named
+        made = Session.of(document if named else replace(document, path=None), self.world)
         self.document, self.desk, self.history = made.document, made.desk, made.history
         self.judged, self.requirements, self.plans = made.judged, made.requirements, ([], None)
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
@@ -100,9 +105,14 @@ class Session:
                 self._show(self.history.first)
                 self.history.add(self.history.first, "revert to the file")
             return
+        before = self.history.at
         done = self.history.undo() if kind == "undo" else self.history.redo()
-        if done:
-            self._show(self.mission)
+        try:
+            if done:
+                self._show(self.mission)
+        except Exception:
+            self.history.at = before
+            raise
 
     def preview(self, message: Drag) -> Json:
         """What a drag would come to, which changes nothing: windows, or the whole where that is asked for."""
@@ -114,12 +124,14 @@ class Session:
         judged = self.desk.judge(mission)
         return {"sheet": sheet_json(self.desk, judged, route_requirements(judged.setup))}
 
-    def replace_plan(self, which: int) -> None:
-        """Take one of the planned paths: all of the mission, or the items between two."""
+    def replace_plan(self, message: Choose) -> None:
+        """Take one of the planned paths: all of the mission, or the items between two.  Raises StaleEdit."""
+        if message.rev != self.rev:
+            raise StaleEdit
         plans, between = self.plans
-        if not 0 <= which < len(plans):
+        if not 0 <= message.which < len(plans):
             raise PlanflyError("that path is not there any more: plan again", field="which")
-        plan = plans[which]
+        plan = plans[message.which]
         if between is None:
             self._show_plan(plan)
             return
@@ -127,21 +139,24 @@ class Session:
         self._show(mission)
         self.history.add(mission, "plan a part")
 
-    def _show(self, mission: Mission) -> None:
-        """Judge a mission as the one that is shown, in its world."""
-        desk = self.desk.around(mission)
+    def _show(self, mission: Mission, desk: Desk | None = None) -> None:
+        """Judge a mission as the one that is shown, in its world; nothing is changed where that fails.
+
+        desk: with which it is judged, None for the one there is.  Paths that were planned before are gone.
+        """
+        desk = (self.desk if desk is None else desk).around(mission)
         judged = desk.judge(mission)
         requirements = route_requirements(judged.setup)
         if desk is not self.desk:
             self.world_rev += 1
         self.desk, self.judged, self.requirements = desk, judged, requirements
+        self.plans = ([], None)
         self.rev += 1
 
     def _show_plan(self, plan: Plan) -> None:
         """A new plan takes the place of all; its certificate counts until it is edited."""
         mission = planned_mission(plan, self.desk.airframe)
-        self.desk = self.desk.of_plan(plan, mission)
-        self._show(mission)
+        self._show(mission, self.desk.of_plan(plan, mission))
         self.history.add(mission, f"plan with seed {plan.seed}")
 
     def _edited(self, message: Edit) -> tuple[Mission, str]:
@@ -155,12 +170,18 @@ class Session:
             case Delete():
                 return self._deleted(message.ks)
             case Raise():
-                chosen = edits.places(self.mission) if message.ks is None else tuple(message.ks)
+                chosen = self._raisable(message.ks)
                 mission = edits.raised(self.mission, chosen, message.by)
                 which = "all items" if message.ks is None else f"{len(chosen)} item{'s' if len(chosen) != 1 else ''}"
                 return mission, f"{'raise' if message.by >= 0.0 else 'lower'} {which} by {abs(message.by):g} m"
             case Apply():
                 return self._applied(message)
+
+    def _raisable(self, ks: list[int] | None) -> tuple[int, ...]:
+        """The items that are raised together: of those asked for, or all, what does not land; a landing alone is."""
+        asked = edits.places(self.mission) if ks is None else tuple(ks)
+        flying = tuple(k for k in asked if edits.checked_place(self.mission, k).command not in LANDINGS)
+        return flying or asked
 
     def _placed(self, k: int, east: float | None, north: float | None, up: float | None) -> Mission:
         mission = self.mission
@@ -179,10 +200,11 @@ class Session:
         height, at = None, own.index(message.after)
         if at + 1 < len(own):
             after = mission.items[own[at + 1]]
-            height = 0.5 * (before.alt + after.alt) if after.frame == before.frame else None
+            alike = after.frame == before.frame and after.command not in LANDINGS
+            height = 0.5 * (before.alt + after.alt) if alike else None
             height = height if height is not None and np.isfinite(height) else None
         made = edits.inserted(mission, message.after, *self.desk.geographic(message.east, message.north), height)
-        return self.desk.retuned(made, message.after + 1), f"insert an item after {before.seq}"
+        return self.desk.retuned(made, edits.next_index(mission, message.after)), f"insert an item after {before.seq}"
 
     def _deleted(self, ks: list[int]) -> tuple[Mission, str]:
         mission = self.mission
@@ -207,11 +229,14 @@ class Session:
         for k in [k for k in edits.places(mission) if first < k < last][::-1]:
             mission = edits.deleted(mission, k)
         lat, lon = to_geo(self.desk.scenario.origin, plan.waypoints[1:-1, 0], plan.waypoints[1:-1, 1])
-        for step, (one_lat, one_lon) in enumerate(zip(lat.tolist(), lon.tolist(), strict=True)):
-            mission = edits.inserted(mission, first + step, one_lat, one_lon)
-            now = float(self.desk.points(mission)[edits.places(mission).index(first + step + 1), 2])
-            mission = edits.at_height(mission, first + step + 1, float(plan.waypoints[step + 1, 2]), now)
-        for k in [k for k in edits.places(mission) if first <= k <= first + len(lat) + 1]:
+        at = first
+        for one_lat, one_lon, up in zip(lat.tolist(), lon.tolist(), plan.waypoints[1:-1, 2].tolist(), strict=True):
+            before, at = at, edits.next_index(mission, at)
+            mission = edits.inserted(mission, before, one_lat, one_lon)
+            now = float(self.desk.points(mission)[edits.places(mission).index(at), 2])
+            mission = edits.at_height(mission, at, up, now)
+        own = edits.places(mission)
+        for k in own[own.index(first) : own.index(at) + 2]:
             mission = self.desk.retuned(mission, k)
         return mission
 
@@ -230,7 +255,7 @@ class Session:
         mission = self.mission
         judged = desk.judge(mission)
         self.requirements = route_requirements(judged.setup)
-        self.desk, self.judged = desk, judged
+        self.desk, self.judged, self.plans = desk, judged, ([], None)
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
 
     def settings_json(self) -> Json:
@@ -270,7 +295,7 @@ class Session:
         return {
             "kind": "world",
             "world": self.world_rev,
-            **world_json(self.desk, self.mission),
+            **world_json(self.desk, self.judged.setup),
             "settings": self.settings_json(),
         }
 
@@ -283,8 +308,12 @@ class Session:
         path = self.document.path
         if path is None or not self.document.kind:
             raise PlanflyError("no mission file was named: save it as a new one", field="over")
+        if path.exists() and path.read_bytes() != self.document.on_disk:
+            changed = f"{path.name} was changed by something else since it was opened: save under another name"
+            raise PlanflyError(changed, file=path)
         saved = self.save(self.document.kind)
         write_whole(path, saved.data)
+        self.document = replace(self.document, on_disk=saved.data)
         return saved
 
     # ------------------------------------------------------------------

@@ -49,9 +49,9 @@ def rounded(values: Any, digits: int = 1) -> Any:
 # The world.
 
 
-def world_json(desk: Desk, mission: Mission) -> Json:
+def world_json(desk: Desk, setup: FlightSetup) -> Json:
     """What stands about a mission: area, threats, zones, ends, limits."""
-    scenario, setup = desk.scenario, desk.opened
+    scenario, mission = desk.scenario, setup.mission
     extent = scenario.bounds if scenario.external else map_extent(scenario, desk.points(mission), [])
     return {
         "name": scenario.name,
@@ -146,7 +146,7 @@ def _window(mission: Mission, route: Route, window: Window) -> Json:
 
 def items_json(desk: Desk, mission: Mission) -> list[Json]:
     """The items that can be moved: where they are, and how the mission states them."""
-    points = desk.points(mission)
+    points, flown = desk.points(mission), desk.flown(mission)
     found = []
     for k, (east, north, up) in zip(places(mission), points.tolist(), strict=True):
         item = mission.items[k]
@@ -160,6 +160,7 @@ def items_json(desk: Desk, mission: Mission) -> list[Json]:
                 "frame": "AMSL" if item.frame in AMSL else "over home" if item.frame in OVER_HOME else "over ground",
                 "lat": item.lat_deg,
                 "lon": item.lon_deg,
+                "state": "" if item.seq in flown else "not flown",
             }
         )
     return found

@@ -1,0 +1,299 @@
+"""What an edit must not touch: landings, zones, certificates, files, and what another change has made of the sheet."""
+
+import asyncio
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flight.mission.items import Command, Frame, Mission, MissionItem
+from flight.mission_files.formats import mission_text
+from logs.recording.example_log import write_example_log
+from planfly.studio import documents, edits, messages
+from planfly.studio.documents import World, open_document, open_dropped, straight_plan
+from planfly.studio.jobs import LONG, Jobs
+from planfly.studio.pilot import Answer
+from planfly.studio.server import Page, Server
+from planfly.studio.session import Session, StaleEdit, open_session
+from tests.planfly.studio.drafts import drawn_session, session_of, world_of
+from world.errors import MissionError, PlanflyError
+from world.frames import to_geo
+
+
+def flight_to_the_ground() -> Mission:
+    """A take-off, four waypoints, the second with a photo and a servo behind it, and a landing; all above sea level."""
+    scenario, _ = world_of("jacksboro")
+    assert scenario.terrain is not None
+    ground = float(scenario.terrain.height(0.0, 0.0))
+    kinds = (22, 16, 16, 206, 183, 16, 16, 189, 21)
+    items = []
+    for seq, kind in enumerate(kinds, 1):
+        east, north = 700.0 * seq - 3000.0, 300.0 * seq - 1000.0
+        lat, lon = (float(one) for one in to_geo(scenario.origin, east, north))
+        placed = kind in (16, 21, 22)
+        up = float(scenario.terrain.height(east, north)) + 2.0 if kind == 21 else ground + 400.0
+        frame = Frame.GLOBAL if placed else Frame.MISSION
+        place = (round(lat, 7), round(lon, 7), round(up, 3)) if placed else (0.0, 0.0, 0.0)
+        items.append(MissionItem(seq, kind, int(frame), (0.0,) * 4, *place))
+    return Mission(drawn_session(5, 12).mission.home, tuple(items), source="ground.waypoints")
+
+
+# ----------------------------------------------------------------------
+# Items.
+
+
+def test_all_are_raised_but_the_landing_and_its_height_is_its_touchdowns() -> None:
+    session = session_of(flight_to_the_ground())
+    landing = session.mission.items[-1]
+    assert session.place_of(8)[2] == landing.alt
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=25.0))
+    assert session.mission.items[-1] == landing
+    assert session.mission.items[1].alt == flight_to_the_ground().items[1].alt + 25.0
+    session.edit(messages.Move(kind="move", rev=session.rev, k=8, up=landing.alt + 1.0))
+    assert session.mission.items[-1].alt == pytest.approx(landing.alt + 1.0)
+
+
+def test_a_waypoint_before_a_landing_is_not_halfway_to_the_ground() -> None:
+    session = session_of(flight_to_the_ground())
+    session.edit(messages.Insert(kind="insert", rev=session.rev, after=6, east=2500.0, north=1200.0))
+    assert [one.command for one in session.mission.items[6:]] == [16, 16, 189, 21]
+    assert session.mission.items[7].alt == session.mission.items[6].alt
+
+
+def test_a_waypoint_stands_behind_what_is_done_at_the_one_before() -> None:
+    session = session_of(flight_to_the_ground())
+    session.edit(messages.Insert(kind="insert", rev=session.rev, after=2, east=500.0, north=300.0))
+    assert [one.command for one in session.mission.items] == [22, 16, 16, 206, 183, 16, 16, 16, 189, 21]
+    assert [one.seq for one in session.mission.items] == list(range(1, 11))
+
+
+def test_an_item_that_no_flight_comes_to_has_a_height_and_says_so() -> None:
+    mission = flight_to_the_ground()
+    jump = MissionItem(4, int(Command.DO_JUMP), int(Frame.MISSION), (6.0, -1.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    passed = replace(mission.items[1], seq=5, lat_deg=mission.items[1].lat_deg + 0.001)
+    end = replace(mission.items[2], seq=6, lat_deg=mission.items[2].lat_deg + 0.01)
+    session = session_of(replace(mission, items=(*mission.items[:3], jump, passed, end)))
+    found = {one["seq"]: one for one in session.sheet()["items"]}
+    assert (found[5]["state"], found[6]["state"]) == ("not flown", "")
+    assert found[5]["at"][2] == pytest.approx(passed.alt, abs=0.06)
+
+
+def test_a_failed_undo_leaves_what_is_shown() -> None:
+    session = drawn_session(5, 12)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    shown, rev = session.mission, session.rev
+    session.history.first = replace(shown, items=shown.items[:1])
+    with pytest.raises(PlanflyError):
+        session.step("undo")
+    assert session.mission is shown
+    assert session.rev == rev
+
+
+# ----------------------------------------------------------------------
+# Plans.
+
+
+def planned_session() -> Session:
+    document = open_document("jacksboro", World())
+    return Session.of(document, World())
+
+
+def test_what_a_plan_of_waypoints_would_drop_is_refused() -> None:
+    session = session_of(flight_to_the_ground())
+    with pytest.raises(MissionError, match="take-off"):
+        session.save("plan.json")
+    items = flight_to_the_ground().items
+    session = session_of(Mission(session.mission.home, (*items[1:3], *items[7:]), source="l"))
+    with pytest.raises(MissionError, match="landing"):
+        session.save("plan.json")
+    speed = MissionItem(4, 178, 2, (0.0, 20.0, -1.0, 0.0), 0.0, 0.0, 0.0)
+    way = (*items[1:3], speed, replace(items[5], seq=5))
+    session = session_of(Mission(session.mission.home, way, source="s"))
+    with pytest.raises(MissionError, match="change of speed"):
+        session.save("plan.json")
+
+
+def test_a_planned_path_is_taken_of_the_sheet_that_it_is_of_alone() -> None:
+    session = planned_session()
+    plan = straight_plan(session.desk.scenario, 3)
+    session.plans = ([plan], None)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
+    mission = session.mission
+    with pytest.raises(StaleEdit):
+        session.replace_plan(messages.Choose(kind="choose", rev=session.rev - 1, which=0))
+    with pytest.raises(PlanflyError, match="plan again"):
+        session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=0))
+    session.plans = ([plan], None)
+    session.change_settings(messages.Settings(kind="settings", wind_speed=3.0))
+    with pytest.raises(PlanflyError, match="plan again"):
+        session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=0))
+    assert session.mission is mission
+
+
+def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    session, asked = planned_session(), []
+    monkeypatch.setattr("planfly.studio.jobs.Pilot.ask", lambda self, work: asked.append(work))
+    monkeypatch.setattr("planfly.studio.jobs.Pilot.start", lambda self: None)
+    jobs = Jobs(lambda name, answer: None)
+    jobs.start(session)
+    assert [work.function for work in asked] == ["planfly.studio.works.plan"]
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
+    answers = jobs.answered(LONG, Answer(asked[0].number, "done", [straight_plan(session.desk.scenario, 3)]), session)
+    assert [one["kind"] for one in answers] == ["stopped", "fault"]
+    assert not jobs.chosen_at_once(session)
+    # What was restored is flown, not planned anew.
+    again = Jobs(lambda name, answer: None)
+    again.start(session)
+    assert asked[-1].function == "planfly.studio.works.fly"
+
+
+def test_a_certificate_does_not_outlive_settings() -> None:
+    session = planned_session()
+    session.plans = ([straight_plan(session.desk.scenario, 3)], None)
+    session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=0))
+    assert session.sheet()["planned"]
+    session.change_settings(messages.Settings(kind="settings", wind_speed=9.0))
+    assert not session.sheet()["planned"]
+    saved = json.loads(session.save("plan.json").data)
+    assert saved["certificate"]["problems"] != ["not planned yet"]
+    assert any("wind" in line for line in session.save("waypoints").losses)
+
+
+# ----------------------------------------------------------------------
+# Files and worlds.
+
+
+def test_a_log_that_names_other_files_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = write_example_log(tmp_path / "l.mcap").read_bytes()
+    open_dropped("l.mcap", data, World())
+    seen: list[bytes] = []
+    monkeypatch.setattr(documents, "_refuse_other_files", lambda name, text: seen.append(text))
+    open_dropped("l.waypoints", data, World())
+    monkeypatch.undo()
+    scenario = json.loads(seen[0])
+    scenario["scenario"].setdefault("flight", {})["params"] = "/etc/passwd"
+    with pytest.raises(MissionError, match="names other files"):
+        documents._refuse_other_files("l.mcap", json.dumps(scenario).encode())
+
+
+def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_path: Path) -> None:
+    file, other = tmp_path / "m.waypoints", tmp_path / "other.waypoints"
+    for one, seed in ((file, 8), (other, 9)):
+        one.write_text(mission_text(drawn_session(seed, 8).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), World(scenario="jacksboro"))
+    session.open(open_document(str(other), session.world))
+    assert session.sheet()["over"] == ""
+    with pytest.raises(PlanflyError, match="no mission file was named"):
+        session.save_over()
+    session.open(open_document(str(file), session.world))
+    for _ in range(2):
+        session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+        session.save_over()
+    file.write_text(other.read_text(encoding="utf-8"), encoding="utf-8")
+    with pytest.raises(PlanflyError, match="changed by something else"):
+        session.save_over()
+    assert file.read_bytes() == other.read_bytes()
+
+
+def test_the_zones_of_a_named_fence_stand_in_the_next_world(tmp_path: Path) -> None:
+    mission = drawn_session(8, 6).mission
+    lat, lon = mission.items[0].lat_deg, mission.items[0].lon_deg
+    ring = [[lon + a, lat + b] for a, b in ((-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01), (-0.01, -0.01))]
+    shape = {"type": "Feature", "properties": {"name": "Z"}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    fence = tmp_path / "z.geojson"
+    fence.write_text(json.dumps({"type": "FeatureCollection", "features": [shape]}), encoding="utf-8")
+    world = World(terrain="jacksboro", fence=(str(fence),))
+    session = Session.of(open_dropped("m.waypoints", mission_text(mission, "waypoints").encode(), world), world)
+    assert len(session.desk.scenario.zones) == 1
+    k = edits.places(session.mission)[-1]
+    east, north, _ = session.place_of(k)
+    before = session.world_rev
+    session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=east + 2500.0, north=north))
+    assert session.world_rev == before + 1
+    assert [zone["name"] for zone in session.world_shown()["zones"]] != []
+    assert len(session.desk.scenario.zones) == 1
+
+
+# ----------------------------------------------------------------------
+# The server.
+
+
+class NoSocket:
+    """A page that takes nothing."""
+
+    def __init__(self) -> None:
+        self.closed: list[int] = []
+
+
+def server_of(session: Session, kept: Path | None = None) -> Server:
+    return Server(session, "token", kept, None)
+
+
+def sent(page: Page) -> list[dict[str, Any]]:
+    found = []
+    while not page.frames.empty():
+        found.append(json.loads(page.frames.get_nowait()))
+    return found
+
+
+def test_a_stale_drag_is_answered() -> None:
+    session = drawn_session(5, 12)
+
+    async def run() -> list[dict[str, Any]]:
+        server, page = server_of(session), Page(NoSocket(), dark=False)  # type: ignore[arg-type]
+        drag = {"kind": "drag", "rev": session.rev + 1, "n": 7, "k": 2, "east": 0.0, "north": 0.0}
+        await server._hear(page, json.dumps(drag))
+        task = asyncio.create_task(server._preview(page))
+        while page.frames.empty():
+            await asyncio.sleep(0.01)
+        task.cancel()
+        return sent(page)
+
+    assert asyncio.run(asyncio.wait_for(run(), 20.0)) == [{"kind": "preview", "n": 7, "stale": True}]
+
+
+def test_a_value_out_of_range_is_a_fault_and_no_message_is_the_end() -> None:
+    session = drawn_session(5, 12)
+
+    async def run() -> list[dict[str, Any]]:
+        server, page = server_of(session), Page(NoSocket(), dark=False)  # type: ignore[arg-type]
+        await server._hear(page, '{"kind": "settings", "airspeed": 900}')
+        for text in ('{"kind": "x"}', "[", "{}"):
+            with pytest.raises(ValueError, match="1 validation error"):
+                await server._hear(page, text)
+        return sent(page)
+
+    (fault,) = asyncio.run(run())
+    assert fault["kind"] == "fault"
+    assert fault["text"].startswith("settings: airspeed: ")
+
+
+def test_a_full_disk_is_said_once(tmp_path: Path) -> None:
+    session = drawn_session(5, 12)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    (tmp_path / "file").write_text("x", encoding="utf-8")
+
+    async def run() -> list[dict[str, Any]]:
+        server = server_of(session, tmp_path / "file" / "kept.json")
+        page = Page(NoSocket(), dark=False)  # type: ignore[arg-type]
+        server._pages.add(page)
+        await server._keep()
+        await server._keep()
+        return sent(page)
+
+    (fault,) = asyncio.run(run())
+    assert "not kept" in fault["text"]
+
+
+def test_a_page_that_missed_a_frame_is_closed() -> None:
+    async def run() -> bool:
+        page = Page(NoSocket(), dark=False)  # type: ignore[arg-type]
+        for _ in range(64):
+            page.send({})
+        assert not page.full.is_set()
+        page.send({})
+        return page.full.is_set()
+
+    assert asyncio.run(run())
