@@ -135,10 +135,14 @@ class Plan(_Message):
 
 
 class Choose(_Message):
-    """One of the paths that were planned."""
+    """One of the paths that were planned.
+
+    rev: of the sheet that they were planned for; without it, the sheet as it is, of which there are none once it is
+    changed.
+    """
 
     kind: Literal["choose"]
-    rev: _Rev
+    rev: _Rev | None = None
     which: Annotated[int, Field(ge=0, le=20)]
 
 
