@@ -227,11 +227,11 @@ export class Panel {
     const { app } = this, box = clear(this.wayBox);
     app.ways(ways, 0);
     if (!ways.length) return;
-    this.waysOf = rev ?? this.now?.rev;
+    const of = this.waysOf = rev ?? this.now.rev;
     box.append(element("h2", {}, ways.length === 1 ? "Found" : `${ways.length} ways found`));
     ways.forEach((way, k) => {
       const rows = [["Length", `${way.length.toFixed(3)} times straight`], ["Exposure to missiles", way.exposure.toFixed(3)], ["Least clearance to spare", way.clearance === null ? "\u2013" : `${plain(way.clearance, 1)} m`]];
-      const take = element("button", { type: "button", onclick: () => { app.ways([]); app.send({ kind: "choose", which: k }); } }, "Take this way");
+      const take = element("button", { type: "button", onclick: () => { app.ways([]); app.commit({ kind: "choose", rev: of, which: k }); } }, "Take this way");
       const card = element("section", { class: "card", "data-state": way.state === "safe" ? "ok" : "fail", onpointerenter: () => app.ways(ways, k) },
         element("h3", {}, `Seed ${way.seed}: ${way.state}`), element("dl", {}, ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])),
         ...way.problems.map((text) => element("p", {}, text)), take);
