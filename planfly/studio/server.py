@@ -309,13 +309,23 @@ class Server:
             case messages.Move() | messages.Insert() | messages.Delete() | messages.Raise() | messages.Apply():
                 session.edit(message)
             case messages.Step():
+                before = session.history
                 session.step(message.kind)
+                if session.history is not before:
+                    self.jobs.forget()
             case messages.Settings():
                 session.change_settings(message)
             case messages.Choose():
                 session.replace_plan(message)
             case messages.Open():
-                session.open(self._opened(message))
+                opened = self._opened(message)
+                if self._kept is not None and session.is_changed:
+                    # What fails here is said where it is kept by and by.
+                    with contextlib.suppress(OSError, PlanflyError):
+                        session.keep(self._kept)
+                session.open(opened)
+                if self._kept is not None:
+                    session.restore(session.kept_file(self._kept))
                 self.jobs.forget()
 
     def _opened(self, message: messages.Open) -> Any:

@@ -4,6 +4,7 @@ No part of it knows of connections or processes: `planfly.studio.server` does.  
 grows; an edit of an older one is refused, so that two pages never change what the other does not show.
 """
 
+import hashlib
 import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -31,6 +32,9 @@ from world.scenario import Scenario, from_spec
 
 Edit = Move | Insert | Delete | Raise | Apply
 _KEPT = "planfly.studio/1"
+# A document with what it is judged with and what was done to it; so many are kept to go back to.
+_Place = tuple[Document, Desk, History]
+_MOST_LEFT = 8
 
 
 class StaleEdit(Exception):
@@ -46,6 +50,7 @@ class Session:
     plans: paths that were planned and may be chosen, with the items that they would replace.
     world_rev: grows with every change of the world.
     named: the file that the command named, the only one that is written over.
+    left: documents that another was opened in place of, as they were left; undone: those whose opening was undone.
     """
 
     document: Document
@@ -59,6 +64,8 @@ class Session:
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
     kept_rev: int = 0
     named: Path | None = None
+    left: list[_Place] = field(default_factory=list)
+    undone: list[_Place] = field(default_factory=list)
 
     @classmethod
     def of(cls, document: Document, world: World) -> "Session":
@@ -70,12 +77,37 @@ class Session:
         return cls(document, world, desk, history, judged, route_requirements(judged.setup), named=named)
 
     def open(self, document: Document) -> None:
-        """Begin anew with another document."""
+        """Begin anew with another document; an undo before its first edit brings back what was there."""
         named = document.path is not None and document.path.resolve() == self.named
         made = Session.of(document if named else replace(document, path=None), self.world)
-        self.document, self.desk, self.history = made.document, made.desk, made.history
-        self.judged, self.requirements, self.plans = made.judged, made.requirements, ([], None)
+        self.left, self.undone = [*self.left, self._place()][-_MOST_LEFT:], []
+        self._go_to((made.document, made.desk, made.history))
+
+    def _place(self) -> _Place:
+        return self.document, self.desk, self.history
+
+    def _go_to(self, place: _Place) -> None:
+        """Show another document as it was left; nothing is changed where it cannot be judged."""
+        _, desk, history = place
+        judged = desk.judge(history.mission)
+        self.requirements = route_requirements(judged.setup)
+        self.document, self.desk, self.history = place
+        self.judged, self.plans = judged, ([], None)
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
+
+    def _note(self, mission: Mission, text: str) -> None:
+        self.history.add(mission, text)
+        self.undone = []
+
+    @property
+    def undo_text(self) -> str:
+        """What would be undone, an opening before the first edit; "" for nothing."""
+        return self.history.undo_text or (f"open {self.document.name}" if self.left else "")
+
+    @property
+    def redo_text(self) -> str:
+        """What would be done again; "" for nothing."""
+        return self.history.redo_text or (f"open {self.undone[-1][0].name}" if self.undone else "")
 
     @property
     def mission(self) -> Mission:
@@ -96,14 +128,24 @@ class Session:
             raise StaleEdit
         mission, text = self._edited(message)
         self._show(mission)
-        self.history.add(mission, text)
+        self._note(mission, text)
 
     def step(self, kind: str) -> None:
         """Undo, redo, or revert to what was opened; nothing happens where there is nothing to."""
         if kind == "revert":
             if self.is_changed:
                 self._show(self.history.first)
-                self.history.add(self.history.first, "revert to the file")
+                self._note(self.history.first, "revert to the file")
+            return
+        if kind == "undo" and not self.history.undo_text and self.left:
+            place = self._place()
+            self._go_to(self.left[-1])
+            self.left, self.undone = self.left[:-1], [*self.undone, place]
+            return
+        if kind == "redo" and not self.history.redo_text and self.undone:
+            place = self._place()
+            self._go_to(self.undone[-1])
+            self.left, self.undone = [*self.left, place], self.undone[:-1]
             return
         before = self.history.at
         done = self.history.undo() if kind == "undo" else self.history.redo()
@@ -137,7 +179,7 @@ class Session:
             return
         mission = self._joined(plan, *between)
         self._show(mission)
-        self.history.add(mission, "plan a part")
+        self._note(mission, "plan a part")
 
     def _show(self, mission: Mission, desk: Desk | None = None) -> None:
         """Judge a mission as the one that is shown, in its world; nothing is changed where that fails.
@@ -157,7 +199,7 @@ class Session:
         """A new plan takes the place of all; its certificate counts until it is edited."""
         mission = planned_mission(plan, self.desk.airframe)
         self._show(mission, self.desk.of_plan(plan, mission))
-        self.history.add(mission, f"plan with seed {plan.seed}")
+        self._note(mission, f"plan with seed {plan.seed}")
 
     def _edited(self, message: Edit) -> tuple[Mission, str]:
         match message:
@@ -282,8 +324,8 @@ class Session:
             "rev": self.rev,
             "name": self.document.name,
             "changed": self.is_changed,
-            "undo": self.history.undo_text,
-            "redo": self.history.redo_text,
+            "undo": self.undo_text,
+            "redo": self.redo_text,
             "over": self.document.kind if self.document.path is not None else "",
             "planned": self.judged.setup.plan is not None,
             "notes": [*self.mission.warnings, *self.judged.setup.notes],
@@ -319,10 +361,18 @@ class Session:
     # ------------------------------------------------------------------
     # Kept beside, for a server that dies.
 
+    def kept_file(self, file: Path) -> Path:
+        """Where this document is kept: what was opened since the command began, beside what it named."""
+        if not self.left:
+            return file
+        first = json.dumps(mission_data(self.history.first)).encode()
+        return file.with_name(f"{file.stem}-{hashlib.sha256(first).hexdigest()[:8]}{file.suffix}")
+
     def keep(self, file: Path) -> None:
         """Write what was done, if anything was since it was written last."""
         if self.kept_rev == self.rev:
             return
+        file = self.kept_file(file)
         file.parent.mkdir(parents=True, exist_ok=True)
         data = {"schema": _KEPT, "name": self.document.name, "mission": mission_data(self.mission)}
         write_whole(file, json.dumps({**data, "first": mission_data(self.history.first)}))
@@ -342,7 +392,7 @@ class Session:
             self._show(mission)
         except (OSError, ValueError, LookupError, TypeError, PlanflyError):
             return False
-        self.history.add(mission, "what was done before the studio ended")
+        self._note(mission, "what was done before the studio ended")
         return True
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+import planfly
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from flight.mission_files.formats import mission_text
 from logs.recording.example_log import write_example_log
@@ -15,7 +16,7 @@ from planfly.studio import documents, edits, messages
 from planfly.studio.documents import World, open_document, open_dropped, straight_plan
 from planfly.studio.jobs import LONG, Jobs
 from planfly.studio.pilot import Answer
-from planfly.studio.server import Page, Server
+from planfly.studio.server import MAX_UNWELCOMED, NO_TOKEN, TOO_MANY, Page, Server
 from planfly.studio.session import Session, StaleEdit, open_session
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from world.errors import MissionError, PlanflyError
@@ -198,6 +199,35 @@ def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_pa
     assert file.read_bytes() == other.read_bytes()
 
 
+def test_an_opening_is_undone_and_each_document_is_kept_for_itself(tmp_path: Path) -> None:
+    file, other = tmp_path / "m.waypoints", tmp_path / "other.waypoints"
+    for one, seed in ((file, 8), (other, 9)):
+        one.write_text(mission_text(drawn_session(seed, 8).mission, "waypoints"), encoding="utf-8")
+    kept = tmp_path / "kept.json"
+    session, _ = open_session(str(file), World(scenario="jacksboro"), kept)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    mine = session.mission
+    session.keep(kept)
+    session.open(open_document(str(other), session.world))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=20.0))
+    theirs = session.mission
+    session.keep(kept)
+    assert open_session(str(file), World(scenario="jacksboro"), kept)[0].mission.items == mine.items
+    session.step("undo")
+    assert session.sheet()["undo"] == "open other.waypoints"
+    session.step("undo")
+    assert session.mission is mine
+    assert session.sheet()["name"] == "m.waypoints"
+    assert session.sheet()["over"] == "waypoints"
+    session.step("redo")
+    session.step("redo")
+    assert session.mission is theirs
+    session.step("undo")
+    session.step("undo")
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=1.0))
+    assert session.redo_text == ""
+
+
 def test_the_zones_of_a_named_fence_stand_in_the_next_world(tmp_path: Path) -> None:
     mission = drawn_session(8, 6).mission
     lat, lon = mission.items[0].lat_deg, mission.items[0].lon_deg
@@ -298,3 +328,50 @@ def test_a_page_that_missed_a_frame_is_closed() -> None:
         return page.full.is_set()
 
     assert asyncio.run(run())
+
+
+def test_a_fault_of_the_server_ends_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def broken(self: Server) -> None:
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(Server, "run", broken)
+    file = tmp_path / "m.waypoints"
+    file.write_text(mission_text(drawn_session(8, 8).mission, "waypoints"), encoding="utf-8")
+    with pytest.raises(RuntimeError, match="broken"):
+        planfly.open_studio(file, scenario="jacksboro", port=0, browser=False, keep=tmp_path, on_message=str)
+
+
+class SilentSocket(NoSocket):
+    """A socket that says nothing, or one long first message."""
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__()
+        self.text = text
+
+    async def accept(self) -> None:
+        pass
+
+    async def receive(self) -> dict[str, str]:
+        if not self.text:
+            await asyncio.sleep(60.0)
+        return {"type": "websocket.receive", "text": self.text}
+
+    async def close(self, code: int) -> None:
+        self.closed.append(code)
+
+
+def test_sockets_without_a_token_are_few_and_say_little() -> None:
+    async def run() -> tuple[list[int], list[int]]:
+        server = server_of(drawn_session(5, 12))
+        hello = json.dumps({"kind": "hello", "token": "token"})
+        long, late = SilentSocket(hello + " " * 2_000), SilentSocket()
+        await server.serve(long)  # type: ignore[arg-type]
+        waiting = [asyncio.create_task(server.serve(SilentSocket())) for _ in range(MAX_UNWELCOMED)]  # type: ignore[arg-type]
+        await asyncio.sleep(0.05)
+        await asyncio.wait_for(server.serve(late), 1.0)  # type: ignore[arg-type]
+        for one in waiting:
+            one.cancel()
+        await asyncio.gather(*waiting, return_exceptions=True)
+        return long.closed, late.closed
+
+    assert asyncio.run(run()) == ([NO_TOKEN], [TOO_MANY])
