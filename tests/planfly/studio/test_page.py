@@ -16,6 +16,7 @@ import pytest
 from flight.mission_files.formats import mission_text, parse_mission
 from tests.browser import Browser
 from tests.planfly.studio.drafts import drawn_session
+from tests.planfly.studio.served import Served
 from tests.soak import at_most
 
 ROOT = Path(__file__).parents[3]
@@ -237,6 +238,22 @@ def test_an_answer_of_an_older_sheet_holds_up_no_drag(page: Browser) -> None:
       return [...found, link.waiting, sent, shown];
     })"""
     assert page.value(program) == [None, None, [2, 4], [4]]
+
+
+def test_a_drag_ends_where_another_page_changes_the_items(page: Browser, studio: Studio) -> None:
+    x, y = centre(page, ".mark .dot", 2)
+    drag(page, [x, y], (30.0, 0.0), let_go=False)
+    page.wait_for("document.querySelector('#map.dragging') !== null")
+    with Served(studio.address).page() as program:
+        sheet = program.until("sheet")
+        program.send(kind="delete", rev=sheet["rev"], ks=[sheet["items"][-1]["k"]])
+        page.wait_for("document.querySelector('#map.dragging') === null")
+    page.mouse("mouseReleased", x + 30.0, y, button="left", clickCount=1)
+    assert marks(page) == len(sheet["items"]) - 1
+    key(page, "Escape", 27)
+    page.value("document.getElementById('undo').click()")
+    page.wait_for(f"document.querySelectorAll('.mark').length === {len(sheet['items'])}")
+    assert page.value("document.getElementById('undo').disabled")
 
 
 def test_a_diamond_inserts_and_a_profiles_dot_raises(page: Browser) -> None:
