@@ -338,7 +338,9 @@ def test_a_fault_of_the_server_ends_the_command(tmp_path: Path, monkeypatch: pyt
     file = tmp_path / "m.waypoints"
     file.write_text(mission_text(drawn_session(8, 8).mission, "waypoints"), encoding="utf-8")
     with pytest.raises(RuntimeError, match="broken"):
-        planfly.open_studio(file, scenario="jacksboro", port=0, browser=False, keep=tmp_path, on_message=str)
+        planfly.open_studio(
+            file, scenario="jacksboro", port=0, browser=False, keep=tmp_path, on_message=lambda line: None
+        )
 
 
 class SilentSocket(NoSocket):
