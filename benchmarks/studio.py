@@ -221,7 +221,7 @@ def measure_memory(folder: Path) -> None:
         with connect(
             f"ws://127.0.0.1:{port}/session",
             origin=f"http://127.0.0.1:{port}",
-            max_size=None,  # type: ignore[arg-type]
+            max_size=2**30,
         ) as socket:
             socket.send(json.dumps({"kind": "hello", "token": token}))
             sheet = _sheet(socket)

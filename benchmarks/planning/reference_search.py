@@ -44,8 +44,10 @@ def reference_search(task: Task) -> tuple[float, Floats | None]:
     best: tuple[float, Floats | None] = pool[0] if pool else (math.inf, None)
     # The programme knows limits in degrees alone.
     programme = None if task.problem.search.legs_hold_turns else Programme(task)
-    for _, path in pool[:POLISHED] if programme else []:
-        shorter = programme.shortened(path)  # type: ignore[union-attr]
+    if programme is None:
+        return best
+    for _, path in pool[:POLISHED]:
+        shorter = programme.shortened(path)
         ratio = task.length_ratio(shorter)
         if ratio < best[0] and is_safe(task.certificate(shorter)):
             best = ratio, shorter

@@ -137,12 +137,11 @@ class Plan(_Message):
 class Choose(_Message):
     """One of the paths that were planned.
 
-    rev: of the sheet that they were planned for; without it, the sheet as it is, of which there are none once it is
-    changed.
+    rev: of the sheet that they were planned for.
     """
 
     kind: Literal["choose"]
-    rev: _Rev | None = None
+    rev: _Rev
     which: Annotated[int, Field(ge=0, le=20)]
 
 

@@ -8,6 +8,7 @@ import asyncio
 import base64
 import binascii
 import contextlib
+import functools
 import hmac
 import json
 import struct
@@ -39,6 +40,8 @@ MAX_PAGES, PATIENCE, KEEPING = 4, 5.0, 3.0
 # Sockets at a time that have not given a token yet.
 MAX_UNWELCOMED = 16
 _WAITING = 64
+# Between two looks whether another page has gone, s.
+_AGAIN = 0.05
 # Files of a folder that are listed, and their suffixes.
 _MOST_FILES, _LISTED = 200, (".waypoints", ".plan", ".json", ".mcap")
 # Codes with which a websocket is closed.
@@ -103,7 +106,7 @@ class Server:
                 await self._judged(lambda: self.session.keep(self._kept or Path()))
             except (OSError, PlanflyError) as error:
                 if not self._unkept:
-                    self._broadcast({"kind": "fault", "text": f"what is done here is not kept: {error}"})
+                    self._broadcast({"kind": "fault", "job": "keep", "text": f"what is done here is not kept: {error}"})
                 self._unkept = str(error)
             else:
                 self._unkept = ""
@@ -161,9 +164,13 @@ class Server:
         while True:
             await self._hear(page, await _text(page.socket))
 
+    async def _has_place(self) -> None:
+        while len(self._pages) >= MAX_PAGES:
+            await asyncio.sleep(_AGAIN)
+
     async def _welcome(self, socket: WebSocket) -> Page | None:
         """The page, if its first message has the token."""
-        code = TOO_MANY if len(self._pages) >= MAX_PAGES else NO_TOKEN
+        code = NO_TOKEN
         with contextlib.suppress(ValueError, asyncio.TimeoutError, WebSocketDisconnect):
             text = await asyncio.wait_for(_text(socket), PATIENCE)
             if len(text) > messages.MAX_FIRST:
@@ -172,7 +179,10 @@ class Server:
             given = isinstance(first, messages.Hello) and hmac.compare_digest(
                 first.token.encode(), self._token.encode()
             )
-            if code != TOO_MANY and given and isinstance(first, messages.Hello):
+            if given and isinstance(first, messages.Hello):
+                code = TOO_MANY
+                # One that has gone counts until that is seen, which takes its time on a busy machine.
+                await asyncio.wait_for(self._has_place(), PATIENCE)
                 return Page(socket, first.dark)
         with contextlib.suppress(RuntimeError):
             await socket.close(code)
@@ -193,7 +203,7 @@ class Server:
             if asked is None:
                 continue
             try:
-                found = await self._judged(lambda asked=asked: self.session.preview(asked))  # type: ignore[misc]
+                found = await self._judged(functools.partial(self.session.preview, asked))
             except StaleEdit:
                 # The page waits for an answer before it asks again.
                 page.send({"kind": "preview", "n": asked.n, "stale": True})
@@ -361,11 +371,17 @@ class Server:
         try:
             await self._change(chosen)
         except StaleEdit:
-            self._broadcast({"kind": "fault", "text": "the mission was edited meanwhile: its first path is not taken"})
+            self._broadcast(
+                {
+                    "kind": "fault",
+                    "job": "plan",
+                    "text": "the mission was edited meanwhile: its first path is not taken",
+                }
+            )
         except PlanflyError as error:
-            self._broadcast({"kind": "fault", "text": str(error)})
+            self._broadcast({"kind": "fault", "job": "plan", "text": str(error)})
         except INTERNAL as error:
-            self._broadcast({"kind": "fault", "text": internal_text(error)})
+            self._broadcast({"kind": "fault", "job": "plan", "text": internal_text(error)})
 
     def _broadcast(self, message: Json) -> None:
         for page in self._pages:

@@ -168,7 +168,7 @@ class Session:
 
     def replace_plan(self, message: Choose) -> None:
         """Take one of the planned paths: all of the mission, or the items between two.  Raises StaleEdit."""
-        if message.rev not in (None, self.rev):
+        if message.rev != self.rev:
             raise StaleEdit
         plans, between = self.plans
         if not 0 <= message.which < len(plans):
