@@ -94,7 +94,7 @@ new MutationObserver(() => {
     if (!opened[name] && there) requestAnimationFrame(() => { opened[name] = performance.now(); });
   };
   note("map", document.querySelectorAll(".mark").length > 1);
-  note("ground", document.querySelector("#map image[href]"));
+  note("ground", document.querySelector("#map-box image[href]"));
 }).observe(document, { subtree: true, childList: true, attributes: true, attributeFilter: ["href"] });
 """
 
@@ -164,7 +164,7 @@ def drawn(browser: Browser, address: str) -> None:
     """Open the page and wait until the mission, its ground and its flight are there."""
     browser.go(address)
     browser.wait_for("document.querySelectorAll('.mark').length > 1")
-    browser.wait_for("document.querySelector('#map image').hasAttribute('href')")
+    browser.wait_for("document.querySelector('#map-box image').hasAttribute('href')")
     browser.wait_for("document.documentElement.dataset.flown")
     browser.settle()
 

@@ -34,6 +34,11 @@ def geometric_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
     return _judged(requirements, None, (), geometric=True)
 
 
+def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
+    """Those of `geometric_findings` that say something of legs, corners, threats or zones."""
+    return _judged(requirements, None, (), geometric=True, whole=False)
+
+
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
     """Findings of a flown track against its route and the aircraft's envelope, but for how the flight ended."""
     return (*unflyable_items(requirements.setup), *_judged(requirements, aligned, (), geometric=False))
@@ -52,13 +57,21 @@ def flown_findings(
 
 
 def _judged(
-    requirements: RouteRequirements, aligned: AlignedTrack | None, at_end: Sequence[Finding], *, geometric: bool
+    requirements: RouteRequirements,
+    aligned: AlignedTrack | None,
+    at_end: Sequence[Finding],
+    *,
+    geometric: bool,
+    whole: bool = True,
 ) -> tuple[Finding, ...]:
-    """Findings of all rules, and then those of how the flight ended, merged."""
+    """Findings of all rules, and then those of how the flight ended, merged.
+
+    whole: whether those count that judge the flight as one.
+    """
     findings: tuple[Finding, ...] = tuple(
         item
         for rule in RULES.values()
-        if rule.judge is not None
+        if rule.judge is not None and (whole or not rule.whole)
         for item in rule.judge(requirements, aligned, geometric=geometric)
     )
     findings = (*findings, *at_end)

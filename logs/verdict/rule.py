@@ -91,6 +91,7 @@ class Rule:
     judge: planned path and flown track.  judge_items, judge_end, judge_imported_end, merge: as their types say.
     An imported flight is judged by `judge`, stretch by stretch, as far as the log holds what ``log`` asks for.
     suggest: what would make a failed finding pass.
+    whole: whether it judges the flight as one, and says nothing of a leg, a corner, a threat or a zone.
 
     In a headline:
     urgency: failures of a greater one are named first.
@@ -113,6 +114,7 @@ class Rule:
     merge: Merge | None = None
     suggest: Suggest | None = None
     log: LogNeeds = LogNeeds()
+    whole: bool = False
     urgency: int = 0
     phrase: Callable[[Finding], str] | None = None
     unjudged: str = ""

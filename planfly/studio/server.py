@@ -40,6 +40,8 @@ MAX_PAGES, PATIENCE, KEEPING = 4, 5.0, 3.0
 # Sockets at a time that have not given a token yet.
 MAX_UNWELCOMED = 16
 _WAITING = 64
+# s for an answer to leave before the next place is judged.
+_BREATH = 0.001
 # Between two looks whether another page has gone, s.
 _AGAIN = 0.05
 # Files of a folder that are listed, and their suffixes.
@@ -212,7 +214,9 @@ class Server:
                 found = {"fault": str(error)}
             except INTERNAL as error:
                 found = {"fault": internal_text(error)}
-            page.send({"kind": "preview", "rev": asked.rev, "n": asked.n, **found})
+            page.send({"kind": "preview", "rev": asked.rev, "n": asked.n, "k": asked.k, **found})
+            # It is on its way before the next is judged, which keeps the interpreter busy.
+            await asyncio.sleep(_BREATH)
 
     async def _show_all(self, page: Page) -> None:
         page.send({"kind": "choices", **self.jobs.choices(), "files": sorted(self._files)})

@@ -162,7 +162,7 @@ class Session:
             raise StaleEdit
         mission = self._placed(message.k, message.east, message.north, message.up)
         if not message.whole:
-            return window_json(mission, *judge_windows(self.desk, mission, message.k))
+            return window_json(mission, *judge_windows(self.desk, mission, message.k, self.judged.setup))
         judged = self.desk.judge(mission)
         return {"sheet": sheet_json(self.desk, judged, route_requirements(judged.setup))}
 

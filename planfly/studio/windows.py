@@ -11,11 +11,13 @@ import numpy as np
 
 from flight.mission.items import Mission
 from flight.mission.route import Route, part_of_route
+from flight.mission.surveys import camera_spacing
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
-from logs.verdict.judge_geometry import geometric_findings
+from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.studio.desk import Desk
+from planfly.studio.moved_route import moved_route
 from world.geometry import leg_runs
 
 # What a move can change reaches so far along the legs, m, and over so many of them; as much again is judged around it
@@ -43,13 +45,20 @@ class Window:
     findings: tuple[Finding, ...]
 
 
-def judge_windows(desk: Desk, mission: Mission, index: int) -> tuple[Route, tuple[Window, ...]]:
+def judge_windows(
+    desk: Desk, mission: Mission, index: int, before: FlightSetup | None = None
+) -> tuple[Route, tuple[Window, ...]]:
     """The windows about an item of a mission, and the route; one of all where that is as quick, or has to be judged.
 
-    index: of the item in the mission's list.  Raises MissionError for a mission that cannot be laid out.
+    index: of the item in the mission's list.  before: of the mission in which it was not moved yet, if that is known.
+    Raises MissionError for a mission that cannot be laid out.
     """
-    route = desk.route(mission)
-    spans = _spans(route, mission.items[index].seq)
+    route = None
+    if before is not None:
+        route = moved_route(before.route, before.mission, mission, desk.scenario, desk.airframe)
+    if route is None:
+        route = desk.route(mission)
+    spans = None if _may_survey(desk, mission, route) else _spans(route, mission.items[index].seq)
     if spans is None:
         return route, (_judged(desk.part(mission, route), 0, route.legs, 0),)
     windows = []
@@ -64,6 +73,11 @@ def judge_windows(desk: Desk, mission: Mission, index: int) -> tuple[Route, tupl
     return route, tuple(windows)
 
 
+def _may_survey(desk: Desk, mission: Mission, route: Route) -> bool:
+    """Whether there may be surveys, whose lines are found from all of the route."""
+    return desk.scenario.limits.surveys == "lines" or bool(camera_spacing(mission, route).any())
+
+
 def _with_fastest(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tuple[Route, int]:
     """A part of a route with what is fastest of the whole beyond its end, and how many waypoints that adds before it.
 
@@ -75,7 +89,7 @@ def _with_fastest(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tupl
     middle = 0.5 * (up[1:] + up[:-1])
     true = route.airspeed * np.array([_speed_factor(desk, float(one)) for one in middle])
     legs = list(dict.fromkeys([int(np.argmax(route.airspeed)), int(np.argmax(true))]))
-    windy = float(max(up.tolist(), key=lambda one: float(np.hypot(*wind.at(one)))))
+    windy = float(max(dict.fromkeys(up.tolist()), key=lambda one: float(np.hypot(*wind.at(one)))))
     heights = np.array([windy, *(middle[leg] for leg in legs for _ in range(2))])
     speeds = np.array([speed for leg in legs for speed in (route.airspeed[leg], route.airspeed[leg])])
     count = len(heights)
@@ -114,7 +128,7 @@ def _speed_factor(desk: Desk, amsl: float) -> float:
 
 def _judged(setup: FlightSetup, first: int, last: int, begin: int) -> Window:
     requirements = route_requirements(setup)
-    findings = tuple(item for item in geometric_findings(requirements) if _within(item, first - begin, last - begin))
+    findings = tuple(item for item in place_findings(requirements) if _within(item, first - begin, last - begin))
     return Window(first, last, begin, requirements, findings)
 
 
@@ -134,7 +148,7 @@ def _within(item: Finding, first: int, last: int) -> bool:
 def _spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
     """First and last waypoint of what a move of an item may change, merged where they meet; None for the whole.
 
-    Landing sequences and returns are found from where the route is, and surveys as a whole.
+    Landing sequences and returns are found from where the route is.
     """
     own = np.flatnonzero(route.items == seq)
     if not len(own) or route.return_from >= 0 or route.straight_to >= 0:

@@ -418,7 +418,11 @@ def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
     if setup.plan is not None or asked == "path":
         return ()
     beyond = [(one.photo, one.turn_around) for one in setup.mission.survey_plans if one.photo is not None]
-    found = find_surveys(setup.route, camera_spacing(setup.mission, setup.route), beyond)
+    camera = camera_spacing(setup.mission, setup.route)
+    if asked != "lines" and not camera.any():
+        # Where no item switches the camera no line takes photos.
+        return ()
+    found = find_surveys(setup.route, camera, beyond)
     return tuple(one for one in found if asked == "lines" or one.takes_photos())
 
 

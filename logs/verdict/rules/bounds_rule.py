@@ -78,6 +78,7 @@ RULE = Rule(
     margin=Margin("distance inside", "m", 10.0),
     tolerances=("ROUNDING",),
     judge=bounds_findings,
+    whole=True,
     suggest=stay_inside,
     log=LogNeeds(("heights",)),
     phrase=lambda item: short_of_limit("bounds", item),

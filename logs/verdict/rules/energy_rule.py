@@ -158,6 +158,7 @@ RULE = Rule(
     margin=Margin("energy", "Wh", 50.0),
     tolerances=("RESERVE", "UNDECIDED"),
     judge=energy_findings,
+    whole=True,
     suggest=use_less_energy,
     log=LogNeeds(("battery",), aircraft=True),
     explained=True,

@@ -153,6 +153,7 @@ RULE = Rule(
     margin=Margin("airspeed", "m/s", 1.0),
     tolerances=("STALL_MEAN", "STALL_TOLERANCE", "GUST_SHARE"),
     judge=stall_findings,
+    whole=True,
     suggest=fly_faster,
     log=LogNeeds(("airspeed", "attitude"), aircraft=True, listed=True),
 )

@@ -31,7 +31,9 @@ export class Hands {
   }
 
   at(event, root) {
-    const box = root.getBoundingClientRect();
+    // While something is held the page does not move below the hand: to ask where it is has all laid out anew.
+    const held = this.drag || this.side, box = (held?.root === root && held.box) || root.getBoundingClientRect();
+    if (held) Object.assign(held, { root, box });
     return [event.clientX - box.left, event.clientY - box.top];
   }
 

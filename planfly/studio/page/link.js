@@ -1,4 +1,4 @@
-// The connection to the server: the token, one drag on its way at a time, and a new connection when one is lost.
+// The connection to the server: the token, the newest place of a drag, and a new connection when one is lost.
 
 const REST = 150;
 const KEY = "planfly-studio-token";
@@ -29,8 +29,7 @@ export class Link {
     this.handlers = handlers;
     this.token = token();
     this.number = 0;
-    this.waiting = null;
-    this.next = null;
+    this.place = null;
     this.tries = 0;
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.dark.addEventListener("change", () => this.send({ kind: "look", dark: this.dark.matches }));
@@ -53,7 +52,6 @@ export class Link {
   }
 
   lost(code) {
-    this.waiting = this.next = null;
     if (code === 4403) return this.handlers.lost("This key is of another start of the studio: open the address that it has printed.", true);
     if (code === 4429) return this.handlers.lost("Four pages are open already: close one, then reload this one.", true);
     this.tries += 1;
@@ -91,40 +89,26 @@ export class Link {
     else this.handlers.heights({ ...head, heights: new Float32Array(body) });
   }
 
-  // A place that an item is dragged to: sent at once if nothing is on its way, else when that has come; the whole
-  // verdict is asked for when the hand rests.
+  // A place that an item is dragged to is sent at once: the server judges the newest of those that have come meanwhile.
+  // The whole verdict is asked for when the hand rests.
   drag(place) {
     this.number += 1;
     // What was asked and what is shown stands in the page, for whoever measures it.
     document.documentElement.dataset.asked = this.number;
-    this.next = { kind: "drag", n: this.number, ...place };
+    this.place = { kind: "drag", ...place };
     clearTimeout(this.rest);
-    this.rest = setTimeout(() => this.ask({ ...this.next0, whole: true, n: ++this.number }), REST);
-    this.next0 = this.next;
-    if (!this.waiting) this.ask(this.next);
+    this.rest = setTimeout(() => this.send({ ...this.place, whole: true, n: ++this.number }), REST);
+    this.send({ ...this.place, n: this.number });
   }
 
-  ask(message) {
-    if (!message || !message.kind) return;
-    if (this.waiting) {
-      this.next = message;
-      return;
-    }
-    this.next = null;
-    this.waiting = this.send(message) ? message : null;
-  }
-
-  // An answer of an older sheet (stale) says nothing of what is shown; the next place is asked about all the same.
+  // An answer of an older sheet (stale) says nothing of what is shown.
   previewed(message) {
-    const k = this.waiting?.k;
-    this.waiting = null;
-    if (this.next) this.ask(this.next);
-    if (this.next0 && !message.stale) this.handlers.preview({ ...message, k });
+    if (this.place && !message.stale) this.handlers.preview(message);
   }
 
   // The drag has ended, however it did.
   settle() {
     clearTimeout(this.rest);
-    this.next = this.next0 = null;
+    this.place = null;
   }
 }

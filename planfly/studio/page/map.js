@@ -3,17 +3,23 @@
 import { Labels, View, clear, groundAt, plain, step, svg } from "/axes.js";
 
 const DENSE = 80;
+// Legs of the straight line between the waypoints that are one shape: what is dragged has its own drawn anew.
+const CHUNK = 6;
 
 export class MapView {
   constructor(root) {
     this.root = root;
     this.view = new View();
+    // Ground, zones and threats are a picture of their own below, which a drag does not have painted anew.
+    this.below = svg("svg", { class: "below", "aria-hidden": "true" });
+    root.before(this.below);
+    this.land = svg("g", { class: "world" }, this.below);
+    this.ground = svg("image", { preserveAspectRatio: "none", transform: "scale(1 -1)" }, this.land);
+    this.shapes = svg("g", {}, this.land);
     this.world = svg("g", { class: "world" }, root);
-    this.ground = svg("image", { preserveAspectRatio: "none", transform: "scale(1 -1)" }, this.world);
-    this.shapes = svg("g", {}, this.world);
     this.legsUnder = svg("g", { class: "under" }, this.world);
     this.ways = svg("g", { class: "ways" }, this.world);
-    this.straight = svg("path", { class: "straight" }, this.world);
+    this.straight = svg("g", {}, this.world);
     this.legs = svg("g", { class: "legs" }, this.world);
     this.track = svg("path", { class: "track" }, this.world);
     this.names = svg("g", { class: "names", "aria-hidden": "true" }, root);
@@ -27,7 +33,7 @@ export class MapView {
 
   resize(width, height) {
     Object.assign(this.view, { width, height });
-    this.root.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    for (const one of [this.root, this.below]) one.setAttribute("viewBox", `0 0 ${width} ${height}`);
   }
 
   setWorld(world) {
@@ -65,7 +71,7 @@ export class MapView {
     this.at = new Map(model.items.map((item) => [item.k, item.at]));
     if (fresh) this.build(model);
     this.colour();
-    this.straight.setAttribute("d", this.straightLine());
+    this.drawStraight(model.route);
     this.layOut();
   }
 
@@ -75,7 +81,7 @@ export class MapView {
     this.model = model;
     this.at = new Map(model.items.map((item) => [item.k, item.at]));
     this.colour();
-    this.straight.setAttribute("d", this.straightLine());
+    this.drawStraight(model.route);
     return this.placeMarks();
   }
 
@@ -85,6 +91,7 @@ export class MapView {
     clear(this.markers);
     this.drawn = model.path.map(() => [null, ""]);
     this.marked = model.items.map(() => "");
+    this.places = [];
     this.legParts = model.path.map(() => [svg("path", {}, this.legsUnder), svg("path", {}, this.legs)]);
     this.marks = model.items.map((item) => {
       const group = svg("g", { class: "mark", tabindex: -1, role: "button", "data-k": item.k }, this.markers);
@@ -132,8 +139,13 @@ export class MapView {
     });
   }
 
-  straightLine() {
-    return `M${this.model.route.map((p) => `${p[0]} ${p[1]}`).join("L")}`;
+  drawStraight(points) {
+    const parts = this.straight.children;
+    for (let i = 0, k = 0; i + 1 < points.length; i += CHUNK, k++) {
+      const d = `M${points.slice(i, i + CHUNK + 1).map((p) => `${p[0]} ${p[1]}`).join("L")}`;
+      renew(parts[k] || svg("path", { class: "straight" }, this.straight), "d", d);
+    }
+    while (parts.length > Math.ceil((points.length - 1) / CHUNK)) parts[parts.length - 1].remove();
   }
 
   // An item follows the hand before the server has answered.
@@ -141,8 +153,9 @@ export class MapView {
     const item = this.at.get(k);
     if (!item) return;
     this.at.set(k, [east, north, item[2]]);
-    const points = this.model.route.map((p, i) => (this.model.of[i] === k && this.once(k) ? [east, north] : p));
-    this.straight.setAttribute("d", `M${points.map((p) => `${p[0]} ${p[1]}`).join("L")}`);
+    const once = this.once(k);
+    const points = this.model.route.map((p, i) => (once && this.model.of[i] === k ? [east, north] : p));
+    this.drawStraight(points);
     this.placeMarks();
   }
 
@@ -169,7 +182,7 @@ export class MapView {
 
   // Everything that depends on the view.
   layOut() {
-    this.world.setAttribute("transform", this.view.transform());
+    for (const one of [this.world, this.land]) one.setAttribute("transform", this.view.transform());
     // Where waypoints stand closer than their dots are wide, small ones leave the legs and their colours to be seen.
     const { route } = this.model, apart = route.slice(1).map((p, i) => Math.hypot(p[0] - route[i][0], p[1] - route[i][1]));
     const middle = apart.sort((a, b) => a - b)[apart.length >> 1] || 0;
@@ -183,7 +196,14 @@ export class MapView {
   placeMarks() {
     this.marks.forEach((group, i) => {
       const [east, north] = this.at.get(this.model.items[i].k);
-      group.setAttribute("transform", `translate(${this.view.x(east)} ${this.view.y(north)})`);
+      const x = this.view.x(east), y = this.view.y(north);
+      if (this.places[i] === `${x} ${y}`) return;
+      this.places[i] = `${x} ${y}`;
+      // A transform each would cost the browser more than all of the rest.
+      for (const circle of group.children) {
+        circle.setAttribute("cx", x);
+        circle.setAttribute("cy", y);
+      }
     });
   }
 
@@ -302,6 +322,11 @@ export class MapView {
     this.view.fit([[east[0] - rim, east[1] + rim], [north[0] - rim, north[1] + rim]]);
     this.layOut();
   }
+}
+
+// Set what differs: what is set is painted anew.
+function renew(part, name, value) {
+  if (part.getAttribute(name) !== value) part.setAttribute(name, value);
 }
 
 const ORDER = ["fail", "open", "near", "ok"];

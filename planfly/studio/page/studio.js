@@ -376,19 +376,10 @@ const app = {
     clearTimeout(now.nudgeTimer);
     now.nudgeTimer = setTimeout(() => { if (!now.committed) app.flush(); }, 60);
   },
+  // It is drawn with the next frame, which lays out the page anyway.
   hint(lines, x, y, state) {
-    const box = $("hint");
-    if (!lines) {
-      box.hidden = true;
-      return;
-    }
-    clear(box).append(...lines.filter(Boolean).map((line, i) => element(i ? "span" : "b", {}, line)));
-    box.dataset.state = state || "";
-    box.hidden = false;
-    const own = map.root.getBoundingClientRect(), views = $("views").getBoundingClientRect();
-    const left = own.left - views.left + x + 18, top = own.top - views.top + y + 16;
-    box.style.left = `${Math.max(4, Math.min(left, views.width - box.offsetWidth - 6))}px`;
-    box.style.top = `${top + box.offsetHeight > views.height - 4 ? top - box.offsetHeight - 34 : top}px`;
+    if (!now.hint) requestAnimationFrame(drawHint);
+    now.hint = { lines, x, y, state };
   },
   showPlace(east, north) {
     const ground = groundAt(now.grid, east, north);
@@ -420,6 +411,19 @@ function triplets(flat) {
   const found = [];
   for (let i = 0; i < flat.length; i += 3) found.push([flat[i], flat[i + 1]]);
   return found;
+}
+
+function drawHint() {
+  const { lines, x, y, state } = now.hint, box = $("hint");
+  now.hint = null;
+  box.hidden = !lines;
+  if (!lines) return;
+  clear(box).append(...lines.filter(Boolean).map((line, i) => element(i ? "span" : "b", {}, line)));
+  box.dataset.state = state || "";
+  const own = map.root.getBoundingClientRect(), views = $("views").getBoundingClientRect();
+  const left = own.left - views.left + x + 18, top = own.top - views.top + y + 16;
+  box.style.left = `${Math.max(4, Math.min(left, views.width - box.offsetWidth - 6))}px`;
+  box.style.top = `${top + box.offsetHeight > views.height - 4 ? top - box.offsetHeight - 34 : top}px`;
 }
 
 const panel = new Panel(app);

@@ -27,8 +27,8 @@ def world_of(name: str) -> tuple[Scenario, Airframe]:
     return scenario, load_airframe(scenario)
 
 
-def draw_mission(rng: np.random.Generator, count: int, scenario: Scenario) -> Mission:
-    """A mission of so many places, some of which are circles, with jumps back and changes of speed between them."""
+def draw_mission(rng: np.random.Generator, count: int, scenario: Scenario, *, jumps: bool = True) -> Mission:
+    """A mission of so many places, some of which are circles, with changes of speed and jumps back between them."""
     (west, east), (south, north) = scenario.bounds.tolist()
     assert scenario.terrain is not None
     middle = np.array([0.5 * (west + east), 0.5 * (south + north)])
@@ -54,7 +54,7 @@ def draw_mission(rng: np.random.Generator, count: int, scenario: Scenario) -> Mi
         lat, lon = to_geo(scenario.origin, *here)
         place = on_grid(float(lat)), on_grid(float(lon)), round(alt, 3)
         items.append(MissionItem(len(items) + 1, int(kind), int(frame), params, *place))
-        if len(items) > 4 and rng.random() < 0.04:
+        if jumps and len(items) > 4 and rng.random() < 0.04:
             target = float(rng.integers(2, len(items)))
             items.append(_item(len(items), Command.DO_JUMP, Frame.MISSION, (target, 1.0, 0.0, 0.0)))
         course += float(rng.normal(0.0, 0.7))
@@ -76,12 +76,12 @@ def session_of(mission: Mission, name: str = "jacksboro") -> Session:
     return Session.of(Document("drawn.waypoints", "drawn", opened, "waypoints"), World(scenario=name))
 
 
-def drawn_session(seed: int, count: int, name: str = "jacksboro") -> Session:
+def drawn_session(seed: int, count: int, name: str = "jacksboro", *, jumps: bool = True) -> Session:
     """A session of a random mission that can be laid out."""
     rng = np.random.default_rng(seed)
     while True:
         try:
-            return session_of(draw_mission(rng, count, world_of(name)[0]), name)
+            return session_of(draw_mission(rng, count, world_of(name)[0], jumps=jumps), name)
         except MissionError:
             continue
 

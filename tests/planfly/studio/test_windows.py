@@ -1,20 +1,25 @@
 """The verdict about a moved item is the whole one's there, and beyond it nothing has changed."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from flight.mission.items import Command, Mission, MissionItem
+from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import geometric_findings
 from logs.verdict.measures.route_requirements import route_requirements
 from planfly.studio import edits
+from planfly.studio.moved_route import moved_route
+from planfly.studio.session import Session
 from planfly.studio.windows import judge_windows
 from tests.planfly.studio.drafts import drawn_session
 from tests.soak import note, scaled
 from world.errors import MissionError
 
-MISSIONS = scaled(1000, 5)
+MISSIONS, MOVED = scaled(1000, 5), scaled(300, 6)
 # A window's path is rounded from its own beginning, and heights over ground differ by what that is worth, m.
 ROUNDED = 0.02
 Judged = dict[tuple[str, str, int], list[Any]]
@@ -36,17 +41,31 @@ def same(found: list[Any], wanted: list[Any]) -> bool:
     return all(a == b or (None not in (a, b) and abs(a - b) < ROUNDED) for a, b in pairs)
 
 
+def changed(session: Session, k: int, how: str, rng: np.random.Generator) -> tuple[Mission, int]:
+    """The mission with a place moved, raised, inserted or deleted, and the place about which it has changed."""
+    east, north, _ = session.place_of(k)
+    lat, lon = session.desk.geographic(*(np.array([east, north]) + rng.normal(0.0, 150.0, 2)).tolist())
+    match how:
+        case "up":
+            return edits.raised(session.mission, [k], float(rng.normal(0.0, 60.0))), k
+        case "insert":
+            return edits.inserted(session.mission, k, lat, lon), edits.next_index(session.mission, k)
+        case "delete":
+            mission = edits.deleted(session.mission, k)
+            return mission, min(edits.places(mission), key=lambda one: abs(one - k))
+        case _:
+            return edits.moved(session.mission, k, lat, lon), k
+
+
 def test_windows_say_what_the_whole_says() -> None:
     windowed = compared = 0
     for seed in range(MISSIONS):
         session = drawn_session(seed, 10 + 7 * seed % 60)
         rng = np.random.default_rng(10_000 + seed)
-        k = int(rng.choice(edits.places(session.mission)))
-        east, north, _ = session.place_of(k)
-        step = rng.normal(0.0, 150.0, 2)
+        how = ("move", "up", "insert", "move", "delete")[seed % 5]
         try:
-            mission = edits.moved(session.mission, k, *session.desk.geographic(east + step[0], north + step[1]))
-            found = judge_windows(session.desk, mission, k)
+            mission, k = changed(session, int(rng.choice(edits.places(session.mission))), how, rng)
+            found = judge_windows(session.desk, mission, k, session.judged.setup)
             whole = by_place(geometric_findings(route_requirements(session.desk.setup(mission))))
         except MissionError:
             continue
@@ -70,6 +89,46 @@ def test_windows_say_what_the_whole_says() -> None:
     assert windowed >= MISSIONS // 2
     assert compared > 20 * MISSIONS
     note("studio: windows against the whole", missions=MISSIONS, windowed=windowed, compared=compared, differing=0)
+
+
+def test_a_moved_route_is_the_one_that_is_laid() -> None:
+    moved = 0
+    for seed in range(MOVED):
+        session = drawn_session(seed, 12, jumps=False)
+        rng = np.random.default_rng(20_000 + seed)
+        setup, desk = session.judged.setup, session.desk
+        for how in ("move", "up", "move"):
+            try:
+                mission, _ = changed(session, int(rng.choice(edits.places(session.mission))), how, rng)
+                laid = desk.route(mission)
+            except MissionError:
+                continue
+            made = moved_route(setup.route, setup.mission, mission, desk.scenario, desk.airframe)
+            if made is None:
+                continue
+            moved += 1
+            for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops"):
+                assert np.allclose(getattr(made, name), getattr(laid, name), rtol=0.0, atol=1e-6), f"seed {seed} {name}"
+    assert moved >= MOVED
+
+
+def test_what_a_move_may_change_elsewhere_has_the_route_laid_anew() -> None:
+    session = drawn_session(11, 12, jumps=False)
+    desk, mission, setup = session.desk, session.mission, session.judged.setup
+    own = edits.places(mission)
+    circles = {k for k in own if mission.items[k].command != Command.NAV_WAYPOINT}
+    beside = next(a for a, b in pairwise(own) if a not in circles and b in circles)
+    free = next(b for a, b, c in zip(own, own[1:], own[2:], strict=False) if not circles & {a, b, c})
+
+    def made(k: int, place: MissionItem, north: float = 0.0) -> Route | None:
+        after = edits.moved(mission, k, place.lat_deg + north, place.lon_deg)
+        return moved_route(setup.route, mission, after, desk.scenario, desk.airframe)
+
+    assert made(free, mission.items[free], 0.001) is not None
+    assert made(beside, mission.items[beside], 0.001) is None
+    assert made(min(circles), mission.items[min(circles)], 0.001) is None
+    # At the place of the one before, with which it is merged.
+    assert made(free, mission.items[own[own.index(free) - 1]]) is None
 
 
 def test_a_move_is_seen_where_it_matters() -> None:
