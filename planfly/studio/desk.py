@@ -18,10 +18,11 @@ from flight.mission.route import Route, lay_route, with_end_courses
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
-from planfly.airframe import Airframe, load_airframe
+from planfly.airframe import Airframe
 from planfly.open_mission import NamedFences, OpenedMission
 from planfly.pipeline import make_setup
 from planfly.studio.edits import places
+from planfly.studio.settings import SetParameters
 from planner.plan import Plan
 from world.frames import to_geo, to_map
 from world.scenario import Scenario
@@ -30,6 +31,7 @@ Floats = NDArray[np.float64]
 # A mission without a scenario gets a new one around it where it comes so near to the edge of its own, m.
 _RIM = 500.0
 _NO_FENCES = NamedFences()
+_NONE_SET = SetParameters()
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,7 @@ class Desk:
     terrain: of a mission that came without a scenario, the elevation file named; None for none.
     planned: whether the acceptance radii are planfly's, and follow the turns.
     fences: named beside a mission; their zones stand in every world that is made around it.
+    parameters: of the autopilot, that were set in the studio.
     """
 
     scenario: Scenario
@@ -59,6 +62,7 @@ class Desk:
     terrain: str | None = None
     planned: bool = False
     fences: NamedFences = _NO_FENCES
+    parameters: SetParameters = _NONE_SET
 
     @classmethod
     def of(cls, opened: OpenedMission, terrain: str | None = None, fences: NamedFences = _NO_FENCES) -> "Desk":
@@ -74,14 +78,14 @@ class Desk:
             fences=fences,
         )
 
-    def flown_as(self, scenario: Scenario) -> "Desk":
+    def flown_as(self, scenario: Scenario, parameters: SetParameters) -> "Desk":
         """The desk with the same mission in another weather, or with another aircraft or autopilot.
 
         A plan's certificate is of the world in which it was planned: it does not count in another.
         """
-        airframe = load_airframe(scenario)
+        airframe = parameters.airframe(scenario)
         setup = make_setup(scenario, airframe, self.opened.mission, self.seed)
-        return replace(self, scenario=scenario, airframe=airframe, opened=setup)
+        return replace(self, scenario=scenario, airframe=airframe, opened=setup, parameters=parameters)
 
     def of_plan(self, plan: Plan, mission: Mission) -> "Desk":
         """The desk of a plan that was made here; its mission counts with its certificate until it is changed."""

@@ -20,6 +20,7 @@ from logs.views.exports.map_files import kml_text, map_zones, plan_line
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.api.flying import opened_mission
 from planfly.api.imported import read_imported
+from planfly.imported_flights import ImportedFlight
 from planfly.open_mission import MCAP_MAGIC, OpenedMission, ScenarioChange, is_log
 from planfly.pipeline import make_setup
 from planfly.studio.desk import Desk, Judged
@@ -28,7 +29,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Certificate, Plan, plan_json
 from world.elevation_formats import EMBEDDED
-from world.errors import MissionError, PlanflyError
+from world.errors import LogError, MissionError, PlanflyError
 from world.files import temporary_folder
 from world.scenario import Scenario, embedded_names, load_scenario
 
@@ -36,7 +37,9 @@ from world.scenario import Scenario, embedded_names, load_scenario
 MAX_DROPPED = 16 * 2**20
 # What may be dropped: all that `planfly check` reads and that names no other file.
 DROPPED = (".waypoints", ".txt", ".plan", ".json", ".mcap", ".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml", ".kmz")
+# What a mission is opened from and saved as; and what else is saved.
 KINDS = {"waypoints": ".waypoints", "plan": ".plan", "plan.json": ".json", "kml": ".kml"}
+SAVED = KINDS | {"parm": ".parm"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,12 +142,23 @@ def _folder(aircraft: Any) -> str | None:
 def _open_file(path: Path, world: World) -> OpenedMission:
     """A plan, a mission, or the mission of a log."""
     if path.is_file() and is_imported_log(path):
-        found = read_imported(path, scenario=world.scenario, terrain=world.terrain, fence=world.fence)
+        found = _imported(path, world)
         return _unflown(found.setup.scenario, found.setup.mission, found.setup.seed, path.stem)
     if path.is_file() and is_log(path):
         setup = read_log(path).setup
         return _unflown(world.change(setup.scenario), setup.mission, setup.seed, path.stem)
     return opened_mission(path, world.scenario, world.terrain, world.seed, world.fence, world.change)
+
+
+def _imported(path: Path, world: World) -> ImportedFlight:
+    """The flight of another program's log.  Raises PlanflyError, in the studio's words for a track alone."""
+    try:
+        return read_imported(path, scenario=world.scenario, terrain=world.terrain, fence=world.fence)
+    except LogError as error:
+        if "holds no mission" not in str(error):
+            raise
+        alone = "a flight's track without a mission: open the file of its mission"
+        raise MissionError(f"{path}: {alone}", file=path) from None
 
 
 def _unflown(scenario: Scenario, mission: Mission, seed: int, stem: str) -> OpenedMission:
@@ -192,18 +206,20 @@ def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> 
 
     An unchanged mission in the form that it was opened in is the file that was opened.
     """
-    mission, name = judged.mission, f"{document.stem}{KINDS[kind]}"
+    mission, name = judged.mission, f"{document.stem}{SAVED[kind]}"
+    if kind == "parm":
+        return _saved_parameters(name, desk)
     before = document.opened.setup.scenario
     same = kind != "plan.json" or desk.scenario is before
     if kind == document.kind and mission is document.opened.setup.mission and same:
-        return Saved(name, document.data)
+        return Saved(name, document.data, _lost_settings(before, desk))
     if kind == "plan.json":
         return _saved_plan(name, desk, judged)
     if kind == "kml":
         text = kml_text(desk.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
         return Saved(name, _bytes(text), ("a map only: the commands, speeds and frames of the items are not in it",))
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
-    losses = (*_losses(desk, mission, text, name, kind), *_lost_settings(before, desk.scenario))
+    losses = (*_losses(desk, mission, text, name, kind), *_lost_settings(before, desk))
     return Saved(name, text.encode(), losses)
 
 
@@ -229,15 +245,30 @@ def _losses(desk: Desk, mission: Mission, text: str, name: str, kind: str) -> tu
     return tuple(found)
 
 
-def _lost_settings(before: Scenario, now: Scenario) -> tuple[str, ...]:
+def _lost_settings(before: Scenario, desk: Desk) -> tuple[str, ...]:
     """What was set here of how a mission is flown, which no ground station's file holds."""
+    now = desk.scenario
     differs = {
         "wind": before.spec.wind != now.spec.wind,
         "aircraft, autopilot or airspeed": before.spec.flight != now.spec.flight,
-        "clearance": before.limits.min_clearance_m != now.limits.min_clearance_m,
+        "limits": before.spec.limits != now.spec.limits or before.ceiling != now.ceiling,
     }
     names = [name for name, other in differs.items() if other]
-    return (f"the settings changed here: {', '.join(names)}",) if names else ()
+    lost = (f"the settings changed here: {', '.join(names)}",) if names else ()
+    return (*lost, *_lost_parameters(desk))
+
+
+def _lost_parameters(desk: Desk) -> tuple[str, ...]:
+    """The autopilot's parameters that were set here, which only their own file holds."""
+    count = len(desk.parameters.values)
+    return (f"{count} parameter{'s' if count != 1 else ''} set here: .parm holds them",) if count else ()
+
+
+def _saved_parameters(name: str, desk: Desk) -> Saved:
+    """The parameters that were set here, as a file for the aircraft.  Raises PlanflyError where none was."""
+    if not desk.parameters.values:
+        raise PlanflyError("no parameter was set here: Settings sets them", field="form")
+    return Saved(name, desk.parameters.text(f"set in planfly studio for {desk.airframe.autopilot.title}").encode())
 
 
 def _saved_plan(name: str, desk: Desk, judged: Judged) -> Saved:
@@ -250,7 +281,7 @@ def _saved_plan(name: str, desk: Desk, judged: Judged) -> Saved:
     if not made.feasible:
         problem = (made.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")
-    return Saved(name, plan_json(made).encode(), tuple(losses))
+    return Saved(name, plan_json(made).encode(), (*losses, *_lost_parameters(desk)))
 
 
 def _refuse_what_no_plan_holds(mission: Mission) -> None:

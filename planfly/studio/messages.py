@@ -1,10 +1,10 @@
-"""The messages of the page to the server: strict, bounded, and nothing in them is a path.
+"""The messages of the page to the server: strict and bounded.  A path is in one alone, to open a file of the folder.
 
 Each is one JSON object whose ``kind`` says what it is.  A value that it may not have is answered with a fault; what
 is no message closes the connection.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
@@ -24,6 +24,11 @@ _Up = Annotated[float, Field(ge=-500.0, le=9_000.0)]
 _Index = Annotated[int, Field(ge=0, le=20_000)]
 _Rev = Annotated[int, Field(ge=0, le=2**53)]
 _Name = Annotated[str, Field(min_length=1, max_length=200)]
+# Entries of a scenario's [limits].
+LimitName = Literal[
+    "min_clearance_m", "max_height_m", "corridor_m", "max_turn_deg", "max_climb_deg", "max_dive_deg", "surveys"
+]  # fmt: skip
+LIMITS: tuple[str, ...] = get_args(LimitName)
 
 
 class Hello(_Message):
@@ -111,16 +116,26 @@ class Apply(_Message):
 
 
 class Settings(_Message):
-    """How it is flown; what is not stated stays."""
+    """How it is flown; what is not stated stays.  Its values are checked as those of a scenario are.
+
+    limits: entries of [limits]; null takes one away.  ceiling: m above mean sea level.
+    parameter: one of the autopilot's, as NAME=VALUE.  without: names that are no longer set.
+    parameter_file: name of a file of parameters, whose text is parameter_text.
+    """
 
     kind: Literal["settings"]
     aircraft: _Name | None = None
     autopilot: _Name | None = None
-    airspeed: Annotated[float, Field(gt=0.0, le=150.0)] | None = None
-    wind_speed: Annotated[float, Field(ge=0.0, le=50.0)] | None = None
-    wind_from: Annotated[float, Field(ge=-360.0, le=360.0)] | None = None
+    airspeed: float | None = None
+    wind_speed: float | None = None
+    wind_from: float | None = None
     turbulence: Literal["none", "light", "moderate"] | None = None
-    clearance: Annotated[float, Field(ge=0.0, le=2_000.0)] | None = None
+    limits: dict[LimitName, float | Annotated[str, Field(max_length=20)] | None] | None = None
+    ceiling: float | None = None
+    parameter: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    without: Annotated[list[_Name], Field(max_length=2_000)] | None = None
+    parameter_file: _Name | None = None
+    parameter_text: str | None = None
 
 
 class Plan(_Message):
@@ -155,15 +170,15 @@ class Save(_Message):
     """The mission as a file: to the page, or over the file that the command named."""
 
     kind: Literal["save"]
-    form: Literal["waypoints", "plan", "plan.json", "kml"]
+    form: Literal["waypoints", "plan", "plan.json", "kml", "parm"]
     over: bool = False
 
 
 class Open(_Message):
-    """A file that was dropped on the page, its bytes in base 64; or one of those that the server has listed."""
+    """A file that was dropped on the page, its bytes in base 64; or one in the server's folder, by its path."""
 
     kind: Literal["open"]
-    name: _Name
+    name: Annotated[str, Field(min_length=1, max_length=1_000)]
     data: Annotated[str, Field(max_length=MAX_DROPPED_MESSAGE)] | None = None
 
 

@@ -25,13 +25,16 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from planfly.studio import messages
 from planfly.studio.documents import open_document, open_dropped
+from planfly.studio.folder import file_inside, folder_json
 from planfly.studio.ground_picture import ground_grid, ground_picture
 from planfly.studio.jobs import Jobs
 from planfly.studio.messages import read_message
 from planfly.studio.pilot import INTERNAL, Answer, internal_text
 from planfly.studio.session import Session, StaleEdit
+from planfly.studio.settings import PARAMETER_FILES
 from planfly.studio.sheet import Json
 from world.errors import MissionError, PlanflyError
+from world.files import read_small_file, utf8_text
 
 Given = TypeVar("Given")
 
@@ -44,8 +47,6 @@ _WAITING = 64
 _BREATH = 0.001
 # Between two looks whether another page has gone, s.
 _AGAIN = 0.05
-# Files of a folder that are listed, and their suffixes.
-_MOST_FILES, _LISTED = 200, (".waypoints", ".plan", ".json", ".mcap")
 # Codes with which a websocket is closed.
 NO_TOKEN, TOO_MANY, TOO_SLOW, NOT_UNDERSTOOD = 4403, 4429, 1013, 1007
 
@@ -78,7 +79,7 @@ class Server:
     def __init__(self, session: Session, token: str, kept: Path | None, folder: Path | None) -> None:
         """kept: where what was done is written.  folder: whose files may be opened by the page, None for none."""
         self.session, self._token, self._kept = session, token, kept
-        self._files = {} if folder is None else listed_files(folder)
+        self._folder = folder
         self._pages: set[Page] = set()
         self._judging = ThreadPoolExecutor(1, "studio-judge")
         self._drawing = ThreadPoolExecutor(1, "studio-draw")
@@ -219,7 +220,7 @@ class Server:
             await asyncio.sleep(_BREATH)
 
     async def _show_all(self, page: Page) -> None:
-        page.send({"kind": "choices", **self.jobs.choices(), "files": sorted(self._files)})
+        page.send({"kind": "choices", **self.jobs.choices(), **folder_json(self._folder)})
         page.send(self.session.world_shown())
         page.send(self.session.sheet())
         for message in self.jobs.shown():
@@ -293,7 +294,8 @@ class Server:
                 async with self._order:
                     saved = await self._judged(work)
                 content = "" if message.over else base64.b64encode(saved.data).decode()
-                answer = {"name": saved.name, "losses": list(saved.losses), "over": message.over, "data": content}
+                where = str(session.document.path.resolve().parent) if message.over and session.document.path else ""
+                answer = {"name": saved.name, "losses": list(saved.losses), "where": where, "data": content}
                 page.send({"kind": "saved", **answer})
             case messages.Hello():
                 raise ValueError("a page says its token once")
@@ -331,6 +333,8 @@ class Server:
                 session.change_settings(message)
             case messages.Choose():
                 session.replace_plan(message)
+            case messages.Open() if message.data is None and message.name.lower().endswith(PARAMETER_FILES):
+                session.change_settings(self._parameters(message.name))
             case messages.Open():
                 opened = self._opened(message)
                 if self._kept is not None and session.is_changed:
@@ -344,15 +348,19 @@ class Server:
 
     def _opened(self, message: messages.Open) -> Any:
         if message.data is None:
-            path = self._files.get(message.name)
-            if path is None:
-                raise MissionError.at("open", "name", message.name[:60], "a file of the list is expected")
-            return open_document(str(path), self.session.world)
+            return open_document(str(file_inside(self._folder, message.name)), self.session.world)
         try:
             data = base64.b64decode(message.data, validate=True)
         except binascii.Error as error:
             raise MissionError(f"{message.name[:60]}: its bytes did not come whole", field="data") from error
         return open_dropped(message.name, data, self.session.world)
+
+    def _parameters(self, name: str) -> messages.Settings:
+        """The change that a file of parameters in the folder asks for."""
+        path = file_inside(self._folder, name)
+        data = read_small_file(path, messages.MAX_MESSAGE, "parameter", PlanflyError)
+        text = utf8_text(data, path, PlanflyError)
+        return messages.Settings(kind="settings", parameter_file=path.name, parameter_text=text)
 
     # ------------------------------------------------------------------
     # What the processes answer.
@@ -407,17 +415,3 @@ def _frame(kind: str, head: Json, body: bytes) -> bytes:
     """A binary frame: its kind, the length of its head, the head as JSON, and the bytes."""
     text = json.dumps(head).encode()
     return kind.encode() + struct.pack("<I", len(text)) + text + body
-
-
-def listed_files(folder: Path) -> dict[str, Path]:
-    """Missions, plans and logs of a folder by name; none that a link leads out of it.
-
-    >>> listed_files(Path("no such folder"))
-    {}
-    """
-    try:
-        inside = folder.resolve(strict=True)
-        found = sorted(one for one in inside.iterdir() if one.suffix.lower() in _LISTED and one.is_file())
-    except OSError:
-        return {}
-    return {one.name: one for one in found[:_MOST_FILES] if one.resolve().parent == inside}

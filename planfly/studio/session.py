@@ -14,7 +14,6 @@ import numpy as np
 
 from flight.mission.items import LANDINGS, Home, Mission, MissionItem
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from planfly.api.planning import changed_scenario
 from planfly.open_mission import read_named_fences
 from planfly.studio import edits
 from planfly.studio.applied import apply_suggestion
@@ -22,13 +21,13 @@ from planfly.studio.desk import Desk, Judged
 from planfly.studio.documents import Document, Saved, World, open_document, planned_mission, save_document
 from planfly.studio.history import History
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
+from planfly.studio.settings import changed_parameters, changed_world, settings_json
 from planfly.studio.sheet import Json, sheet_json, window_json, world_json
 from planfly.studio.windows import judge_windows
 from planner.plan import Plan
 from world.errors import MissionError, PlanflyError
 from world.files import write_whole
 from world.frames import to_geo
-from world.scenario import Scenario, from_spec
 
 Edit = Move | Insert | Delete | Raise | Apply
 _KEPT = "planfly.studio/1"
@@ -293,7 +292,8 @@ class Session:
 
     def change_settings(self, asked: Settings) -> None:
         """Fly the mission otherwise.  Raises PlanflyError for a value that no scenario may have."""
-        desk = self.desk.flown_as(changed_world(self.desk.scenario, asked))
+        scenario = changed_world(self.desk.scenario, asked)
+        desk = self.desk.flown_as(scenario, changed_parameters(self.desk.parameters, scenario, asked))
         mission = self.mission
         judged = desk.judge(mission)
         self.requirements = route_requirements(judged.setup)
@@ -302,17 +302,7 @@ class Session:
 
     def settings_json(self) -> Json:
         """The settings as they are."""
-        scenario, frame = self.desk.scenario, self.desk.airframe
-        return {
-            "aircraft": frame.aircraft.name,
-            "autopilot": frame.autopilot.name,
-            "autopilot_title": frame.autopilot.title,
-            "airspeed": round(frame.airspeed, 1),
-            "wind_speed": float(scenario.wind.speed),
-            "wind_from": round(float(np.degrees(scenario.wind.from_course)), 1),
-            "turbulence": scenario.wind.turbulence,
-            "clearance": float(scenario.limits.min_clearance_m),
-        }
+        return settings_json(self.desk.scenario, self.desk.airframe, self.desk.parameters)
 
     # ------------------------------------------------------------------
     # What the page draws, and files.
@@ -394,26 +384,6 @@ class Session:
             return False
         self._note(mission, "what was done before the studio ended")
         return True
-
-
-def changed_world(scenario: Scenario, asked: Settings) -> Scenario:
-    """A scenario with other settings.  Raises PlanflyError for a value that it may not have."""
-    wind = None
-    if asked.wind_speed is not None or asked.wind_from is not None:
-        speed = scenario.wind.speed if asked.wind_speed is None else asked.wind_speed
-        from_deg = float(np.degrees(scenario.wind.from_course)) if asked.wind_from is None else asked.wind_from
-        wind = (float(speed), from_deg)
-    if asked.aircraft is not None and ("/" in asked.aircraft or "\\" in asked.aircraft):
-        raise PlanflyError("aircraft: a name that planfly aircraft lists is expected", field="aircraft")
-    changed = changed_scenario(
-        scenario, wind=wind, turbulence=asked.turbulence, aircraft=asked.aircraft, airspeed=asked.airspeed,
-        autopilot_law=asked.autopilot,
-    )  # fmt: skip
-    if asked.clearance is None:
-        return changed
-    spec = changed.to_json()
-    spec.setdefault("limits", {})["min_clearance_m"] = asked.clearance
-    return from_spec(spec, changed.name, ground=changed.terrain, external=changed.external)
 
 
 def mission_data(mission: Mission) -> Json:

@@ -2,6 +2,7 @@
 
 import { clear, element, groundAt, plain } from "/axes.js";
 import { cornerStates } from "/map.js";
+import { buildSettings, field, isParameters, sendParameters } from "/settings.js";
 
 const $ = (id) => document.getElementById(id);
 const TABS = ["verdict", "items", "plan", "settings", "files"];
@@ -44,11 +45,18 @@ export class Panel {
     this.drawItems();
   }
 
+  // Shows a panel that may lie below what is seen.
+  reveal(name) {
+    this.show(name);
+    if (this.boxes[name].getBoundingClientRect().top > innerHeight - 120) this.boxes[name].scrollIntoView({ block: "start" });
+  }
+
   // ---- what comes
 
   choices(message) {
     this.offered = message;
     this.files = message.files;
+    this.folder = message.folder;
     this.drawFiles();
     this.drawPlan();
   }
@@ -242,26 +250,7 @@ export class Panel {
   // ---- settings
 
   drawSettings() {
-    if (this.about && this.offered) keepFocus(this.boxes.settings, () => this.buildSettings());
-  }
-
-  buildSettings() {
-    const { about, offered, app } = this, box = clear(this.boxes.settings);
-    const { settings } = about;
-    const list = (name, values, chosen) => element("select", { id: `set-${name}`, onchange: (event) => app.send({ kind: "settings", [name]: event.target.value }) }, ...values.map((one) => element("option", { value: one, selected: one === chosen }, one)));
-    const number = (name, value, low, high, step) => element("input", { id: `set-${name}`, type: "number", min: low, max: high, step, value, onchange: (event) => {
-      const given = Math.max(low, Math.min(high, Number(event.target.value)));
-      if (event.target.value === "" || !Number.isFinite(given)) return;
-      event.target.value = given;
-      app.send({ kind: "settings", [name]: given });
-    } });
-    const laws = [...new Set([settings.autopilot, ...offered.autopilots])].filter(Boolean);
-    const craft = [...new Set([settings.aircraft, ...offered.aircraft])];
-    box.append(element("p", { class: "more" }, "What is changed here is judged and flown at once."),
-      field("Aircraft", list("aircraft", craft, settings.aircraft)), field("Autopilot", list("autopilot", laws, settings.autopilot)),
-      field("Airspeed, m/s", number("airspeed", settings.airspeed, 5, 100, 0.5)), field("Wind, m/s", number("wind_speed", settings.wind_speed, 0, 50, 0.5)),
-      field("Wind from, degrees", number("wind_from", settings.wind_from, -360, 360, 5)), field("Turbulence", list("turbulence", offered.turbulence, settings.turbulence)),
-      field("Least clearance, m", number("clearance", settings.clearance, 0, 2000, 5)));
+    if (this.about && this.offered) keepFocus(this.boxes.settings, () => buildSettings(this.boxes.settings, this.about.settings, this.offered, this.app));
   }
 
   // ---- files
@@ -277,9 +266,17 @@ export class Panel {
     this.lossBox = this.lossBox || element("div", { role: "status" });
     box.append(this.lossBox);
     const pick = element("input", { type: "file", id: "pick", onchange: (event) => event.target.files[0] && this.openFile(event.target.files[0]) });
-    box.append(element("h2", {}, "Open"), element("p", { class: "more" }, "Drop a file anywhere, or choose one: .waypoints, .plan, plan.json, or a log whose mission is opened."), element("p", {}, element("label", { for: "pick", class: "hidden" }, "File to open"), pick));
-    if (this.files.length) box.append(element("ul", { class: "files" }, ...this.files.map((name) => element("li", {}, element("button", { type: "button", class: "place", onclick: () => app.send({ kind: "open", name }) }, name)))));
+    box.append(element("h2", {}, "Open"), element("p", { class: "more" }, "Drop a file anywhere, or choose one: a mission (.waypoints, .plan, plan.json), a flight log whose mission is opened (.mcap, .bin, .tlog, .ulg, .gpx, .igc, .kml, .kmz), or the autopilot's parameters (.parm, .param)."), element("p", {}, element("label", { for: "pick", class: "hidden" }, "File to open"), pick));
+    if (this.folder) box.append(...this.byPath());
     box.append(element("h2", {}, "Back"), element("p", {}, element("button", { type: "button", disabled: !now?.changed, onclick: () => app.send({ kind: "revert" }) }, "Revert to the file"), element("small", {}, "undo brings the changes back")));
+  }
+
+  // A file in the folder of the one that the command named, by its path or from a list.
+  byPath() {
+    const { app } = this, path = element("input", { id: "open-path", placeholder: "survey/mission.plan", autocomplete: "off", spellcheck: "false", onkeydown: (event) => event.key === "Enter" && open() });
+    const open = () => path.value.trim() && app.send({ kind: "open", name: path.value.trim() });
+    const found = this.files.map((name) => element("li", {}, element("button", { type: "button", class: "place", onclick: () => app.send({ kind: "open", name }) }, name)));
+    return [element("p", { class: "more" }, `Or by its path in ${this.folder}:`), element("p", {}, element("label", { for: "open-path", class: "hidden" }, "Path of a file to open"), path, element("button", { type: "button", onclick: open }, "Open")), element("ul", { class: "files" }, ...found)];
   }
 
   save() {
@@ -287,19 +284,23 @@ export class Panel {
     else this.app.send({ kind: "save", form: "waypoints" });
   }
 
-  saved({ name, losses, over, data }) {
-    if (!over) {
+  saved({ name, losses, where, data }) {
+    if (!where) {
       const bytes = Uint8Array.from(atob(data), (ch) => ch.charCodeAt(0));
       const url = URL.createObjectURL(new Blob([bytes]));
       element("a", { href: url, download: name }).click();
       setTimeout(() => URL.revokeObjectURL(url), 10000);
     }
     const lost = losses.length ? element("ul", {}, ...losses.map((text) => element("li", {}, text))) : null;
-    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is saved. `), losses.length ? "It does not hold:" : "It holds all of the mission."), ...(lost ? [lost] : []));
-    this.show("files");
+    clear(this.lossBox).append(element("p", {}, element("b", {}, `${name} is saved`), ` ${where ? `in ${where}` : "among your browser's downloads"}. `, losses.length ? "It does not hold:" : "It holds all of the mission."), ...(lost ? [lost] : []));
+    this.reveal("files");
   }
 
   async openFile(file) {
+    if (isParameters(file.name)) {
+      this.show("settings");
+      return sendParameters(file, this.app);
+    }
     if (file.size > 16 * 2 ** 20) return this.app.complain(`${file.name}: larger than 16 MB: open it with planfly studio ${file.name}`);
     const bytes = new Uint8Array(await file.arrayBuffer()), parts = [];
     for (let i = 0; i < bytes.length; i += 32768) parts.push(String.fromCharCode(...bytes.subarray(i, i + 32768)));
@@ -350,10 +351,6 @@ function keepFocus(box, build) {
   if (next && typed !== null && !had.entered) next.value = typed;
   (next || box).focus({ preventScroll: true });
   return undefined;
-}
-
-function field(words, input) {
-  return element("div", { class: "field" }, element("label", { for: input.id }, words), input);
 }
 
 function duration(seconds) {

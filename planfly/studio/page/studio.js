@@ -72,6 +72,8 @@ function onSheet(sheet) {
   }
   say(`Geometry: ${sheet.verdict.headline}`);
   document.documentElement.dataset.rev = sheet.rev;
+  // Who has made an edit knows how.
+  $("begin").hidden = Boolean(sheet.undo || sheet.redo);
   if (now.nudged && !now.queue.length) app.flush();
   else pump();
 }
@@ -202,6 +204,7 @@ function onWorking(work) {
 // What fails beside the edits (a flight, a plan, a disk that is full) leaves them as they are.
 function onFault({ text, job }) {
   complain(text);
+  panel.drawSettings();
   if (job !== undefined || link.before === "stopped") return;
   app.refused();
   if (now.dragging) {
@@ -453,6 +456,8 @@ const link = new Link({
 $("undo").onclick = () => app.send({ kind: "undo" });
 $("redo").onclick = () => app.send({ kind: "redo" });
 $("fly").onclick = () => app.send({ kind: "fly" });
+$("save").onclick = () => panel.save();
+for (const id of ["geometry", "flown"]) $(id).onclick = () => panel.reveal("verdict");
 $("stop").onclick = () => link.send({ kind: "stop" });
 for (const [id, factor] of [["zoom-in", 1.5], ["zoom-out", 1 / 1.5]]) {
   $(id).onclick = () => { map.view.zoom(factor, map.view.width / 2, map.view.height / 2); map.layOut(); };

@@ -289,7 +289,7 @@ def test_a_value_out_of_range_is_a_fault_and_no_message_is_the_end() -> None:
 
     async def run() -> list[dict[str, Any]]:
         server, page = server_of(session), Page(NoSocket(), dark=False)  # type: ignore[arg-type]
-        await server._hear(page, '{"kind": "settings", "airspeed": 900}')
+        await server._hear(page, '{"kind": "raise", "rev": 1, "by": 1e9}')
         for text in ('{"kind": "x"}', "[", "{}"):
             with pytest.raises(ValueError, match="1 validation error"):
                 await server._hear(page, text)
@@ -297,7 +297,7 @@ def test_a_value_out_of_range_is_a_fault_and_no_message_is_the_end() -> None:
 
     (fault,) = asyncio.run(run())
     assert fault["kind"] == "fault"
-    assert fault["text"].startswith("settings: airspeed: ")
+    assert fault["text"].startswith("raise: by: ")
 
 
 def test_a_full_disk_is_said_once(tmp_path: Path) -> None:

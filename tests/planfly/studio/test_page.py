@@ -17,11 +17,13 @@ from flight.mission.items import MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
 from planfly.studio.session import mission_from
 from tests.browser import Browser
+from tests.logs.views.report.page_in_browser import grave_findings, prefer
 from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import Served
-from tests.soak import at_most
+from tests.soak import SOAK, at_most
 
 ROOT = Path(__file__).parents[3]
+TABS = ("verdict", "items", "plan", "settings", "files")
 STATE = "document.getElementById('{}').dataset.state"
 READY = "document.querySelectorAll('.mark').length > 1 && document.querySelector('#map-box image[href]') !== null"
 CENTRE = """(() => {{ const r = document.querySelectorAll({0})[{1}].getBoundingClientRect();
@@ -282,6 +284,42 @@ def test_a_suggestion_is_applied_by_its_button(page: Browser) -> None:
     undo_all(page)
 
 
+def test_settings_say_what_is_allowed_and_take_parameters(page: Browser) -> None:
+    page.value("document.getElementById('tab-settings').click()")
+    enter = (
+        "(() => {{ const one = document.getElementById('{}'); one.focus(); one.value = '{}';"
+        " one.dispatchEvent(new Event('change', {{ bubbles: true }})); }})()"
+    )
+    page.value(enter.format("set-min_clearance_m", "99999"))
+    page.wait_for(
+        "document.getElementById('message').textContent.includes('min_clearance_m: 99999.0: allowed 0..5000')"
+    )
+    assert page.value("document.getElementById('set-min_clearance_m').value") == "60"
+    page.value(enter.format("set-parameter", "WP_RADIUS=45"))
+    page.key("Enter")
+    page.wait_for("document.querySelector('.parameters')?.textContent.includes('WP_RADIUS = 45')")
+    page.value("document.querySelector('.parameters button').click()")
+    page.wait_for("document.querySelector('.parameters') === null")
+    assert page.problems == []
+
+
+SCREENS = [("light", 1400, "verdict"), ("dark", 420, "settings")]
+if SOAK:
+    SCREENS = [(look, width, tab) for look in ("light", "dark") for width in (1400, 420) for tab in TABS]
+
+
+def test_axe_finds_nothing_grave(page: Browser) -> None:
+    page.value("document.querySelectorAll('.mark')[1].focus()")
+    assert page.value("document.querySelectorAll('#panel-verdict li[data-state=fail] .apply').length") > 0
+    for look, width, tab in SCREENS:
+        prefer(page, look, width)
+        page.value(f"document.getElementById('tab-{tab}').click()")
+        page.settle()
+        assert (look, width, tab, grave_findings(page)) == (look, width, tab, [])
+    prefer(page, "light", 1400)
+    page.settle()
+
+
 def test_a_path_is_planned_between_two_items(page: Browser) -> None:
     page.value("document.getElementById('tab-items').click()")
     page.value("document.getElementById('raise-by').value = 150")
@@ -306,7 +344,10 @@ def test_a_dropped_file_is_opened(page: Browser) -> None:
     )
     page.wait_for("document.getElementById('name').textContent === 'dropped.waypoints'")
     page.value("document.getElementById('tab-files').click()")
-    page.value("[...document.querySelectorAll('.files button')].find((b) => b.textContent === 'm.waypoints').click()")
+    page.value(
+        "document.getElementById('open-path').value = './m.waypoints'; document.getElementById('open-path').focus()"
+    )
+    page.key("Enter")
     page.wait_for("document.getElementById('name').textContent === 'm.waypoints'")
 
 

@@ -195,18 +195,6 @@ def test_a_mission_comes_back_from_its_data() -> None:
     assert mission_from(mission_data(mission), mission) == mission
 
 
-def test_settings_are_judged_at_once() -> None:
-    session = drawn_session(6, 14)
-    session.change_settings(messages.Settings(kind="settings", wind_speed=9.0, wind_from=270.0, clearance=10.0))
-    shown = session.settings_json()
-    assert (shown["wind_speed"], shown["wind_from"], shown["clearance"]) == (9.0, 270.0, 10.0)
-    assert session.judged.setup.scenario.wind.speed == 9.0
-    session.change_settings(messages.Settings(kind="settings", autopilot="px4", aircraft="aerosonde"))
-    assert session.settings_json()["autopilot"] == "px4"
-    with pytest.raises(PlanflyError, match="aircraft"):
-        session.change_settings(messages.Settings(kind="settings", aircraft="../x8"))
-
-
 def test_a_suggestion_applied_mends_its_finding() -> None:
     session = drawn_session(5, 12)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=-90.0))

@@ -1,0 +1,55 @@
+"""The folder of the file that the command named: what of it the page may open, and nothing outside."""
+
+from pathlib import Path
+
+from planfly.studio.documents import DROPPED
+from planfly.studio.settings import PARAMETER_FILES
+from planfly.studio.sheet import Json
+from world.errors import MissionError
+
+# Files that are listed.
+_MOST_FILES = 200
+_READ = (*DROPPED, *PARAMETER_FILES)
+
+
+def folder_json(folder: Path | None) -> Json:
+    """The folder with its missions, plans, logs and parameters, for a page to choose from; none that a link leads out.
+
+    >>> folder_json(Path("no such folder"))["files"]
+    []
+    """
+    if folder is None:
+        return {"folder": "", "files": []}
+    try:
+        inside = folder.resolve(strict=True)
+        found = sorted(one for one in inside.iterdir() if one.suffix.lower() in _READ and one.is_file())
+    except OSError:
+        return {"folder": "", "files": []}
+    return {
+        "folder": str(inside),
+        "files": [one.name for one in found[:_MOST_FILES] if one.resolve().parent == inside],
+    }
+
+
+def file_inside(folder: Path | None, name: str) -> Path:
+    """A file by its path in the folder.  Raises MissionError for one that is not in it, or not to be opened.
+
+    >>> file_inside(Path("/tmp"), "../etc/passwd")
+    Traceback (most recent call last):
+        ...
+    world.errors.MissionError: open: name: '../etc/passwd': a file in /tmp is expected
+    """
+    if folder is None:
+        allowed = "no file was named by the command, so that there is no folder to open from: drop the file here"
+        raise MissionError.at("open", "name", name[:60], allowed, shown=repr(name[:60]))
+    try:
+        inside = folder.resolve(strict=True)
+        path = (inside / name).resolve(strict=True)
+        there = path.is_file() and path.is_relative_to(inside) and ".." not in Path(name).parts
+    except (OSError, ValueError, RuntimeError):
+        there = False
+    if not there:
+        raise MissionError.at("open", "name", name[:60], f"a file in {folder} is expected", shown=repr(name[:60]))
+    if path.suffix.lower() not in _READ:
+        raise MissionError.at("open", "suffix", path.suffix, f"allowed {', '.join(_READ)}", shown=repr(path.suffix))
+    return path

@@ -1,0 +1,82 @@
+// The settings: what a mission is flown with.  Values go to the server as they are typed, and it says what is allowed.
+
+import { clear, element } from "/axes.js";
+
+// Entries of a scenario's [limits]: words, and what counts where there is none.
+const LIMITS = [["min_clearance_m", "Least clearance, m", ""], ["max_height_m", "Most above ground, m", "no limit"], ["corridor_m", "Corridor each side, m", "the autopilot's"], ["max_turn_deg", "Sharpest turn, degrees", "the aircraft's"], ["max_climb_deg", "Steepest climb, degrees", "the aircraft's"], ["max_dive_deg", "Steepest descent, degrees", "the aircraft's"]];
+const SURVEYS = [["", "as the mission says"], ["lines", "judged as lines"], ["path", "judged as any path"]];
+const PARAMETERS = /\.(parm|param|params)$/i;
+const MOST = 240 * 1024;
+
+export function field(words, input, id = input.id) {
+  return element("div", { class: "field" }, element("label", { for: id }, words), input);
+}
+
+// Whether a file of this name is one of parameters.
+export function isParameters(name) {
+  return PARAMETERS.test(name);
+}
+
+export async function sendParameters(file, app) {
+  if (file.size > MOST) return app.complain(`${file.name}: larger than ${MOST / 1024} kB: no file of parameters is`);
+  return app.send({ kind: "settings", parameter_file: file.name.slice(-100), parameter_text: await file.text() });
+}
+
+export function buildSettings(box, settings, offered, app) {
+  const send = (change) => app.send({ kind: "settings", ...change });
+  clear(box).append(element("p", { class: "more" }, "What is changed here is judged and flown at once."), ...flown(settings, offered, send),
+    element("h2", {}, "Limits"), ...limits(settings, send), element("h2", {}, "Parameters of the autopilot"), ...parameters(settings, app, send));
+}
+
+function list(id, values, chosen, change) {
+  return element("select", { id, onchange: (event) => change(event.target.value) }, ...values.map(([value, words]) => element("option", { value, selected: value === chosen }, words)));
+}
+
+// A number as it is typed; an empty field is null.
+function number(id, value, step, change, placeholder = "") {
+  const shown = typeof value === "number" ? value : "";
+  return element("input", { id, type: "number", step, value: shown, placeholder, onchange: ({ target }) => {
+    if (target.value === "" && target.validity.badInput) target.value = shown;
+    else change(target.value === "" ? null : Number(target.value));
+  } });
+}
+
+function flown(settings, offered, send) {
+  const same = (values, own) => [...new Set([own, ...values])].filter(Boolean).map((one) => [one, one]);
+  const need = (name) => (value) => value !== null && send({ [name]: value });
+  return [
+    field("Aircraft", list("set-aircraft", same(offered.aircraft, settings.aircraft), settings.aircraft, need("aircraft"))),
+    field("Autopilot", list("set-autopilot", same(offered.autopilots, settings.autopilot), settings.autopilot, need("autopilot"))),
+    field("Airspeed, m/s", number("set-airspeed", settings.airspeed, 0.5, need("airspeed"))),
+    field("Wind, m/s", number("set-wind_speed", settings.wind_speed, 0.5, need("wind_speed"))),
+    field("Wind from, degrees", number("set-wind_from", settings.wind_from, 5, need("wind_from"))),
+    field("Turbulence", list("set-turbulence", same(offered.turbulence, settings.turbulence), settings.turbulence, need("turbulence"))),
+  ];
+}
+
+function limits(settings, send) {
+  const rows = LIMITS.map(([name, words, none]) => field(words, number(`set-${name}`, settings.limits[name], name.endsWith("_m") ? 5 : 1, (value) => send({ limits: { [name]: value } }), none)));
+  const surveys = list("set-surveys", SURVEYS, settings.limits.surveys || "", (value) => send({ limits: { surveys: value || null } }));
+  const ceiling = settings.ceiling === null ? [] : [field("Ceiling, m AMSL", number("set-ceiling", settings.ceiling, 10, (value) => value !== null && send({ ceiling: value })))];
+  return [...rows.slice(0, 2), ...ceiling, ...rows.slice(2), field("Photo lines", surveys)];
+}
+
+function parameters(settings, app, send) {
+  const known = Object.keys(settings.known);
+  if (!known.length) return [element("p", { class: "more" }, "planfly's own guidance has none: choose another autopilot.")];
+  const one = element("input", { id: "set-parameter", list: "known-parameters", placeholder: "NAME=VALUE", autocomplete: "off", spellcheck: "false" });
+  const enter = () => one.value.trim() && send({ parameter: one.value.trim() });
+  one.addEventListener("keydown", (event) => event.key === "Enter" && enter());
+  const file = element("input", { id: "set-parameter-file", type: "file", accept: ".parm,.param,.params", onchange: ({ target }) => target.files[0] && sendParameters(target.files[0], app) });
+  const set = Object.entries(settings.parameters);
+  const rows = set.map(([name, value]) => element("li", {}, element("span", {}, `${name} = ${value}`), element("button", { type: "button", class: "remove", "aria-label": `No longer set ${name}`, onclick: () => send({ without: [name] }) }, "\u00d7")));
+  const from = settings.parameter_file ? `Set here or by ${settings.parameter_file}:` : "Set here:";
+  return [
+    field("Set one", element("span", { class: "with-button" }, one, element("button", { type: "button", onclick: enter }, "Set")), one.id),
+    element("datalist", { id: "known-parameters" }, ...known.map((name) => element("option", { value: `${name}=${settings.known[name]}` }))),
+    field("From a file", file),
+    element("p", { class: "more" }, set.length ? from : `None is set here: ${settings.autopilot_title} flies with those of the aircraft and of the scenario. A file takes the place of all.`),
+    ...(settings.unused ? [element("p", { class: "more" }, `This law has no use for ${settings.unused}.`)] : []),
+    ...(set.length ? [element("ul", { class: "parameters" }, ...rows), element("p", {}, element("button", { type: "button", onclick: () => send({ without: set.map(([name]) => name) }) }, "Set none of them"), " ", element("button", { type: "button", onclick: () => app.send({ kind: "save", form: "parm" }) }, "Save as .parm"))] : []),
+  ];
+}

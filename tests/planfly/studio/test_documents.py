@@ -1,0 +1,91 @@
+"""What is opened: every form of file that `planfly check` reads, dropped on the page or in the folder."""
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from flight.mission_files.formats import mission_text
+from logs.recording.example_log import write_example_log
+from planfly.studio.documents import DROPPED, World, open_dropped, straight_plan
+from planfly.studio.folder import file_inside, folder_json
+from planner.plan import plan_json
+from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
+from tests.planfly.studio.drafts import drawn_session, world_of
+from world.errors import MissionError, PlanflyError
+
+
+def zipped_kml(path: Path) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.write(kml(path.with_suffix(".kml")), "doc.kml")
+    return path
+
+
+def written_mission(path: Path) -> Path:
+    form = "plan" if path.suffix == ".plan" else "waypoints"
+    path.write_text(mission_text(drawn_session(8, 8).mission, form), encoding="utf-8")
+    return path
+
+
+def written_plan(path: Path) -> Path:
+    path.write_text(plan_json(straight_plan(world_of("jacksboro-air")[0], 1)), encoding="utf-8")
+    return path
+
+
+# Each suffix with what writes such a file, and how many items its mission has; none for a track alone.
+FORMS: dict[str, tuple[Callable[[Path], Path], int]] = {
+    ".waypoints": (written_mission, 8),
+    ".txt": (written_mission, 8),
+    ".plan": (written_mission, 8),
+    ".json": (written_plan, 2),
+    ".mcap": (write_example_log, 3),
+    ".bin": (dataflash, 3),
+    ".tlog": (telemetry, 3),
+    ".ulg": (px4, 3),
+    ".gpx": (gpx, 3),
+    ".igc": (igc, 3),
+    ".kml": (kml, 0),
+    ".kmz": (zipped_kml, 0),
+}
+
+
+def test_each_suffix_is_tried() -> None:
+    assert tuple(FORMS) == DROPPED
+
+
+@pytest.mark.parametrize("suffix", FORMS)
+def test_a_file_of_each_suffix_is_opened(suffix: str, tmp_path: Path) -> None:
+    write, items = FORMS[suffix]
+    data = write(tmp_path / f"a{suffix}").read_bytes()
+    assert file_inside(tmp_path, f"a{suffix}") == tmp_path.resolve() / f"a{suffix}"
+    assert f"a{suffix}" in folder_json(tmp_path)["files"]
+    if not items:
+        with pytest.raises(PlanflyError, match=f"^A{suffix.upper()}: a flight's track without a mission"):
+            open_dropped(f"A{suffix.upper()}", data, World())
+        return
+    world = World(scenario="jacksboro") if write is written_mission else World()
+    document = open_dropped(f"A{suffix.upper()}", data, world)
+    mission = document.opened.setup.mission
+    assert len([item for item in mission.items if item.has_position]) == items
+    assert (document.name, document.path) == (f"A{suffix.upper()}", None)
+
+
+def test_no_path_leads_out_of_the_folder(tmp_path: Path) -> None:
+    inside = tmp_path / "in"
+    (inside / "deeper").mkdir(parents=True)
+    for place in (tmp_path, inside, inside / "deeper"):
+        written_mission(place / "m.plan")
+    (inside / "link.plan").symlink_to(tmp_path / "m.plan")
+    (inside / "notes.md").write_text("", encoding="utf-8")
+    for name in ("m.plan", "deeper/m.plan", str(inside / "m.plan")):
+        assert file_inside(inside, name).is_relative_to(inside.resolve())
+    outside = ("../m.plan", "deeper/../../m.plan", "link.plan", str(tmp_path / "m.plan"), "deeper", "none.plan")
+    for name in (*outside, "a\0.plan", "/etc/passwd", "."):
+        with pytest.raises(MissionError, match=r"a file in .* is expected"):
+            file_inside(inside, name)
+    with pytest.raises(MissionError, match=r"suffix: '.md': allowed"):
+        file_inside(inside, "notes.md")
+    with pytest.raises(MissionError, match="drop the file here"):
+        file_inside(None, "m.plan")
+    assert folder_json(inside)["files"] == ["m.plan"]

@@ -1,0 +1,86 @@
+"""Settings: limits and the autopilot's parameters are judged at once, refused in one line, and said to be lost."""
+
+import pytest
+
+from planfly.studio.messages import Settings
+from planfly.studio.session import Session
+from tests.planfly.studio.drafts import drawn_session
+from world.errors import PlanflyError
+
+
+def set_in(session: Session, **asked: object) -> None:
+    session.change_settings(Settings.model_validate({"kind": "settings", **asked}))
+
+
+def test_settings_are_judged_at_once() -> None:
+    session = drawn_session(6, 14)
+    set_in(session, wind_speed=9.0, wind_from=270.0, limits={"min_clearance_m": 10.0, "max_height_m": 800.0})
+    shown = session.settings_json()
+    assert (shown["wind_speed"], shown["wind_from"], shown["limits"]["min_clearance_m"]) == (9.0, 270.0, 10.0)
+    scenario = session.judged.setup.scenario
+    assert (scenario.wind.speed, scenario.limits.max_height_m) == (9.0, 800.0)
+    set_in(session, limits={"max_height_m": None}, ceiling=1300.0)
+    assert session.judged.setup.scenario.limits.max_height_m is None
+    assert session.settings_json()["ceiling"] == session.judged.setup.scenario.ceiling == 1300.0
+    set_in(session, autopilot="px4", aircraft="aerosonde")
+    assert session.settings_json()["autopilot"] == "px4"
+    assert any("limits" in line for line in session.save("waypoints").losses)
+
+
+def test_parameters_are_flown_with_and_saved() -> None:
+    session = drawn_session(6, 14)
+    text = "# of a ground station\nLIM_ROLL_CD,2500\nWP_RADIUS 45\nSERVO1_MIN 1100\n"
+    set_in(session, parameter_file="mine.param", parameter_text=text)
+    assert session.settings_json()["parameters"] == {"ROLL_LIMIT_DEG": 25.0, "WP_RADIUS": 45.0}
+    # What they set is judged: turns are wider with less bank.
+    assert session.judged.setup.limits.max_bank < 0.45
+    assert "the parameters of mine.param" in session.judged.setup.autopilot.described("aerosonde")
+    shown = session.settings_json()
+    assert (shown["parameter_file"], shown["unused"]) == ("mine.param", "SERVO1_MIN")
+    set_in(session, parameter="WP_RADIUS=60")
+    set_in(session, without=["ROLL_LIMIT_DEG"])
+    assert session.settings_json()["parameters"] == {"WP_RADIUS": 60.0}
+    assert session.save("parm").data.splitlines()[1:] == [b"WP_RADIUS 60"]
+    assert any("1 parameter set here" in line for line in session.save("plan").losses)
+    # A change of the weather leaves them, and another autopilot has others.
+    set_in(session, wind_speed=2.0)
+    assert session.settings_json()["parameters"] == {"WP_RADIUS": 60.0}
+    set_in(session, autopilot="px4")
+    assert session.settings_json()["parameters"] == {}
+    with pytest.raises(PlanflyError, match="no parameter was set here"):
+        session.save("parm")
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"limits": {"min_clearance_m": 6000.0}}, "limits.min_clearance_m: 6000.0: allowed 0..5000"),
+        ({"limits": {"max_height_m": 20.0}}, "limits: max_height_m: 20: must be above min_clearance_m 60"),
+        ({"limits": {"max_turn_deg": 400.0}}, 'limits.max_turn_deg: 400.0: allowed above 0..180, or "aircraft"'),
+        ({"ceiling": -9999.0}, "area.ceiling_amsl_m: -9999.0: allowed -500..9000"),
+        ({"wind_speed": 500.0}, "wind: speed_mps: 500.0: allowed 0..40"),
+        ({"airspeed": 2.0}, "airspeed_mps: 2.0: allowed 15..60"),
+        ({"aircraft": "../x8"}, "aircraft"),
+        ({"parameter": "WP_RADIUS=99999"}, "parameter:1: WP_RADIUS: 99999: allowed 0..32767"),
+        ({"parameter": "WP_RADIUS=wide"}, "parameter:1: WP_RADIUS: 'wide': a finite number is expected"),
+        ({"parameter": "WP_RADIU=50"}, "parameter: WP_RADIU: .* did you mean 'WP_RADIUS'"),
+        ({"parameter": "THR_MIN=100"}, "THR_MIN 100: must be below THR_MAX"),
+        ({"parameter_file": "a.parm", "parameter_text": "\n"}, "a.parm: no parameter"),
+    ],
+)
+def test_a_value_that_is_not_allowed_is_refused_in_one_line(asked: dict[str, object], said: str) -> None:
+    session = drawn_session(6, 14)
+    before = session.rev, session.settings_json(), session.judged
+    with pytest.raises(PlanflyError, match=said.replace("(", "[(]")) as refused:
+        set_in(session, **asked)
+    assert "\n" not in str(refused.value)
+    assert "/" not in str(refused.value).replace("m/s", "")
+    assert (session.rev, session.settings_json(), session.judged) == before
+
+
+def test_planflys_own_guidance_has_no_parameters() -> None:
+    session = drawn_session(6, 14)
+    set_in(session, autopilot="ideal")
+    assert session.settings_json()["known"] == {}
+    with pytest.raises(PlanflyError, match="has no parameters"):
+        set_in(session, parameter="WP_RADIUS=60")
