@@ -36,8 +36,10 @@ def returns(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
     )
     every = max(1.0, (float(flown.track.time[-1]) if len(flown.track) else 0.0) / _RETURNS)
     starts = return_starts(setup, flown.track, every)
-    advance(0.5, 1.0, f"flying {len(starts)} returns")
-    found = judge_returns(world, starts, every)
+    remark = f"flying {len(starts)} returns"
+    found = judge_returns(
+        world, starts, every, advance=lambda done, total: advance(0.5 + 0.5 * done / max(1.0, total), 1.0, remark)
+    )
     lines = [range_text(one, found, desk.scenario) for one in found.ranges[:_RANGES]]
     return {
         "state": "ok" if found.safe else "open" if found.undecided else "fail",

@@ -14,6 +14,8 @@ from typing import Any
 
 from world.errors import PlanflyError
 
+# s in which a work ends that is cancelled, or its process is ended: kernels may have to be compiled meanwhile.
+PATIENCE = 60.0
 # Takes done, total and a remark.
 Advance = Callable[[float, float, str], None]
 
@@ -58,16 +60,26 @@ class Cancelled(Exception):
 
 
 class Pilot:
-    """The process, as the server sees it.  Its methods are called from any thread."""
+    """The process, as the server sees it.  Its methods are called from any thread, and none of them waits for it.
 
-    def __init__(self, name: str, on_answer: Callable[[Answer], None]) -> None:
-        """Nothing is started before `ask`.  on_answer: called from a thread of its own."""
-        self._name, self._on_answer = name, on_answer
-        self._lock = threading.Lock()
+    What it is asked is sent from a thread, the newest alone: a process that reads nothing holds up nobody.
+    """
+
+    def __init__(self, name: str, on_answer: Callable[[Answer], None], patience: float = PATIENCE) -> None:
+        """Nothing is started before `ask`.
+
+        on_answer: called from a thread of its own.  patience: s in which a work ends that is cancelled.
+        """
+        self._name, self._on_answer, self._patience = name, on_answer, patience
+        self._changed = threading.Condition(threading.RLock())
         self._process: multiprocessing.process.BaseProcess | None = None
         self._pipe: Connection | None = None
+        # What is wanted, and whether that was sent; numbers of works that were sent and are not answered.
         self._asked: Work | None = None
-        self._closed = False
+        self._sent, self._closed = True, False
+        self._open: list[int] = []
+        self._sender: threading.Thread | None = None
+        self._watch: threading.Timer | None = None
 
     @property
     def pid(self) -> int | None:
@@ -76,40 +88,93 @@ class Pilot:
 
     def start(self) -> None:
         """Have the process there before it is needed."""
-        with self._lock:
+        with self._changed:
             self._ready()
 
     def ask(self, work: Work) -> None:
         """Do a work; whatever is under way is cancelled."""
-        with self._lock:
-            self._asked = work
-            try:
-                self._ready().send(work)
-            except OSError:
-                self._lost()
-                self._ready().send(work)
+        self._want(work)
 
     def cancel(self) -> None:
         """End what is under way."""
-        with self._lock:
-            self._asked = None
-            if self._pipe is not None:
-                try:
-                    self._pipe.send(None)
-                except OSError:
-                    self._lost()
+        self._want(None)
+
+    def _want(self, work: Work | None) -> None:
+        with self._changed:
+            dropped = self._asked if not self._sent else None
+            self._asked, self._sent = work, False
+            if self._open and self._watch is None:
+                self._watch = threading.Timer(self._patience, self._end, (self._pipe, self._open[0]))
+                self._watch.daemon = True
+                self._watch.start()
+            if self._sender is None:
+                self._sender = threading.Thread(target=self._send, name=f"{self._name}: sends", daemon=True)
+                self._sender.start()
+            self._changed.notify_all()
+        if dropped is not None:
+            self._on_answer(Answer(dropped.number, "cancelled"))
 
     def close(self) -> None:
         """End the process."""
-        with self._lock:
+        with self._changed:
             self._closed = True
+            self._unwatch()
             process, pipe = self._process, self._pipe
             self._process = self._pipe = None
-        if pipe is not None:
-            pipe.close()
+            self._changed.notify_all()
         if process is not None:
             process.terminate()
             process.join(5.0)
+        if pipe is not None:
+            pipe.close()
+
+    def _send(self) -> None:
+        """Send what is wanted, until it is closed."""
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or not self._sent)
+                if self._closed:
+                    return
+                work, self._sent = self._asked, True
+                pipe = self._pipe if work is None else self._ready()
+                self._open += [] if work is None else [work.number]
+            try:
+                if pipe is not None:
+                    pipe.send(work)
+            except (OSError, TypeError, ValueError):
+                # The process has ended: another one does it.
+                with self._changed:
+                    if self._pipe is pipe:
+                        self._pipe = self._process = None
+                    if work is not None and self._asked is work:
+                        self._sent = False
+                        self._open.remove(work.number)
+
+    def _end(self, pipe: Connection, number: int) -> None:
+        """End a process that is still at a work that was cancelled; what is wanted now is done by another one."""
+        with self._changed:
+            self._watch = None
+            if self._closed or self._pipe is not pipe or number not in self._open:
+                return
+            process, self._process, self._pipe = self._process, None, None
+            left = self._left()
+            self._sent = self._asked is None
+            self._changed.notify_all()
+        if process is not None:
+            process.kill()
+        for one in left:
+            self._on_answer(Answer(one, "cancelled"))
+
+    def _left(self) -> list[int]:
+        """Works that a process was at which is gone, and nobody wants any more."""
+        left = [one for one in self._open if self._asked is None or one != self._asked.number]
+        self._open = []
+        return left
+
+    def _unwatch(self) -> None:
+        if self._watch is not None:
+            self._watch.cancel()
+        self._watch = None
 
     def _ready(self) -> Connection:
         """The pipe to a running process."""
@@ -125,11 +190,6 @@ class Pilot:
         threading.Thread(target=self._listen, args=(ours,), name=self._name, daemon=True).start()
         return ours
 
-    def _lost(self) -> None:
-        if self._pipe is not None:
-            self._pipe.close()
-        self._pipe = self._process = None
-
     def _listen(self, pipe: Connection) -> None:
         """Hand on what comes; a process that is gone before it has answered is a fault of its work."""
         while True:
@@ -138,17 +198,31 @@ class Pilot:
             except (EOFError, OSError, TypeError):
                 # A pipe that is closed while it is waited on loses its handle: a TypeError.
                 break
-            with self._lock:
-                if self._asked is not None and answer.number == self._asked.number and answer.kind != "progress":
-                    self._asked = None
+            if answer.kind != "progress":
+                self._note(pipe, answer)
             self._on_answer(answer)
-        with self._lock:
-            lost = self._asked if self._pipe is pipe and not self._closed else None
-            if self._pipe is pipe:
-                self._lost()
+        fault = "the process that worked on this has ended: ask again"
+        with self._changed:
+            if self._closed or self._pipe is not pipe:
+                return
+            self._pipe = self._process = None
+            left = [Answer(one, "cancelled") for one in self._left()]
+            if self._asked is not None and self._sent:
+                left.append(Answer(self._asked.number, "fault", fault))
                 self._asked = None
-        if lost is not None:
-            self._on_answer(Answer(lost.number, "fault", "the process that worked on this has ended: ask again"))
+        for answer in left:
+            self._on_answer(answer)
+
+    def _note(self, pipe: Connection, answer: Answer) -> None:
+        """A work has ended."""
+        with self._changed:
+            if self._asked is not None and answer.number == self._asked.number:
+                self._asked = None
+            if self._pipe is pipe and answer.number in self._open:
+                first = self._open[0]
+                self._open.remove(answer.number)
+                if answer.number == first:
+                    self._unwatch()
 
 
 # ----------------------------------------------------------------------
@@ -164,12 +238,20 @@ def work_on(pipe: Connection) -> None:
     waiting: Work | None = None
     while True:
         try:
-            work = waiting if waiting is not None else pipe.recv()
-            while pipe.poll():
-                work = pipe.recv()
+            work = _newest(pipe, waiting if waiting is not None else pipe.recv())
             waiting = None if work is None else _do(pipe, work)
         except (EOFError, OSError):
             return
+
+
+def _newest(pipe: Connection, work: Work | None) -> Work | None:
+    """The newest of a work and of those that have come after it; the others are answered as cancelled."""
+    while pipe.poll():
+        newer = pipe.recv()
+        if work is not None:
+            pipe.send(Answer(work.number, "cancelled"))
+        work = newer
+    return work
 
 
 def _do(pipe: Connection, work: Work) -> Work | None:

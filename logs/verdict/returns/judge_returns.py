@@ -403,25 +403,32 @@ MAX_AGAIN = 4
 
 
 def judge_returns(
-    world: ReturnWorld, starts: ReturnStarts, every: float, fly_again: FlyAgain | None = None, most: int = MAX_AGAIN
+    world: ReturnWorld,
+    starts: ReturnStarts,
+    every: float,
+    fly_again: FlyAgain | None = None,
+    most: int = MAX_AGAIN,
+    advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
     """Fly and judge the return from each start.
 
     every: s between them.  fly_again: flies a return in JSBSim; None for no such flights.  most: of them.
+    advance: called with how many are judged, and of how many; what it raises ends the work.
     """
     each: list[ReturnFlown] = []
     again: list[float] = []
-    left_out = 0
-    for way in world.ways:
+    left_out, total = 0, len(world.ways) * len(starts)
+    for number, way in enumerate(world.ways):
+        advance(number * len(starts), total)
         if "terrain" in world.open or ("landing" in world.open and way == "straight to land"):
             continue
         ends = [world.target(row, way) for row in starts.rows]
         flown, paths = fly_home(world, starts, ends)
         asked = floors(world, starts)
-        ones = [
-            _judged(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(asked[k]))
-            for k, row in enumerate(flown)
-        ]
+        ones = []
+        for k, row in enumerate(flown):
+            advance(number * len(starts) + k, total)
+            ones.append(_judged(world, starts, k, ends[k], row, paths[k] if paths else _NO_WAY, float(asked[k])))
         if fly_again is not None and way == "circle":
             ones, apart = _set_right(world, starts, ones, flown, fly_again, most)
             again += apart

@@ -1,7 +1,6 @@
 """Random missions for the studio's tests: waypoints, circles, jumps, changes of speed, in all frames."""
 
 import math
-import time
 from functools import cache
 
 import numpy as np
@@ -11,7 +10,6 @@ from planfly.airframe import Airframe, load_airframe
 from planfly.open_mission import OpenedMission
 from planfly.pipeline import make_setup
 from planfly.studio.documents import Document, World
-from planfly.studio.pilot import Advance
 from planfly.studio.session import Session
 from world.errors import MissionError
 from world.frames import to_geo
@@ -84,11 +82,3 @@ def drawn_session(seed: int, count: int, name: str = "jacksboro", *, jumps: bool
             return session_of(draw_mission(rng, count, world_of(name)[0], jumps=jumps), name)
         except MissionError:
             continue
-
-
-def count(most: int, advance: Advance) -> int:
-    """Count, some thousandths of a second a number: a work for the studio's processes."""
-    for number in range(most):
-        advance(number, most, "")
-        time.sleep(0.002)
-    return most

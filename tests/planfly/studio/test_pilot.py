@@ -9,16 +9,17 @@ import pytest
 
 from planfly.studio.pilot import Answer, Pilot, Work
 
-COUNT = "tests.planfly.studio.drafts.count"
+WORKS = "tests.planfly.studio.light_works"
+COUNT = f"{WORKS}.count"
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals")
 
 
 class Heard:
     """A pilot and what it answers."""
 
-    def __init__(self) -> None:
+    def __init__(self, **more: float) -> None:
         self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
-        self.pilot = Pilot("test", self.answers.put)
+        self.pilot = Pilot("test", self.answers.put, **more)
 
     def next(self, *kinds: str) -> Answer:
         deadline = time.monotonic() + 60.0
@@ -44,7 +45,7 @@ def test_the_newest_work_is_done_and_the_others_are_cancelled() -> None:
         heard.pilot.cancel()
         assert heard.next("cancelled").number == 10
         assert time.monotonic() - asked < 1.0
-        heard.pilot.ask(Work(11, "planfly.studio.works.fly", None))
+        heard.pilot.ask(Work(11, f"{WORKS}.length", None))
         assert "fault" in heard.next("fault").value
         pid = heard.pilot.pid
         assert pid is not None
@@ -55,5 +56,28 @@ def test_the_newest_work_is_done_and_the_others_are_cancelled() -> None:
         assert (lost.number, "has ended" in lost.value) == (12, True)
         heard.pilot.ask(Work(13, COUNT, 2))
         assert heard.next("done").number == 13
+    finally:
+        heard.pilot.close()
+
+
+def test_a_process_that_reads_nothing_holds_up_nobody() -> None:
+    heard = Heard(patience=1.0)
+    try:
+        heard.pilot.ask(Work(1, f"{WORKS}.sleep", 600.0))
+        assert heard.next("progress").number == 1
+        # More than a pipe holds, and the one that takes its place.
+        for number in (2, 3):
+            begun = time.monotonic()
+            heard.pilot.ask(Work(number, f"{WORKS}.length", b"x" * 2**24))
+            assert time.monotonic() - begun < 0.5
+        pid = heard.pilot.pid
+        ended = {answer.number: answer for answer in (heard.next("cancelled", "done") for _ in range(3))}
+        assert {number: one.kind for number, one in ended.items()} == {1: "cancelled", 2: "cancelled", 3: "done"}
+        assert ended[3].value == 2**24
+        assert heard.pilot.pid != pid
+        heard.pilot.ask(Work(4, f"{WORKS}.sleep", 600.0))
+        heard.next("progress")
+        heard.pilot.cancel()
+        assert heard.next("cancelled").number == 4
     finally:
         heard.pilot.close()

@@ -34,7 +34,11 @@ def test_the_least_altitude_clears_the_hill_with_its_margin(tmp_path: Path) -> N
     # From 6.5 km: h + (600 - h) * 3000 / 6500 and the lag of 3 s, over ground 370 m high 115 m aside of the top, has to
     # be 370 + 30 + 15 m: h = 251 m; the next step of 25 m.
     assert found == Remedy({"RTL_ALTITUDE": 250.0}) or found == Remedy({"RTL_ALTITUDE": 275.0})
-    good = judge_returns(found.on(world), starts, 8.0)
+    shares: list[float] = []
+    good = judge_returns(found.on(world), starts, 8.0, advance=lambda done, total: shares.append(done / total))
+    # Whoever waits for it is asked before each.
+    assert shares == sorted(shares)
+    assert len(shares) > len(good.each)
     assert all(one.safe for one in good.each)
     assert min(one.clearance for one in good.each) >= world.limit + MARGIN
     lower = world.with_parameters(RTL_ALTITUDE=found.parameters["RTL_ALTITUDE"] - 50.0)
