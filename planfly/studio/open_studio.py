@@ -146,6 +146,7 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
     import uvicorn
 
     from planfly.studio.app import make_app
+    from planfly.studio.connections import ShortLived
     from planfly.studio.messages import MAX_DROPPED_MESSAGE, MAX_MESSAGE
 
     class Quiet(uvicorn.Server):
@@ -160,7 +161,7 @@ async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], b
         app,
         log_level="critical", access_log=False, server_header=False, date_header=False, lifespan="off",
         ws="websockets-sansio", ws_max_size=MAX_DROPPED_MESSAGE + MAX_MESSAGE, timeout_graceful_shutdown=_CLOSING,
-        limit_concurrency=_CONNECTIONS, h11_max_incomplete_event_size=16_384, http="h11",
+        limit_concurrency=_CONNECTIONS, h11_max_incomplete_event_size=16_384, http=ShortLived,
     )  # fmt: skip
     web = Quiet(config)
     serving = asyncio.create_task(web.serve(sockets=[listener]))

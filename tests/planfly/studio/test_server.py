@@ -1,6 +1,7 @@
 """The server as pages meet it: who is let in, what is refused, and that two pages agree."""
 
 import base64
+import contextlib
 import http.client
 import json
 import socket
@@ -13,7 +14,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
 from flight.mission_files.formats import mission_text
-from planfly.studio import messages
+from planfly.studio import connections, messages
 from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import PageProgram, Served, served
 from tests.soak import note, scaled
@@ -155,6 +156,23 @@ def test_a_body_of_a_gigabyte_is_not_read(studio: Served) -> None:
         assert sent < 64 * 2**20
     with studio.socket() as one:
         assert code_of(one, "x" * (messages.MAX_DROPPED_MESSAGE + messages.MAX_MESSAGE + 1)) == 1009
+
+
+def test_a_connection_that_asks_for_nothing_ends(studio: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "LIFETIME", 0.4)
+    address = ("127.0.0.1", studio.port)
+    with studio.page() as page, contextlib.ExitStack() as links:
+        silent, half, kept = (links.enter_context(socket.create_connection(address, timeout=20)) for _ in range(3))
+        half.sendall(b"GET / HTTP/1.1\r\nHost: ")
+        kept.sendall(f"GET /link.js HTTP/1.1\r\nHost: 127.0.0.1:{studio.port}\r\n\r\n".encode())
+        assert kept.recv(15) == b"HTTP/1.1 200 OK"
+        for one in (silent, half, kept):
+            with contextlib.suppress(ConnectionError):
+                while one.recv(2**16):
+                    pass
+        # The page's own is another matter.
+        page.send(kind="save", form="kml")
+        page.until("saved")
 
 
 def test_four_pages_are_enough(studio: Served) -> None:
