@@ -8,6 +8,7 @@ from typing import Any
 from aircraft.catalog import aircraft_names
 from planfly.arguments import CHOICES
 from planfly.studio import messages
+from planfly.studio.changes import Figures, changes
 from planfly.studio.pilot import Answer, Pilot, Work
 from planfly.studio.session import Session
 from planfly.studio.sheet import Json, rounded
@@ -44,7 +45,7 @@ class Jobs:
     _asked: dict[str, _Asked] = field(default_factory=dict)
     _number: int = 0
     _flown: Json | None = None
-    _before: Json | None = None
+    _figures: Figures | None = None
     _others: list[Json] = field(default_factory=list)
     _at_once: bool = False
 
@@ -85,7 +86,7 @@ class Jobs:
     def forget(self) -> None:
         """Another mission was opened."""
         self.stop()
-        self._flown = self._before = None
+        self._flown = self._figures = None
         self._others = []
 
     # ------------------------------------------------------------------
@@ -173,8 +174,8 @@ class Jobs:
 
     def _done(self, asked: _Asked, value: Any, session: Session) -> Json:
         if asked.name == "fly":
-            self._before = self._flown
-            self._flown = {"kind": "flown", "rev": asked.rev, **value, "changes": changes(self._before, value)}
+            before, self._figures = self._figures, value.pop("figures")
+            self._flown = {"kind": "flown", "rev": asked.rev, **value, "changes": changes(before, self._figures)}
             return self._flown
         if asked.name == "plan":
             session.plans = (list(value), session.plans[1])
@@ -189,23 +190,6 @@ class Jobs:
         if come:
             self._at_once = False
         return come
-
-
-def changes(before: Json | None, now: Json) -> list[str]:
-    """What a flight has that the one before it had not, in words; nothing for the first.
-
-    >>> changes({"failed": [("slope", "leg 2")], "seconds": 500.0}, {"failed": [], "seconds": 512.0})
-    ['mended: slope on leg 2', '12 s longer']
-    """
-    if before is None:
-        return []
-    old, new = ({tuple(one) for one in flight["failed"]} for flight in (before, now))
-    found = [f"mended: {rule} on {where}" for rule, where in sorted(old - new)]
-    found += [f"fails now: {rule} on {where}" for rule, where in sorted(new - old)]
-    longer = now["seconds"] - before["seconds"]
-    if abs(longer) >= 0.5:
-        found.append(f"{abs(longer):.0f} s {'longer' if longer > 0.0 else 'shorter'}")
-    return found or ["nothing"]
 
 
 def _way(plan: Plan) -> Json:

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from flight.mission.items import Mission
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.wording import place_text
 from logs.views.failures import track_distance
 from planfly.airframe import Airframe, laid_from_the_ground
 from planfly.pipeline import fly_and_judge
+from planfly.studio.changes import flight_figures
 from planfly.studio.desk import Desk
 from planfly.studio.pilot import Advance
 from planfly.studio.sheet import findings_json, rounded, states_json, verdict_json
@@ -40,15 +40,16 @@ def fly(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
     setup = desk.setup(mission)
     flown = fly_and_judge(setup, desk.airframe, None, advance, reference=False)
     states = place_states(route_requirements(setup), flown.verdict.findings)
+    seconds = round(float(flown.track.time[-1]), 1) if len(flown.track) else 0.0
     return {
         "verdict": verdict_json(flown.verdict),
         "findings": findings_json(flown.verdict),
-        "failed": sorted({(item.rule, place_text(item.place)) for item in flown.verdict.failed}),
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},
         "ended": flown.ended,
         "autopilot": setup.autopilot.title,
-        "seconds": round(float(flown.track.time[-1]), 1) if len(flown.track) else 0.0,
+        "seconds": seconds,
+        "figures": flight_figures(mission, setup.route, flown.verdict.findings, seconds),
         **_track(setup.route.waypoints, flown.track, flown.verdict.leg_ends),
     }
 

@@ -107,7 +107,7 @@ export class Panel {
     if (flight) {
       const part = this.answerOf("Flown", flight.verdict, `${flight.autopilot}, ${duration(flight.seconds)}${stale ? ", before the last change" : ""}`);
       part.classList.toggle("stale", Boolean(stale));
-      if (flight.changes.length) part.append(element("p", { class: "changes" }, element("b", {}, "Since the last flight: "), flight.changes.join("; ")));
+      if (flight.changes.length) part.append(element("p", {}, element("b", {}, "Since the last flight")), element("ul", { class: "changes" }, ...flight.changes.map((text) => element("li", {}, text))));
       box.append(part);
     }
     const failed = this.listed(now.findings, false), flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];

@@ -1,0 +1,61 @@
+"""What has changed since the last flight: by legs and items, with figures, over insertions and deletions."""
+
+import re
+
+from planfly.studio import edits, messages
+from planfly.studio.changes import Figures, changes, flight_figures
+from planfly.studio.session import Session
+from tests.planfly.studio.drafts import drawn_session
+
+
+def figures_of(session: Session, seconds: float = 100.0) -> Figures:
+    """Of the geometric verdict, whose findings are made as those of a flight are."""
+    judged = session.judged
+    return flight_figures(judged.mission, judged.setup.route, judged.verdict.findings, seconds)
+
+
+def test_a_height_that_fails_and_is_mended_is_said_with_its_leg_and_figures() -> None:
+    session = drawn_session(5, 12)
+    before = figures_of(session)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=-90.0))
+    low = figures_of(session, 103.0)
+    said = changes(before, low)
+    words = re.compile(r"(leg \d+\u2013\d+): clearance ([\d.]+) m \u2192 ([-\d.]+) m, fails now")
+    place, was, now = next(found.groups() for line in said if (found := words.fullmatch(line)))
+    assert float(was) > 60.0 > float(now)
+    assert said[-1] == "3 s longer"
+    session.step("undo")
+    assert f"{place}: clearance {now} m \u2192 {was} m, now passes" in changes(low, figures_of(session))
+    assert changes(before, figures_of(session)) == ["nothing"]
+
+
+def test_items_that_have_other_numbers_are_the_same() -> None:
+    """Before all but the first leg a waypoint is inserted: all numbers are others, and nothing else has changed."""
+    session = drawn_session(8, 8)
+    before = figures_of(session)
+    own = edits.places(session.mission)
+    (east, north, _), (far, further, _) = session.place_of(own[0]), session.place_of(own[1])
+    assert [one.place for one in before.found.values() if one.ok is False] == ["item 6", "leg 1\u20132", "leg 2\u20133"]
+    middle = {"east": 0.5 * (east + far), "north": 0.5 * (north + further)}
+    session.edit(messages.Insert(kind="insert", rev=session.rev, after=own[0], **middle))
+    inserted = figures_of(session)
+    assert [re.sub(r"-[\d.]+", "-", line) for line in changes(before, inserted)] == [
+        "leg 1\u20132: slope -\u00b0, fails now",
+        "leg 2\u20133: slope -\u00b0, fails now",
+        "the former leg 1\u20132: slope -\u00b0, is gone",
+    ]
+    session.edit(messages.Delete(kind="delete", rev=session.rev, ks=[edits.places(session.mission)[1]]))
+    assert [re.sub(r"-[\d.]+", "-", line) for line in changes(inserted, figures_of(session))] == [
+        "leg 1\u20132: slope -\u00b0, fails now",
+        "the former leg 1\u20132: slope -\u00b0, is gone",
+        "the former leg 2\u20133: slope -\u00b0, is gone",
+    ]
+
+
+def test_without_a_failure_the_closest_figures_are_said() -> None:
+    session = drawn_session(5, 12)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=150.0))
+    before = figures_of(session)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
+    said = changes(before, figures_of(session))
+    assert any(line.startswith("closest to its limit: clearance") for line in said), said
