@@ -89,7 +89,8 @@ def open_studio(
         kept = Path(keep) / f"{_stem(target)}.json"
         session, restored = open_session(target, World(named, ground, fences, seed, change), kept)
         if restored:
-            on_message(f"what was done before is there again (kept in {kept}); undo takes it back")
+            back = "; undo takes it back" if session.undo_text else ""
+            on_message(f"what was done before is there again (kept in {kept}){back}")
         # Imported here: only who serves needs the extra.
         from planfly.studio.server import Server
 

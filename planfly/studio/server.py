@@ -103,7 +103,7 @@ class Server:
             await self._keep()
 
     async def _keep(self) -> None:
-        if self._kept is not None and (self.session.is_changed or self.session.kept_rev):
+        if self._kept is not None and (self.session.has_news or self.session.kept_rev):
             # Without room on the disk the studio goes on, and what is done is not kept: the pages say so once.
             try:
                 await self._judged(lambda: self.session.keep(self._kept or Path()))
@@ -337,7 +337,7 @@ class Server:
                 session.change_settings(self._parameters(message.name))
             case messages.Open():
                 opened = self._opened(message)
-                if self._kept is not None and session.is_changed:
+                if self._kept is not None and session.has_news:
                     # What fails here is said where it is kept by and by.
                     with contextlib.suppress(OSError, PlanflyError):
                         session.keep(self._kept)

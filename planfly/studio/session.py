@@ -4,15 +4,12 @@ No part of it knows of connections or processes: `planfly.studio.server` does.  
 grows; an edit of an older one is refused, so that two pages never change what the other does not show.
 """
 
-import hashlib
-import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from flight.mission.items import LANDINGS, Home, Mission, MissionItem
+from flight.mission.items import LANDINGS, Mission
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.open_mission import read_named_fences
 from planfly.studio import edits
@@ -20,6 +17,7 @@ from planfly.studio.applied import apply_suggestion
 from planfly.studio.desk import Desk, Judged
 from planfly.studio.documents import Document, Saved, World, open_document, planned_mission, save_document
 from planfly.studio.history import History
+from planfly.studio.kept import kept_beside, kept_text, read_kept
 from planfly.studio.messages import Apply, Choose, Delete, Drag, Insert, Move, Raise, Settings
 from planfly.studio.settings import changed_parameters, changed_world, settings_json
 from planfly.studio.sheet import Json, sheet_json, window_json, world_json
@@ -30,7 +28,6 @@ from world.files import write_whole
 from world.frames import to_geo
 
 Edit = Move | Insert | Delete | Raise | Apply
-_KEPT = "planfly.studio/1"
 # A document with what it is judged with and what was done to it; so many are kept to go back to.
 _Place = tuple[Document, Desk, History]
 _MOST_LEFT = 8
@@ -47,7 +44,7 @@ class Session:
     document: as opened.  desk: what it is judged with.  history: what was done to it.
     rev: grows with every change.  judged, requirements: of the mission as it is.
     plans: paths that were planned and may be chosen, with the items that they would replace.
-    world_rev: grows with every change of the world.
+    world_rev: grows with every change of the world.  document_rev: with every other document.
     named: the file that the command named, the only one that is written over.
     left: documents that another was opened in place of, as they were left; undone: those whose opening was undone.
     """
@@ -63,6 +60,7 @@ class Session:
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
     kept_rev: int = 0
     named: Path | None = None
+    document_rev: int = 1
     left: list[_Place] = field(default_factory=list)
     undone: list[_Place] = field(default_factory=list)
 
@@ -93,6 +91,7 @@ class Session:
         self.document, self.desk, self.history = place
         self.judged, self.plans = judged, ([], None)
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
+        self.document_rev += 1
 
     def _note(self, mission: Mission, text: str) -> None:
         self.history.add(mission, text)
@@ -313,6 +312,7 @@ class Session:
             "kind": "sheet",
             "rev": self.rev,
             "name": self.document.name,
+            "document": self.document_rev,
             "changed": self.is_changed,
             "undo": self.undo_text,
             "redo": self.redo_text,
@@ -351,12 +351,14 @@ class Session:
     # ------------------------------------------------------------------
     # Kept beside, for a server that dies.
 
+    @property
+    def has_news(self) -> bool:
+        """Whether anything is to be kept: the mission, or how it is flown, differs from what was opened."""
+        return self.is_changed or self.desk.scenario is not self.document.opened.setup.scenario
+
     def kept_file(self, file: Path) -> Path:
         """Where this document is kept: what was opened since the command began, beside what it named."""
-        if not self.left:
-            return file
-        first = json.dumps(mission_data(self.history.first)).encode()
-        return file.with_name(f"{file.stem}-{hashlib.sha256(first).hexdigest()[:8]}{file.suffix}")
+        return kept_beside(file, self.history.first) if self.left else file
 
     def keep(self, file: Path) -> None:
         """Write what was done, if anything was since it was written last."""
@@ -364,55 +366,25 @@ class Session:
             return
         file = self.kept_file(file)
         file.parent.mkdir(parents=True, exist_ok=True)
-        data = {"schema": _KEPT, "name": self.document.name, "mission": mission_data(self.mission)}
-        write_whole(file, json.dumps({**data, "first": mission_data(self.history.first)}))
+        plan = self.judged.setup.plan
+        write_whole(file, kept_text(self.desk, self.history.first, self.mission, plan, self.document.name))
         self.kept_rev = self.rev
 
     def restore(self, file: Path) -> bool:
-        """Take what was kept of the same document as an edit of it; whether there was anything.
+        """Take what was kept of the same document, its mission as an edit; whether there was anything.
 
         What was kept of another document, or cannot be read, is left.
         """
         try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            same = data["schema"] == _KEPT and data["first"] == mission_data(self.history.first)
-            mission = mission_from(data["mission"], self.history.first) if same else self.history.first
-            if not same or data["mission"] == data["first"]:
+            found = read_kept(file, self.desk, self.history.first)
+            if found is None:
                 return False
-            self._show(mission)
+            self._show(*found)
         except (OSError, ValueError, LookupError, TypeError, PlanflyError):
             return False
-        self._note(mission, "what was done before the studio ended")
+        if found[0] is not self.history.first:
+            self._note(found[0], "what was done before the studio ended")
         return True
-
-
-def mission_data(mission: Mission) -> Json:
-    """A mission as plain data, of which `mission_from` makes the same again; NaN is null."""
-
-    def plain(item: MissionItem) -> list[Any]:
-        numbers = [*item.params, item.lat_deg, item.lon_deg, item.alt]
-        return [item.seq, item.command, item.frame, *(None if v != v else v for v in numbers), item.autocontinue]
-
-    home = mission.home
-    return {
-        "home": None if home is None else [home.lat_deg, home.lon_deg, None if home.alt != home.alt else home.alt],
-        "items": [plain(item) for item in mission.items],
-    }
-
-
-def mission_from(data: Json, first: Mission) -> Mission:
-    """A mission of its data; what the items do not say is that of the first."""
-
-    def number(value: Any) -> float:
-        return float("nan") if value is None else float(value)
-
-    items = [
-        MissionItem(int(seq), int(command), int(frame), (p[0], p[1], p[2], p[3]), p[4], p[5], p[6], bool(go_on))
-        for seq, command, frame, *numbers, go_on in data["items"]
-        for p in [[number(value) for value in numbers]]
-    ]
-    home = data["home"]
-    return replace(first, items=tuple(items), home=None if home is None else Home(*(number(one) for one in home)))
 
 
 def open_session(target: str, world: World, kept: Path | None = None) -> tuple[Session, bool]:

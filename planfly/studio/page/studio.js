@@ -11,7 +11,7 @@ import { Scene } from "/scene.js";
 const $ = (id) => document.getElementById(id);
 const map = new MapView($("map")), profile = new Profile($("profile"));
 const now = { world: null, sheet: null, model: null, grid: null, flown: null, selected: null, dragging: null, fault: "", work: {}, committed: false, queue: [] };
-let fitted = "", scene = null;
+let fitted = 0, scene = null;
 
 // ---- what the server sends
 
@@ -57,8 +57,8 @@ function onSheet(sheet) {
   }
   if (!sheet.items.some((one) => one.k === now.selected)) now.selected = null;
   drawAll();
-  if (fitted !== sheet.name) {
-    fitted = sheet.name;
+  if (fitted !== sheet.document) {
+    fitted = sheet.document;
     map.fit();
   }
   answers();
@@ -80,7 +80,7 @@ function onSheet(sheet) {
 
 // Whether both have the same items, but for one that may stand elsewhere: numbers of items mean the same in both.
 function sameItems(before, sheet) {
-  if (!before || before.name !== sheet.name || before.items.length !== sheet.items.length) return false;
+  if (!before || isOther(before, sheet) || before.items.length !== sheet.items.length) return false;
   let moved = 0;
   return before.items.every((one, i) => {
     const other = sheet.items[i];
@@ -89,9 +89,9 @@ function sameItems(before, sheet) {
   });
 }
 
-// Another mission was opened: nothing is there to undo or to redo, and something was.
+// Another mission was opened, or its opening was undone.
 function isOther(before, sheet) {
-  return before.name !== sheet.name || (!sheet.undo && !sheet.redo && Boolean(before.undo || before.redo));
+  return before.document !== sheet.document || before.name !== sheet.name;
 }
 
 // What waits was meant for the sheet before: it goes on to this one where its numbers mean the same, and else is left.

@@ -207,7 +207,9 @@ def test_an_opening_is_undone_and_each_document_is_kept_for_itself(tmp_path: Pat
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
     mine = session.mission
     session.keep(kept)
+    number = session.sheet()["document"]
     session.open(open_document(str(other), session.world))
+    assert session.sheet()["document"] > number
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=20.0))
     theirs = session.mission
     session.keep(kept)

@@ -15,7 +15,7 @@ import pytest
 
 from flight.mission.items import MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
-from planfly.studio.session import mission_from
+from planfly.studio.kept import mission_from
 from tests.browser import Browser
 from tests.logs.views.report.page_in_browser import grave_findings, prefer
 from tests.planfly.studio.drafts import drawn_session
@@ -353,6 +353,10 @@ def test_a_dropped_file_is_opened(page: Browser) -> None:
 
 def test_what_was_done_survives_a_reload_and_a_server_that_dies(page: Browser, studio: Studio) -> None:
     undo_all(page)
+    with Served(studio.address).page() as program:
+        program.send(kind="settings", wind_speed=6.5)
+        program.until("sheet")
+        program.until("sheet")
     drag(page, centre(page, ".mark .dot", 3), (20.0, 10.0))
     page.wait_for("document.getElementById('undo').title.startsWith('Undo: move')")
     done = saved(page)
@@ -369,6 +373,8 @@ def test_what_was_done_survives_a_reload_and_a_server_that_dies(page: Browser, s
     page.go(studio.address)
     page.wait_for(f"({READY}) && document.getElementById('undo').title.includes('before the studio ended')")
     assert parse_mission(saved(page), "m").items == parse_mission(done, "m").items
+    with Served(studio.address).page() as program:
+        assert program.until("world")["settings"]["wind_speed"] == 6.5
 
 
 def test_a_phone_drags_by_touch(studio: Studio, tmp_path: Path) -> None:

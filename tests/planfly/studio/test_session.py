@@ -1,5 +1,6 @@
 """A session: what is done to a mission and undone, judged as the API judges it, saved without loss, and kept."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,9 @@ import planfly
 from flight.mission_files.formats import mission_text, parse_mission
 from logs.verdict.findings import verdict_json
 from planfly.studio import edits, messages
-from planfly.studio.documents import World, open_document, open_dropped
-from planfly.studio.session import Session, StaleEdit, mission_data, mission_from, open_session
+from planfly.studio.documents import World, open_document, open_dropped, straight_plan
+from planfly.studio.kept import mission_data, mission_from
+from planfly.studio.session import Session, StaleEdit, open_session
 from tests.planfly.studio.drafts import drawn_session, session_of
 from tests.soak import note, scaled
 from world.errors import MissionError, PlanflyError
@@ -188,6 +190,50 @@ def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
     kept.write_text("{", encoding="utf-8")
     assert not open_session(str(file), World(scenario="jacksboro"), kept)[1]
     assert not other.is_changed
+
+
+def test_settings_and_a_planned_path_are_there_after_the_server_died(tmp_path: Path) -> None:
+    file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", World(scenario="jacksboro-air")
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), world, kept)
+    assert not session.has_news
+    session.change_settings(messages.Settings(kind="settings", wind_speed=9.0, limits={"min_clearance_m": 33.0}))
+    session.change_settings(messages.Settings(kind="settings", parameter="WP_RADIUS=55"))
+    session.keep(kept)
+    again, restored = open_session(str(file), world, kept)
+    assert restored
+    assert again.mission is again.history.first
+    assert not again.undo_text
+    assert again.settings_json() == session.settings_json()
+    assert verdict_json(again.judged.verdict) == verdict_json(session.judged.verdict)
+    # A path that was planned there, with its certificate; and then without, when it was edited.
+    again.plans = ([straight_plan(again.desk.scenario, 3)], None)
+    again.replace_plan(messages.Choose(kind="choose", rev=again.rev, which=0))
+    again.keep(kept)
+    third, _ = open_session(str(file), world, kept)
+    assert third.sheet()["planned"]
+    assert third.save("plan.json").data == again.save("plan.json").data
+    third.edit(messages.Raise(kind="raise", rev=third.rev, by=5.0))
+    third.keep(kept)
+    fourth, _ = open_session(str(file), world, kept)
+    assert (fourth.sheet()["planned"], fourth.desk.planned) == (False, True)
+    assert fourth.settings_json() == session.settings_json()
+    assert fourth.mission.items == third.mission.items
+
+
+def test_what_cannot_be_set_any_more_leaves_the_edits(tmp_path: Path) -> None:
+    session = drawn_session(8, 10)
+    session.change_settings(messages.Settings(kind="settings", wind_speed=9.0))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    kept = tmp_path / "m.json"
+    session.keep(kept)
+    data = json.loads(kept.read_text(encoding="utf-8"))
+    data["settings"]["flight"]["aircraft"] = "gone"
+    kept.write_text(json.dumps(data), encoding="utf-8")
+    again = drawn_session(8, 10)
+    assert again.restore(kept)
+    assert again.mission.items == session.mission.items
+    assert again.desk.scenario.wind.speed != 9.0
 
 
 def test_a_mission_comes_back_from_its_data() -> None:
