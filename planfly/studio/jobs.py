@@ -1,8 +1,8 @@
 """What the studio's two processes are asked, and what the pages are shown of it: flights, plans, returns, campaigns."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from aircraft.catalog import aircraft_names
@@ -13,8 +13,8 @@ from planfly.studio.pilot import Answer, Pilot, Work
 from planfly.studio.session import Session
 from planfly.studio.sheet import Json, rounded
 from planfly.studio.works import PlanAsked
-from planner.plan import Objective, Plan
 from planner.search.algorithms import ALGORITHMS
+from planner.search.plan_front import FrontPlan
 from world.errors import MissionError, PlanflyError
 
 # s between two reports of how far a work is.
@@ -121,19 +121,21 @@ class Jobs:
         scenario, frame = session.desk.scenario, session.desk.airframe
         if message.algorithm is not None and message.algorithm not in ALGORITHMS:
             raise PlanflyError.of_argument("algorithm", message.algorithm, f"allowed {', '.join(ALGORITHMS)}")
-        seeds = tuple(message.seed + k for k in range(message.ways))
+        if message.algorithm is not None and message.ways > 1:
+            raise PlanflyError.of_argument("ways", message.ways, "one is expected with an algorithm of your own")
+        asked = PlanAsked(scenario, frame, message.seed, message.algorithm, ways=message.ways)
         if message.first is None or message.last is None:
             if scenario.external:
                 raise MissionError(f"{session.document.name}: choose the two items to plan between", field="first")
             session.plans = ([], None)
-            return PlanAsked(scenario, frame, seeds, message.algorithm)
+            return asked
         ends = [session.place_of(k) for k in (message.first, message.last)]
         if message.first >= message.last:
             raise MissionError(
                 f"{session.document.name}: the second item to plan between comes after the first", field="last"
             )
         session.plans = ([], (message.first, message.last))
-        return PlanAsked(scenario, frame, seeds, message.algorithm, (ends[0], ends[1]))
+        return replace(asked, ends=(ends[0], ends[1]))
 
     def _ask(self, pilot: str, name: str, function: str, payload: Any, rev: int) -> None:
         self._number += 1
@@ -178,8 +180,8 @@ class Jobs:
             self._flown = {"kind": "flown", "rev": asked.rev, **value, "changes": changes(before, self._figures)}
             return self._flown
         if asked.name == "plan":
-            session.plans = (list(value), session.plans[1])
-            return {"kind": "ways", "rev": asked.rev, "ways": [_way(one) for one in value], "at_once": self._at_once}
+            session.plans = ([one.plan for one in value], session.plans[1])
+            return {"kind": "ways", "rev": asked.rev, "ways": ways_json(value), "at_once": self._at_once}
         found = {"kind": asked.name, "rev": asked.rev, **value}
         self._others = [*(one for one in self._others if one["kind"] != asked.name), found]
         return found
@@ -192,16 +194,38 @@ class Jobs:
         return come
 
 
-def _way(plan: Plan) -> Json:
-    """A planned path to choose."""
-    certificate = plan.certificate
+def ways_json(ways: Sequence[FrontPlan]) -> list[Json]:
+    """Planned paths to choose from, with what each is the best in."""
+    figures = {
+        "shortest": [one.length for one in ways],
+        "least seen by radars": [one.exposure for one in ways],
+        "highest above ground": [-one.clearance for one in ways],
+        "quickest": [one.time for one in ways],
+        "least energy": [one.energy for one in ways],
+    }
+    # What all have, or is not known, is nothing to choose by.
+    telling = {name: values for name, values in figures.items() if max(values) > min(values)}
+    return [
+        _way(one) | {"best": [name for name, values in telling.items() if values[k] == min(values)]}
+        for k, one in enumerate(ways)
+    ]
+
+
+def _way(one: FrontPlan) -> Json:
+    """A planned path: its length, m, exposure to radars, s, least height above ground, m, time, s, and energy, Wh."""
+    plan, (length, exposure, clearance, seconds, energy) = (
+        one.plan,
+        rounded([one.length, one.exposure, one.clearance, one.time, one.energy / 3600.0]),
+    )
     return {
         "seed": plan.seed,
         "algorithm": plan.algorithm,
         "state": plan.state,
-        "length": round(float(plan.objectives[Objective.LENGTH_RATIO]), 3),
-        "exposure": round(float(plan.objectives[Objective.KILL_EXPOSURE]), 4),
-        "clearance": rounded([certificate.clearance])[0],
-        "problems": list(certificate.problems[:2]),
+        "length": length,
+        "exposure": exposure,
+        "clearance": clearance,
+        "seconds": seconds,
+        "energy": energy,
+        "problems": list(plan.certificate.problems[:2]),
         "points": rounded(plan.waypoints),
     }

@@ -139,14 +139,17 @@ class Settings(_Message):
 
 
 class Plan(_Message):
-    """A path from here: between the scenario's ends, or two items; ``ways`` paths with the seeds that follow."""
+    """A path from here: between the scenario's ends, or two items.
+
+    ways: how many to choose from, found in one search by the default algorithm.
+    """
 
     kind: Literal["plan"]
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 1
     algorithm: _Name | None = None
     first: _Index | None = None
     last: _Index | None = None
-    ways: Annotated[int, Field(ge=1, le=5)] = 1
+    ways: Annotated[int, Field(ge=1, le=20)] = 1
 
 
 class Choose(_Message):

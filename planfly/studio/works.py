@@ -24,6 +24,7 @@ from planfly.studio.pilot import Advance
 from planfly.studio.sheet import findings_json, rounded, states_json, verdict_json
 from planfly.studio.states import place_states
 from planner.plan import Plan
+from planner.search.plan_front import FrontPlan, front_plan, front_task, plan_front
 from planner.search.plan_path import plan_path
 from world.scenario import Scenario, from_spec
 
@@ -76,32 +77,31 @@ def _track(route: Floats, track: Track, leg_ends: Sequence[float]) -> dict[str, 
 class PlanAsked:
     """Between which places to plan, in the world of a scenario.
 
-    ends: (2, 3) m; None for the scenario's own.  seeds: a path is searched with each.  algorithm: None for the default.
+    ends: (2, 3) m; None for the scenario's own.  algorithm: None for the default.
+    ways: one; or so many at most, none better than another in length, exposure, clearance and energy at once.
     """
 
     scenario: Scenario
     airframe: Airframe
-    seeds: tuple[int, ...]
+    seed: int
     algorithm: str | None = None
     ends: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    ways: int = 1
 
 
-def plan(asked: PlanAsked, advance: Advance) -> list[Plan]:
-    """A path with each seed; those that differ from none before them are left out."""
+def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
+    """A path, or several to choose from, the shortest first; where none is safe the one that comes nearest to it."""
     scenario = asked.scenario if asked.ends is None else between(asked.scenario, *asked.ends)
-    limits, found = asked.airframe.limits.surely(), list[Plan]()
-    for number, seed in enumerate(asked.seeds):
+    limits, stop = asked.airframe.limits.surely(), partial(_ended, time.monotonic() + SECONDS)
 
-        def on(done: int, total: int, remark: str, number: int = number) -> None:
-            advance(number + done / max(1, total), len(asked.seeds), remark)
+    def finish(made: Plan) -> Plan:
+        return laid_from_the_ground(made, asked.airframe) if asked.ends is None else made
 
-        ends = partial(_ended, time.monotonic() + SECONDS)
-        made = plan_path(scenario, limits, seed=seed, algorithm=asked.algorithm, progress=on, stop=ends)
-        if asked.ends is None:
-            made = laid_from_the_ground(made, asked.airframe)
-        if not any(_same(made, one) for one in found):
-            found.append(made)
-    return found
+    if asked.ways > 1:
+        front = plan_front(scenario, limits, asked.ways, seed=asked.seed, progress=advance, stop=stop, finish=finish)
+        return list(front.plans) or [front.default]
+    made = plan_path(scenario, limits, seed=asked.seed, algorithm=asked.algorithm, progress=advance, stop=stop)
+    return [front_plan(front_task(scenario, limits), finish(made))]
 
 
 def _ended(deadline: float) -> str:
@@ -117,7 +117,3 @@ def between(scenario: Scenario, start: tuple[float, ...], destination: tuple[flo
     for key in ("launch", "landing"):
         spec.pop(key, None)
     return from_spec(spec, scenario.name, ground=scenario.terrain, external=scenario.external)
-
-
-def _same(a: Plan, b: Plan) -> bool:
-    return a.waypoints.shape == b.waypoints.shape and bool(np.allclose(a.waypoints, b.waypoints, atol=5.0))

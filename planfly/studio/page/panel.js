@@ -8,6 +8,8 @@ const $ = (id) => document.getElementById(id);
 const TABS = ["verdict", "items", "plan", "settings", "files"];
 const FORMS = [["waypoints", ".waypoints", "QGC WPL 110: Mission Planner, QGroundControl, MAVProxy"], ["plan", ".plan", "QGroundControl, with fence and rally points"], ["plan.json", "plan.json", "planfly, with scenario and certificate"], ["kml", ".kml", "a map for Google Earth and others"]];
 const MOST_ROWS = 600;
+// Ways that one search looks for.
+const WAYS = 6;
 
 export class Panel {
   constructor(app) {
@@ -201,20 +203,20 @@ export class Panel {
     if (!offered) return;
     this.seed = element("input", { type: "number", min: "0", value: "1", id: "plan-seed" });
     this.algorithm = element("select", { id: "plan-algorithm" }, element("option", { value: "" }, "the default"), ...Object.keys(offered.algorithms).map((name) => element("option", { value: name, title: offered.algorithms[name] }, name)));
-    this.number = element("select", { id: "plan-ways" }, ...[1, 2, 3, 4, 5].map((n) => element("option", { value: n }, n === 1 ? "one way" : `${n} ways`)));
     this.first = element("select", { id: "plan-first" });
     this.last = element("select", { id: "plan-last" });
-    const plan = () => {
-      const asked = { kind: "plan", seed: Math.max(0, Math.round(Number(this.seed.value) || 0)), ways: Number(this.number.value) };
+    const plan = (ways) => {
+      const asked = { kind: "plan", seed: Math.max(0, Math.round(Number(this.seed.value) || 0)), ways };
       if ((this.first.value === "") !== (this.last.value === "")) return app.complain("Choose both ends of the part to plan, or none for the whole mission.");
-      if (this.algorithm.value) asked.algorithm = this.algorithm.value;
+      if (this.algorithm.value && ways === 1) asked.algorithm = this.algorithm.value;
       if (this.first.value !== "" && this.last.value !== "") Object.assign(asked, { first: Number(this.first.value), last: Number(this.last.value) });
       return app.send(asked);
     };
     this.wayBox = element("div", { class: "ways" });
     box.append(element("p", { class: "more" }, "The planner searches a path that the aircraft can fly, clear of ground, threats and zones."),
-      field("From", this.first), field("To", this.last), field("Seed", this.seed), field("Algorithm", this.algorithm), field("Search", this.number),
-      element("p", {}, element("button", { type: "button", class: "main", "data-job": "plan", onclick: plan }, "Plan from here")), this.wayBox);
+      field("From", this.first), field("To", this.last), field("Seed", this.seed), field("Algorithm", this.algorithm),
+      element("p", {}, element("button", { type: "button", class: "main", "data-job": "plan", onclick: () => plan(1) }, "Plan from here"), " ",
+        element("button", { type: "button", "data-job": "plan", id: "other-ways", title: "Several in one search, by the default algorithm: none is better than another in all", onclick: () => plan(WAYS) }, "Other ways")), this.wayBox);
     this.drawPlanEnds();
   }
 
@@ -238,10 +240,11 @@ export class Panel {
     const of = this.waysOf = rev ?? this.now.rev;
     box.append(element("h2", {}, ways.length === 1 ? "Found" : `${ways.length} ways found`));
     ways.forEach((way, k) => {
-      const rows = [["Length", `${way.length.toFixed(3)} times straight`], ["Exposure to missiles", way.exposure.toFixed(3)], ["Least clearance to spare", way.clearance === null ? "\u2013" : `${plain(way.clearance, 1)} m`]];
+      const rows = [["Length", `${plain(way.length / 1000, 2)} km`], ["Seen by radars", `${plain(way.exposure)} s`], ["Above ground at least", `${plain(way.clearance)} m`], ["Time", `${plain(way.seconds)} s`]];
+      if (way.energy !== null) rows.push(["Energy", `${plain(way.energy)} Wh`]);
       const take = element("button", { type: "button", onclick: () => { app.ways([]); app.commit({ kind: "choose", rev: of, which: k }); } }, "Take this way");
       const card = element("section", { class: "card", "data-state": way.state === "safe" ? "ok" : "fail", onpointerenter: () => app.ways(ways, k) },
-        element("h3", {}, `Seed ${way.seed}: ${way.state}`), element("dl", {}, ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])),
+        element("h3", {}, `Way ${k + 1}: ${[way.state, ...way.best].join(", ")}`), element("dl", {}, ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])),
         ...way.problems.map((text) => element("p", {}, text)), take);
       box.append(card);
     });

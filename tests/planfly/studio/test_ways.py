@@ -1,0 +1,37 @@
+"""Paths to choose from: several of one search, what each is the best in, and the one that is taken."""
+
+import numpy as np
+import pytest
+
+from planfly.studio import messages
+from planfly.studio.documents import World, open_document
+from planfly.studio.jobs import LONG, Jobs
+from planfly.studio.pilot import Answer, Work
+from planfly.studio.session import Session
+from planfly.studio.works import plan
+from world.errors import PlanflyError
+
+
+def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Work] = []
+    monkeypatch.setattr("planfly.studio.jobs.Pilot.ask", lambda self, work: asked.append(work))
+    session, jobs = Session.of(open_document("tight", World()), World()), Jobs(lambda name, answer: None)
+    with pytest.raises(PlanflyError, match="algorithm"):
+        jobs.plan(messages.Plan(kind="plan", ways=3, algorithm="umda"), session)
+    jobs.plan(messages.Plan(kind="plan", seed=1, ways=3), session)
+    shares: list[float] = []
+    found = plan(asked[-1].payload, lambda done, total, remark: shares.append(done / max(1.0, total)))
+    assert shares
+    (shown,) = jobs.answered(LONG, Answer(asked[-1].number, "done", found), session)
+    ways = shown["ways"]
+    assert 2 <= len(ways) <= 3
+    assert all(one["state"] == "safe" for one in ways)
+    values = np.array([[one.length, one.exposure, -one.clearance, one.energy] for one in found])
+    for k, row in enumerate(values):
+        others = np.delete(values, k, axis=0)
+        assert not ((others <= row).all(axis=1) & (others < row).any(axis=1)).any()
+    assert [one["length"] for one in ways] == sorted(one["length"] for one in ways)
+    assert "shortest" in ways[0]["best"]
+    session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=1))
+    assert session.judged.setup.plan is found[1].plan
+    assert session.sheet()["undo"] == "plan with seed 1"
