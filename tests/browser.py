@@ -183,14 +183,16 @@ class Browser:
         """PNG of one element, or of the whole page."""
         if selector is None:
             size = self.call("Page.getLayoutMetrics")["cssContentSize"]
-            clip = {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}
+            box, beyond = [0, 0, size["width"], size["height"]], True
         else:
-            box = self.value(
+            # A picture of what is in view alone needs no new layout of the page.
+            *box, beyond = self.value(
                 f"(() => {{ const b = document.querySelector({json.dumps(selector)}).getBoundingClientRect();"
-                " return [b.x + scrollX, b.y + scrollY, b.width, b.height]; })()"
+                " const beyond = b.x < 0 || b.y < 0 || b.right > innerWidth || b.bottom > innerHeight;"
+                " return [b.x + scrollX, b.y + scrollY, b.width, b.height, beyond]; })()"
             )
-            clip = {"x": box[0], "y": box[1], "width": box[2], "height": box[3], "scale": 1}
-        answer = self.call("Page.captureScreenshot", format="png", clip=clip, captureBeyondViewport=True)
+        clip = {"x": box[0], "y": box[1], "width": box[2], "height": box[3], "scale": 1}
+        answer = self.call("Page.captureScreenshot", format="png", clip=clip, captureBeyondViewport=beyond)
         return base64.b64decode(answer["data"])
 
     def printed(self) -> bytes:

@@ -18,7 +18,7 @@ from flight.dynamics.trim import Floats, Trim, fastest, full_throttle, idle, slo
 from world.files import write_whole
 
 # Any change of what the file holds or of how it is computed counts this up.
-_SCHEMA = 5
+_SCHEMA = 6
 _SPEEDS = 11
 _AMSL = np.arange(0.0, 9001.0, 1000.0)
 _TABLES = (*TABLES, *POWERS)

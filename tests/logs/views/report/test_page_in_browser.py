@@ -35,6 +35,7 @@ def test_wide_page_draws_the_view_and_fills_the_tables(page: Path, tmp_path: Pat
         assert len(tables) >= 5
         assert all(rows > 0 and full for rows, full in tables)
         assert browser.value("[...document.images].every(i => i.complete && i.naturalWidth > 500)")
+        browser.value("document.querySelector('#view3d').scrollIntoView()")
         first = picture_when(browser, "#view3d", lambda png: spread(png) > 60)
         assert spread(first) > 60
         assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "none"
@@ -46,7 +47,6 @@ def test_wide_page_draws_the_view_and_fills_the_tables(page: Path, tmp_path: Pat
 
 def _try_the_controls(browser: Browser, first: bytes) -> None:
     """Mouse, wheel, keys and buttons change the picture; Back brings it back."""
-    browser.value("document.querySelector('#view3d').scrollIntoView()")
     x, y = 600.0, 250.0
     browser.mouse("mousePressed", x, y, button="left", clickCount=1)
     browser.mouse("mouseMoved", x + 120, y + 40, button="left", buttons=1)
