@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.setup import Damage
-from world.kernels import compiled, read_only
+from world.kernels import compiled, copy_into, read_only
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -307,7 +307,8 @@ def _walk_messages(
         if wanted[kind]:
             if count == at.size:
                 more_at, more_kinds = np.empty(2 * count, np.int64), np.empty(2 * count, np.uint8)
-                more_at[:count], more_kinds[:count] = at, kinds
+                copy_into(more_at, at)
+                copy_into(more_kinds, kinds)
                 at, kinds = more_at, more_kinds
             at[count], kinds[count] = k, kind
             count += 1

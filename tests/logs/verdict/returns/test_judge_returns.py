@@ -131,12 +131,15 @@ class Stub:
         return one.clearance + self.higher, one.outside + self.farther
 
 
-@pytest.fixture
-def hill(tmp_path: Path) -> tuple[ReturnWorld, ReturnStarts, Returns]:
-    """Returns every second: dozens graze the hill, or come within 10 m of the least height over it."""
-    world = return_world(hill_setup(tmp_path))
-    starts = planned_starts(world.setup, 1.0)
-    return world, starts, judge_returns(world, starts, 1.0)
+# So often, s, that many graze the hill, or come within 10 m of the least height over it.
+OFTEN = 2.0
+
+
+@pytest.fixture(scope="module")
+def hill(tmp_path_factory: pytest.TempPathFactory) -> tuple[ReturnWorld, ReturnStarts, Returns]:
+    world = return_world(hill_setup(tmp_path_factory.mktemp("hill")))
+    starts = planned_starts(world.setup, OFTEN)
+    return world, starts, judge_returns(world, starts, OFTEN)
 
 
 @pytest.mark.parametrize("higher", [2.0, 5.0, 9.0, 31.0, 400.0])
@@ -145,7 +148,7 @@ def test_a_flight_that_finds_it_higher_makes_that_one_better_alone(
 ) -> None:
     world, starts, before = hill
     stub = Stub(before, higher)
-    after = judge_returns(world, starts, 1.0, stub)
+    after = judge_returns(world, starts, OFTEN, stub)
     asked = {one.time for one in stub.asked}
     assert 0 < len(asked) <= 4
     assert after.again == pytest.approx([higher] * len(asked))
@@ -166,20 +169,20 @@ def test_a_flight_that_finds_it_lower_makes_all_like_it_worse(
     hill: tuple[ReturnWorld, ReturnStarts, Returns],
 ) -> None:
     world, starts, before = hill
-    after = judge_returns(world, starts, 1.0, Stub(before, -8.0), 2)
+    after = judge_returns(world, starts, OFTEN, Stub(before, -8.0), 2)
     assert after.count("ground") + after.count("low") > before.count("ground") + before.count("low")
     assert after.count("safe") < before.count("safe")
     assert not after.count("unsure")
     # Further apart than it may be: what was flown hits, and nobody knows of the others.
     stub = Stub(before, -50.0)
-    far = judge_returns(world, starts, 1.0, stub)
+    far = judge_returns(world, starts, OFTEN, stub)
     assert {one.kind for one in far.each if one.time in {asked.time for asked in stub.asked}} == {"ground"}
     assert far.count("unsure") > 5
     assert "too differently" in headline(far)
     # How far it is from a sphere that is far away decides nothing.
-    assert not judge_returns(world, starts, 1.0, Stub(before, 0.0, 2000.0)).count("unsure")
+    assert not judge_returns(world, starts, OFTEN, Stub(before, 0.0, 2000.0)).count("unsure")
     # What could not be flown stays as it was.
-    unflown = judge_returns(world, starts, 1.0, lambda *_: None)
+    unflown = judge_returns(world, starts, OFTEN, lambda *_: None)
     assert [(one.kind, one.clearance) for one in unflown.each] == [(one.kind, one.clearance) for one in before.each]
 
 
@@ -189,7 +192,7 @@ def test_one_deep_in_the_ground_is_sure(hill: tuple[ReturnWorld, ReturnStarts, R
     deep = {one.time for one in before.each if one.start[0] > 6200.0}
     assert {(one.kind, one.clearance < -10.0) for one in before.each if one.time in deep} == {("ground", True)}
     stub = Stub(before, 5.0)
-    judge_returns(world, starts, 1.0, stub, 100)
+    judge_returns(world, starts, OFTEN, stub, 100)
     assert not deep & {one.time for one in stub.asked}
 
 
@@ -201,7 +204,7 @@ def test_no_flight_begins_where_none_can(
     world, starts, _ = hill
     for name, value in changed.items():
         starts.rows[name] = value
-    judge_returns(world, starts, 1.0, lambda *_: pytest.fail("it was flown"))
+    judge_returns(world, starts, OFTEN, lambda *_: pytest.fail("it was flown"))
 
 
 def test_one_that_begins_low_is_held_to_what_it_has(tmp_path: Path) -> None:
