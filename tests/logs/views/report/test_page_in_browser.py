@@ -1,48 +1,88 @@
-"""The page works in a browser: wide and narrow, with mouse and keys, without a script, on paper."""
+"""The page of a report works in a browser: wide and narrow, by mouse and keys, light and dark, and without a script."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
+from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_flight
+from logs.views.report.compare import compare_logs, write_comparison
 from logs.views.report.page import write_report
 from tests.browser import Browser
-from tests.logs.views.report.page_in_browser import apart, changed, own_problems, picture_when, spread
+from tests.logs.views.report.page_in_browser import (
+    apart,
+    changed,
+    grave_findings,
+    own_problems,
+    picture_when,
+    prefer,
+    show_all_charts,
+    show_chart,
+    spread,
+    until,
+)
+from tests.soak import SOAK
 
 pytestmark = [pytest.mark.client, pytest.mark.xdist_group("browser")]
 
+TIME = "document.querySelector('[data-chart=time]')"
+READ_OUT = (
+    "Object.fromEntries([...document.querySelectorAll('.readout div')].map(d => [...d.children].map(c => c.innerText)))"
+)
+
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory, setup: FlightSetup, track: Track) -> Path:
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("profile"), 1400, 900) as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory, browser: Browser, setup: FlightSetup, track: Track) -> Path:
     folder = tmp_path_factory.mktemp("report")
     verdict = judge_flight(setup, track, "completed")
     arguments: dict[str, Any] = {"ended": "completed", "versions": {"planfly": "0"}, "command": "planfly run small"}
-    return write_report(folder, setup, track, verdict, **arguments)[-1]
+    page = write_report(folder, setup, track, verdict, **arguments)[-1]
+    browser.open(page)
+    return page
 
 
-def test_wide_page_draws_the_view_and_fills_the_tables(page: Path, tmp_path: Path) -> None:
-    with Browser(tmp_path / "profile", 1200, 900) as browser:
-        browser.open(page)
-        browser.settle()
-        assert browser.value("document.querySelector('.badge').innerText").strip()
-        tables = browser.value(
-            "[...document.querySelectorAll('table')].map(t => [t.tBodies[0].rows.length,"
-            " [...t.tBodies[0].rows].every(r => r.innerText.trim().length > 3)])"
-        )
-        assert len(tables) >= 5
-        assert all(rows > 0 and full for rows, full in tables)
-        assert browser.value("[...document.images].every(i => i.complete && i.naturalWidth > 500)")
-        browser.value("document.querySelector('#view3d').scrollIntoView()")
-        first = picture_when(browser, "#view3d", lambda png: spread(png) > 60)
-        assert spread(first) > 60
-        assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "none"
-        _try_the_controls(browser, first)
-        assert len(browser.printed()) > 50_000
-        assert own_problems(browser) == []
-        assert browser.requests == []
+def middle(browser: Browser, element: str) -> tuple[float, float, float, float]:
+    """Bring an element's middle into the screen's; returns where that is, and its half width and height, pixels."""
+    browser.value(f"{element}.scrollIntoView({{block: 'center'}})")
+    browser.settle()
+    box = browser.value(
+        f"(() => {{ const b = {element}.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; }})()"
+    )
+    x, y, width, height = box
+    return x + width / 2, y + height / 2, width / 2, height / 2
+
+
+@pytest.mark.usefixtures("page")
+def test_wide_page_draws_the_view_and_fills_the_tables(browser: Browser) -> None:
+    prefer(browser, "light", 1200)
+    browser.settle()
+    assert browser.value("document.querySelector('.badge').innerText").strip()
+    tables = browser.value(
+        "[...document.querySelectorAll('table')].map(t => [t.tBodies[0].rows.length,"
+        " [...t.tBodies[0].rows].every(r => r.innerText.trim().length > 3)])"
+    )
+    assert len(tables) >= 5
+    assert all(rows > 0 and full for rows, full in tables)
+    assert browser.value("[...document.images].every(i => i.complete && i.naturalWidth > 500)")
+    browser.value("document.querySelector('#view3d').scrollIntoView()")
+    first = picture_when(browser, "#view3d", lambda png: spread(png) > 60)
+    assert spread(first) > 60
+    assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "none"
+    _try_the_controls(browser, first)
+    assert len(browser.printed()) > 50_000
+    assert own_problems(browser) == []
+    assert browser.requests == []
 
 
 def _try_the_controls(browser: Browser, first: bytes) -> None:
@@ -69,36 +109,172 @@ def _try_the_controls(browser: Browser, first: bytes) -> None:
     assert apart(last, first) < 0.01
 
 
-def test_narrow_page_fits_a_phone(page: Path, tmp_path: Path) -> None:
-    with Browser(tmp_path / "profile", 420, 860, phone=True) as browser:
-        browser.open(page)
-        browser.settle()
-        assert browser.value("document.documentElement.scrollWidth") <= 420
-        assert spread(picture_when(browser, "#view3d", lambda png: spread(png) > 40)) > 40
-        small = browser.value(
-            "[...document.querySelectorAll('button, nav a')]"
-            ".map(b => b.getBoundingClientRect().height).filter(h => h < 24)"
+@pytest.mark.usefixtures("page")
+def test_a_chart_tells_values_with_units_zooms_and_moves_the_aircraft(browser: Browser) -> None:
+    prefer(browser, "light", 1400)
+    show_chart(browser, "time")
+    x, y, across, _ = middle(browser, f"{TIME}.querySelector('.nsewdrag')")
+    browser.mouse("mouseMoved", x, y)
+    until(browser, f"{TIME}.querySelector('.hoverlayer').textContent.includes('m/s')")
+    words = browser.value(f"{TIME}.querySelector('.hoverlayer').textContent")
+    # All panels are read out together, at one time.
+    assert all(unit in words for unit in (" s", "m/s", "°", " g", " m"))
+    before = browser.value(f"{TIME}.layout.xaxis.range")
+    browser.mouse("mousePressed", x, y, button="left", clickCount=1)
+    browser.mouse("mouseReleased", x, y, button="left", clickCount=1)
+    until(browser, "Number(document.querySelector('.player input').value) > 0")
+    moment = float(browser.value("document.querySelector('.player input').value"))
+    assert moment == pytest.approx(np.mean(before), abs=0.1 * np.ptp(before))
+    browser.mouse("mousePressed", x - across / 2, y, button="left", clickCount=1)
+    browser.mouse("mouseMoved", x, y, button="left", buttons=1)
+    browser.mouse("mouseReleased", x, y, button="left", clickCount=1)
+    until(browser, f"{TIME}.layout.xaxis.range[1] < {0.75 * before[1]}")
+    after = browser.value(f"{TIME}.layout.xaxis.range")
+    assert after == pytest.approx([0.25 * before[1], 0.5 * before[1]], rel=0.1)
+
+
+@pytest.mark.usefixtures("page")
+def test_no_legend_covers_a_chart(browser: Browser) -> None:
+    prefer(browser, "light", 1400)
+    for name in show_all_charts(browser):
+        chart = f"document.querySelector('[data-chart={name}]')"
+        edges = "(b => [b.top, b.bottom])({}.querySelector('{}').getBoundingClientRect())"
+        buttons, legend, panel = (
+            browser.value(edges.format(chart, part)) for part in (".modebar", ".legend", ".nsewdrag")
         )
-        assert small == []
-        assert own_problems(browser) == []
+        assert buttons[1] <= legend[0] + 6.0, name
+        assert legend[1] <= panel[0] + 1.0, name
 
 
-def test_without_a_script_the_still_picture_stands(page: Path, tmp_path: Path) -> None:
-    with Browser(tmp_path / "profile", 1200, 900) as browser:
-        browser.call("Emulation.setScriptExecutionDisabled", value=True)
-        browser.open(page)
-        still = browser.value("getComputedStyle(document.querySelector('.still')).display")
-        assert still == "block"
-        assert browser.value("getComputedStyle(document.querySelector('#view3d')).display") == "none"
-        assert spread(browser.picture(".still")) > 60
+@pytest.mark.usefixtures("page")
+def test_the_slider_moves_the_aircraft_and_its_read_out(browser: Browser, track: Track) -> None:
+    prefer(browser, "light", 1400)
+    slider = "document.querySelector('.player input')"
+    browser.value("document.querySelector('#view3d').scrollIntoView()")
+    browser.value(f"{slider}.value = 0; {slider}.dispatchEvent(new Event('input'))")
+    browser.value(f"{slider}.focus()")
+    first = picture_when(browser, "#view3d", lambda png: spread(png) > 60)
+    for _ in range(3):
+        browser.key("ArrowRight")
+    browser.settle()
+    said = browser.value(READ_OUT)
+    assert said["time"] == "3.0 s"
+    row = int(np.searchsorted(track.time, 3.0))
+    assert float(said["height"].split()[0].replace("−", "-")) == pytest.approx(track.position[row, 2], abs=1.0)
+    assert float(said["airspeed"].split()[0]) == pytest.approx(float(track.airspeed[row]), abs=0.3)
+    assert {"leg", "above ground", "bank"} <= set(said)
+    assert browser.value(f"{slider}.getAttribute('aria-valuetext')").startswith("3.0 s, leg ")
+    later = picture_when(browser, "#view3d", lambda png: changed(png, first) > 5e-4)
+    assert changed(later, first) > 5e-4
+    # Eight seconds at five times their speed.
+    speed = "document.querySelector('.player select')"
+    browser.value(f"{speed}.value = '5'; {speed}.dispatchEvent(new Event('change'))")
+    browser.value("document.querySelector('.player button').click()")
+    until(browser, f"Number({slider}.value) >= {float(track.time[-1]) - 0.01}")
+    assert browser.value("document.querySelector('.player button').innerText").endswith("Play")
 
 
-def test_on_paper_the_still_picture_stands(page: Path, tmp_path: Path) -> None:
-    with Browser(tmp_path / "profile", 1200, 900) as browser:
-        browser.open(page)
-        browser.call("Emulation.setEmulatedMedia", media="print")
-        assert browser.value("getComputedStyle(document.querySelector('#view3d')).display") == "none"
-        assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "block"
-        shown = "[...document.querySelectorAll('SELECTOR')].map(e => getComputedStyle(e).display)"
-        assert set(browser.value(shown.replace("SELECTOR", ".chart, .player, .key"))) == {"none"}
-        assert set(browser.value(shown.replace("SELECTOR", ".picture"))) == {"block"}
+@pytest.mark.usefixtures("page")
+def test_names_stay_while_the_view_is_turned(browser: Browser) -> None:
+    prefer(browser, "light", 1400)
+    browser.value("document.querySelector('[data-do=home]').click()")
+    browser.settle()
+    names = set(browser.value("document.querySelector('#view3d').dataset.labels").split("|"))
+    assert {"start", "destination"} < names
+    for _ in range(12):
+        browser.value("for (let k = 0; k < 4; k++) document.querySelector('[data-do=left]').click()")
+        browser.settle()
+        assert set(browser.value("document.querySelector('#view3d').dataset.labels").split("|")) == names
+
+
+def test_a_finger_scrolls_the_page_past_a_chart(browser: Browser, page: Path) -> None:
+    prefer(browser, "light", 390)
+    browser.open(page)
+    show_chart(browser, "profile")
+    assert browser.value("document.querySelector('[data-chart=profile]').layout.dragmode") is False
+    until(browser, "document.documentElement.scrollWidth <= 390")
+
+
+SCREENS = [("light", 1400), ("dark", 390)] + ([("dark", 1400), ("light", 390)] if SOAK else [])
+
+
+@pytest.mark.usefixtures("page")
+@pytest.mark.parametrize(("scheme", "width"), SCREENS)
+def test_axe_finds_nothing_grave_and_nothing_stands_out(browser: Browser, scheme: str, width: int) -> None:
+    _look_at(browser, scheme, width)
+
+
+def _look_at(browser: Browser, scheme: str, width: int) -> None:
+    prefer(browser, scheme, width)
+    browser.settle()
+    assert show_all_charts(browser)
+    assert browser.value("document.documentElement.scrollWidth") <= width
+    too_wide = (
+        "[...document.querySelectorAll('.chart svg, .view')].filter(e => e.getBoundingClientRect().right > innerWidth)"
+    )
+    assert browser.value(f"{too_wide}.length") == 0
+    paper = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
+    assert (max(browser.value(paper)) < 60) == (scheme == "dark")
+    # Charts are drawn in the colours of the page.
+    ink = browser.value("getComputedStyle(document.body).getPropertyValue('--ink').trim()")
+    until(browser, f"document.querySelector('.chart').layout.font.color === '{ink}'")
+    assert own_problems(browser) == []
+    assert browser.requests == []
+    assert grave_findings(browser) == []
+
+
+@pytest.mark.usefixtures("page")
+def test_paper_is_light_whatever_the_screen(browser: Browser) -> None:
+    features = [{"name": "prefers-color-scheme", "value": "dark"}]
+    browser.call("Emulation.setEmulatedMedia", media="print", features=features)
+    assert browser.value("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert browser.value("getComputedStyle(document.body).getPropertyValue('--ink').trim()") == "#1d1d1f"
+
+
+@pytest.mark.usefixtures("page")
+def test_narrow_page_fits_a_phone(browser: Browser) -> None:
+    prefer(browser, "light", 420)
+    browser.settle()
+    assert browser.value("document.documentElement.scrollWidth") <= 420
+    assert spread(picture_when(browser, "#view3d", lambda png: spread(png) > 40)) > 40
+    # Plotly's own buttons stand apart from each other.
+    small = browser.value(
+        "[...document.querySelectorAll('button:not(.modebar-btn), nav a')].map(b => b.getBoundingClientRect().height).filter(h => h < 24)"
+    )
+    assert small == []
+    assert own_problems(browser) == []
+
+
+@pytest.mark.usefixtures("page")
+def test_on_paper_the_still_picture_stands(browser: Browser) -> None:
+    prefer(browser, "light", 1200)
+    browser.call("Emulation.setEmulatedMedia", media="print")
+    assert browser.value("getComputedStyle(document.querySelector('#view3d')).display") == "none"
+    assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "block"
+    shown = "[...document.querySelectorAll('SELECTOR')].map(e => getComputedStyle(e).display)"
+    assert set(browser.value(shown.replace("SELECTOR", ".chart, .player, .key"))) == {"none"}
+    assert set(browser.value(shown.replace("SELECTOR", ".picture"))) == {"block"}
+
+
+def test_without_a_script_the_still_picture_stands(browser: Browser, page: Path) -> None:
+    prefer(browser, "light", 1200)
+    browser.call("Emulation.setScriptExecutionDisabled", value=True)
+    browser.open(page)
+    still = browser.value("getComputedStyle(document.querySelector('.still')).display")
+    assert still == "block"
+    assert browser.value("getComputedStyle(document.querySelector('#view3d')).display") == "none"
+    assert spread(browser.picture(".still")) > 60
+    browser.call("Emulation.setScriptExecutionDisabled", value=False)
+
+
+@pytest.mark.skipif(not SOAK, reason="the same charts, twice: in make soak")
+def test_the_comparison_has_charts_for_both_and_nothing_grave(
+    browser: Browser, log_file: Path, other: FlightLog, tmp_path: Path
+) -> None:
+    found = compare_logs(read_log(log_file), other, names=("a.mcap", "<b>.mcap"))
+    prefer(browser, "dark", 390)
+    browser.open(write_comparison(tmp_path, found)[-1])
+    _look_at(browser, "dark", 390)
+    legend = browser.value("document.querySelector('[data-chart=map] .legend').textContent")
+    assert "a.mcap" in legend
+    assert "<b>.mcap" in legend
