@@ -4,12 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from aircraft.identification.estimate import Equation, Estimate
 from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means, prior_sds
 from logs.views.report.identification import IdentificationFacts, ReplayedLog, identification_page, parameter_rows
 from tests.browser import Browser
+from tests.logs.views.report.page_in_browser import prefer, until
 
 WAVE = np.sin(np.arange(2000) / 40.0)
 
@@ -58,21 +58,19 @@ def test_the_page_says_what_was_found_and_what_was_not() -> None:
     assert "Performance only" in shown
 
 
-@pytest.mark.parametrize(("width", "height", "phone"), [(1280, 900, False), (390, 840, True)])
-def test_a_browser_shows_it(tmp_path: Path, width: int, height: int, phone: bool) -> None:
+def test_a_browser_shows_it_wide_and_narrow(tmp_path: Path) -> None:
     file = tmp_path / "identify.html"
     file.write_text(identification_page(facts()), encoding="utf-8")
-    with Browser(tmp_path / "profile", width, height, phone=phone) as browser:
-        browser.open(file)
-        browser.settle()
-        assert browser.value("document.querySelectorAll('.chart').length") == 4
-        browser.value("document.querySelector('.chart').scrollIntoView()")
-        # The library is unpacked first.
-        drawn = "document.querySelector('.chart').dataset.drawn"
-        assert browser.value(
-            f"new Promise(done => {{ const look = () => {drawn} ? done(1) : setTimeout(look, 50); look() }})"
-        )
-        # No part of the page is wider than the screen.
-        assert browser.value("document.documentElement.scrollWidth") <= width
-        assert browser.problems == []
-        assert browser.requests == []
+    with Browser(tmp_path / "profile", 1280, 900) as browser:
+        for width in (1280, 390):
+            prefer(browser, "light", width)
+            browser.open(file)
+            browser.settle()
+            assert browser.value("document.querySelectorAll('.chart').length") == 4
+            browser.value("document.querySelector('.chart').scrollIntoView()")
+            # The library is unpacked first.
+            until(browser, "document.querySelector('.chart').dataset.drawn")
+            # No part of the page is wider than the screen.
+            assert browser.value("document.documentElement.scrollWidth") <= width
+            assert browser.problems == []
+            assert browser.requests == []

@@ -238,9 +238,8 @@ def test_narrow_page_fits_a_phone(browser: Browser) -> None:
     assert browser.value("document.documentElement.scrollWidth") <= 420
     assert spread(picture_when(browser, "#view3d", lambda png: spread(png) > 40)) > 40
     # Plotly's own buttons stand apart from each other.
-    small = browser.value(
-        "[...document.querySelectorAll('button:not(.modebar-btn), nav a')].map(b => b.getBoundingClientRect().height).filter(h => h < 24)"
-    )
+    own = "[...document.querySelectorAll('button:not(.modebar-btn), nav a')]"
+    small = browser.value(f"{own}.map(b => b.getBoundingClientRect().height).filter(h => h < 24)")
     assert small == []
     assert own_problems(browser) == []
 
