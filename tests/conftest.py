@@ -12,13 +12,13 @@ from hypothesis import settings
 from planfly.process_setup import prepare_process
 from planfly.terminal import output
 from tests.shared import remove_made
-from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files
+from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files, scaled
 
 # Looking for garbage among all that tests import takes a tenth of their time.
 prepare_process()
 
 # The first example of a test may compile kernels, or share its core with another test: neither is the kernel's fault.
-settings.register_profile("planfly", deadline=None)
+settings.register_profile("planfly", deadline=None, max_examples=scaled(100, 50))
 settings.load_profile("planfly")
 
 # Files that compile kernels for more than a second, as no command does.  They come first: nobody waits for them later,

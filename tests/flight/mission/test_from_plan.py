@@ -19,11 +19,12 @@ from flight.mission_files.formats import mission_text, parse_mission
 from flight.simulation.setup import make_limits
 from planner.ground_ways import ClimbOut, Descent, GroundWays
 from tests.mission_lines import a_plan
+from tests.soak import scaled
 from world.frames import to_map
 from world.scenario import load_scenario, with_wind
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=scaled(40, 20), deadline=None)
 @given(
     st.lists(
         st.tuples(st.floats(-12_000, 12_000), st.floats(-9000, 9000), st.floats(300, 1100)),

@@ -40,7 +40,7 @@ def circled(flown: Route, item: int) -> tuple[float, float]:
     return float(turns[at].sum()) / TURN, float(flown.arcs[at][0])
 
 
-@settings(max_examples=scaled(60, 25), deadline=None)
+@settings(max_examples=scaled(60, 12), deadline=None)
 @given(
     st.floats(-4000, 4000), st.floats(-4000, 4000), st.floats(-math.pi, math.pi), st.floats(400, 5000),
     st.floats(15, 350), st.booleans(), st.sampled_from([0.0, 0.5, 1.0, 2.0, 3.7]),

@@ -29,7 +29,7 @@ def test_what_is_no_mission_file_is_refused(tmp_path: Path) -> None:
     refused(tmp_path / "a.kml", "suffix '.kml': allowed .waypoints, .plan, .txt")
 
 
-@settings(max_examples=scaled(300, 60), deadline=None)
+@settings(max_examples=scaled(300, 25), deadline=None)
 @given(st.text(max_size=60), st.sampled_from(["a.waypoints", "a.plan"]))
 def test_any_text_is_read_or_refused(text: str, source: str) -> None:
     for head in ("", "QGC WPL 110\n", HOME_LINE + "\n", '{"fileType": "Plan", "version": 1, "mission": '):

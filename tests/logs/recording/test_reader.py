@@ -18,6 +18,7 @@ from logs.recording.recorder import Recorder
 from logs.recording.state_channel import state_class
 from tests.logs.log_copies import prefix_of, rewrite, same
 from tests.logs.made_flight import make_setup
+from tests.soak import scaled
 from world.errors import LogError
 
 
@@ -89,7 +90,7 @@ def tracks(draw: st.DrawFn) -> Track:
 
 @pytest.mark.filterwarnings("ignore:invalid value encountered in cast")
 @given(tracks())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=scaled(40, 15), deadline=None)
 def test_any_track_comes_back_bit_for_bit(tmp_path_factory: pytest.TempPathFactory, track: Track) -> None:
     path = tmp_path_factory.getbasetemp() / "any.mcap"
     with Recorder(path, SMALL) as recorder:

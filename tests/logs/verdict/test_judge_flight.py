@@ -17,6 +17,7 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.rules.registry import RULES
 from tests.logs.verdict.judging import ROUTE, SILENT_ON_WAYPOINTS, failing, judge, leg, of, waypoint
+from tests.soak import scaled
 from tests.synthetic import (
     copied,
     edited,
@@ -127,7 +128,7 @@ def test_two_rows_far_apart_say_nothing_of_a_slope() -> None:
     judge(setup, Track(**columns).rows(0, 212))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=scaled(30, 12), deadline=None)
 @given(st.data())
 def test_random_cuts_and_holes_never_raise(data: st.DataObject) -> None:
     setup = make_setup(ROUTE)
@@ -144,7 +145,7 @@ def test_random_cuts_and_holes_never_raise(data: st.DataObject) -> None:
     judge(setup, Track(**columns).rows(first, data.draw(st.integers(first, len(track)))))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=scaled(25, 10), deadline=None)
 @given(
     st.lists(
         st.tuples(st.floats(-80.0, 80.0), st.floats(500.0, 2500.0), st.floats(-6.0, 10.0)), min_size=1, max_size=6
