@@ -34,7 +34,8 @@ from world.scenario import load_scenario
 
 MOVES, RELEASES, EDITS = 200, 7, 1_000
 SCENARIO = "jacksboro-air"
-# Moves of the pointer, 16 ms apart, as a page's own script sends them; gives the time to each verdict's frame, ms.
+# Moves of the pointer, 16 ms apart, as a page's own script sends them; gives the time to each
+# verdict's frame, ms, and how many moves had none.
 DRAG = """
 new Promise((done) => {
   const page = document.documentElement, map = document.getElementById("map"), asked = [], found = [];
@@ -59,7 +60,11 @@ new Promise((done) => {
     send("pointermove", 8 + 24 * Math.sin(k / 9), 24 * Math.cos(k / 7));
     asked.push([Number(page.dataset.asked), at]);
     if (k < %(moves)d) setTimeout(step, 16);
-    else setTimeout(() => { watch.disconnect(); send("pointerup", 8, 8); done(found); }, 900);
+    else setTimeout(() => {
+      watch.disconnect();
+      send("pointerup", 8, 8);
+      done({ answered: found, never: asked.length });
+    }, 900);
   };
   setTimeout(step, 200);
 })
@@ -109,7 +114,7 @@ def write_missions(folder: Path) -> dict[str, tuple[str, ...]]:
         name = f"w{count}.waypoints"
         (folder / name).write_text(mission_text(_long_mission(count), "waypoints"), encoding="utf-8")
         found[f"{count} waypoints"] = (name, "--scenario", SCENARIO)
-    (folder / "zones.geojson").write_text(_zones(), encoding="utf-8")
+    (folder / "zones.geojson").write_text(_zones(plan.waypoints[:, :2]), encoding="utf-8")
     found["demo, 1,000 zones"] = ("demo.json", "--fence", "zones.geojson")
     return found
 
@@ -127,20 +132,30 @@ def _long_mission(count: int) -> Mission:
     return Mission(Home(on_grid(float(lat[0])), on_grid(float(lon[0])), 300.0), tuple(items))
 
 
-def _zones() -> str:
-    """A thousand square zones to keep out of, all over the map, below the flight."""
+def _zones(way: np.ndarray) -> str:
+    """A thousand square zones to keep out of, up to above the flight, all over the map but for its way."""
     scenario, rng = load_scenario(SCENARIO), np.random.default_rng(38)
-    features = []
-    for number in range(1_000):
+    features: list[dict[str, Any]] = []
+    while len(features) < 1_000:
+        number = len(features)
         east, north = rng.uniform(-10_000.0, 10_000.0, 2)
+        if _distance(np.array([east, north]), way) < 250.0:
+            continue
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * 90.0 + [east, north]
         lat, lon = to_geo(scenario.origin, corners[:, 0], corners[:, 1])
         ring = np.stack([lon, lat], axis=1).tolist()
-        properties = {"name": f"zone {number}", "kind": "exclusion", "ceiling_amsl_m": 300.0}
+        properties = {"name": f"zone {number}", "kind": "exclusion", "ceiling_amsl_m": 2_000.0}
         features.append(
             {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [ring]}}
         )
     return json.dumps({"type": "FeatureCollection", "features": features})
+
+
+def _distance(point: np.ndarray, way: np.ndarray) -> float:
+    """From a point (2,) to a way (n, 2), m."""
+    along = np.diff(way, axis=0)
+    shares = np.clip(((point - way[:-1]) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return float(np.hypot(*(way[:-1] + shares[:, None] * along - point).T).min())
 
 
 @contextlib.contextmanager
@@ -174,6 +189,11 @@ def share(values: list[float], part: float) -> float:
     return sorted(values)[min(len(values) - 1, math.ceil(part * len(values)) - 1)]
 
 
+def timed(drag: dict[str, Any]) -> list[float]:
+    """Times of a drag's moves, ms; without end for one that was never answered."""
+    return [*drag["answered"], *[math.inf] * int(drag["never"])]
+
+
 def measure_drags(folder: Path, missions: dict[str, tuple[str, ...]]) -> list[dict[str, Any]]:
     """A row a mission."""
     rows = []
@@ -185,7 +205,7 @@ def measure_drags(folder: Path, missions: dict[str, tuple[str, ...]]) -> list[di
         ):
             drawn(browser, address)
             count = int(browser.value("document.querySelectorAll('.mark').length"))
-            moves = browser.value(DRAG % {"mark": count // 2, "moves": MOVES})
+            moves = timed(browser.value(DRAG % {"mark": count // 2, "moves": MOVES}))
             browser.wait_for("document.getElementById('flown').dataset.state !== 'checking'")
             way = [2, -2]
             flown = [browser.value(RELEASE % {"mark": count // 2, "way": way[k % 2]}) for k in range(RELEASES)]

@@ -127,7 +127,7 @@ def _speed_factor(desk: Desk, amsl: float) -> float:
 
 
 def _judged(setup: FlightSetup, first: int, last: int, begin: int) -> Window:
-    requirements = route_requirements(setup)
+    requirements = replace(route_requirements(setup), zones_on=(first - begin, last - begin - 1))
     findings = tuple(item for item in place_findings(requirements) if _within(item, first - begin, last - begin))
     return Window(first, last, begin, requirements, findings)
 

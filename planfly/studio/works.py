@@ -29,8 +29,8 @@ from planner.search.plan_path import plan_path
 from world.scenario import Scenario, from_spec
 
 Floats = NDArray[np.float64]
-# A search for one path, at most, s: a hand waits for it.
-SECONDS = 25.0
+# A search for one path, and for several, at most, s: a hand waits for it.
+SECONDS, SECONDS_FOR_SEVERAL = 25.0, 60.0
 # Rows of a flown track that the page draws.
 _DRAWN = 1_500
 
@@ -92,7 +92,8 @@ class PlanAsked:
 def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
     """A path, or several to choose from, the shortest first; where none is safe the one that comes nearest to it."""
     scenario = asked.scenario if asked.ends is None else between(asked.scenario, *asked.ends)
-    limits, stop = asked.airframe.limits.surely(), partial(_ended, time.monotonic() + SECONDS)
+    seconds = SECONDS if asked.ways == 1 else SECONDS_FOR_SEVERAL
+    limits, stop = asked.airframe.limits.surely(), partial(_ended, time.monotonic() + seconds)
 
     def finish(made: Plan) -> Plan:
         return laid_from_the_ground(made, asked.airframe) if asked.ends is None else made

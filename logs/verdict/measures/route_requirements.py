@@ -41,6 +41,10 @@ Floats = NDArray[np.float64]
 # The zones that a flight is judged by: those of its scenario, then those of its mission's own fence.
 
 
+# What chords leave an arc by is far less, m.
+_NEAR = 10.0
+
+
 @dataclass(frozen=True, slots=True)
 class Airspace:
     """Zones in the order in which findings number them.
@@ -60,6 +64,21 @@ class Airspace:
         """A zone as the place of a finding."""
         zone = self.zones[index]
         return Place(zone.kind, index, name=zone.name)
+
+    def about(self, points: Floats) -> NDArray[np.int64]:
+        """Zones that a way (n, 3) m may violate: inclusions, and exclusions that a straight piece of it comes near.
+
+        >>> from world.airspace.zones import Cylinder
+        >>> zones = tuple(Zone(str(k), "exclusion", Cylinder(1000.0 * k, 0.0, 50.0)) for k in range(4))
+        >>> way = np.array([[1900.0, 900.0, 80.0], [2100.0, -900.0, 80.0]])
+        >>> Airspace(zones, zone_records(zones)).about(way).tolist()
+        [2]
+        """
+        boxes = self.records.zones
+        low, high = np.minimum(points[:-1], points[1:]) - _NEAR, np.maximum(points[:-1], points[1:]) + _NEAR
+        east = (boxes["west"][:, None] <= high[:, 0]) & (boxes["east"][:, None] >= low[:, 0])
+        north = (boxes["south"][:, None] <= high[:, 1]) & (boxes["north"][:, None] >= low[:, 1])
+        return np.flatnonzero(~boxes["exclusion"] | (east & north).any(axis=1))
 
 
 def airspace_of(setup: FlightSetup) -> Airspace:
@@ -283,6 +302,8 @@ class RouteRequirements:
     envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
     airspace: the zones of scenario and mission.
     surveys: those of a mission that a person brought, where the scenario judges surveys by their lines.
+    zones_on: first and last leg if zones are asked about on these alone, and only those that the planned path violates
+        there, for an answer that is in a hurry.
     ground: of a flight that took off or landed, whose part in the air the rest is of; None for any other.
     """
 
@@ -311,6 +332,7 @@ class RouteRequirements:
     airspace: Airspace
     surveys: tuple[Survey, ...]
     ground: FlownGround | None = None
+    zones_on: tuple[int, int] | None = None
 
     @property
     def limits(self) -> Limits:

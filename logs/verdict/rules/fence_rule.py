@@ -20,7 +20,7 @@ from logs.verdict.rule import LogNeeds, Margin, Rule
 from logs.verdict.suggestions import pass_zone
 from logs.verdict.tolerances import ROUNDING
 from logs.verdict.wording import place_text
-from world.airspace.zone_kernels import zone_records
+from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
 from world.kernels import Record, Records
 
@@ -57,6 +57,8 @@ def fence_findings(
     if not geometric and aligned is None:
         return [*out, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
     terrain = requirements.setup.scenario.terrain
+    if geometric and requirements.zones_on is not None:
+        return out + _violated_zones(requirements, *requirements.zones_on)
     planned = path_zones(planned_moves(requirements), airspace.records, terrain)
     flown = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
     sides = [planned] if flown is None else [planned, flown]
@@ -67,6 +69,17 @@ def fence_findings(
     if not any(item.ok is False for item in touched):
         touched.insert(0, _kept(requirements, planned, flown))
     return out + touched
+
+
+def _violated_zones(requirements: RouteRequirements, first: int, last: int) -> list[Finding]:
+    """Each zone that the planned path violates or touches on some legs, with nothing said of the others."""
+    airspace, path = requirements.airspace, requirements.path
+    begin, end = np.searchsorted(path.legs, [first, last + 1]).tolist()
+    numbers = airspace.about(path.points[begin : end + 1])
+    records = ZoneRecords(airspace.records.zones[numbers], airspace.records.edges)
+    planned = path_zones(planned_moves(requirements, first, last), records, requirements.setup.scenario.terrain)
+    met = np.flatnonzero((planned["depth"] > 0.0) | planned["unknown"])
+    return [_touched(requirements, int(numbers[k]), planned[k], None) for k in met.tolist()]
 
 
 def _kept(requirements: RouteRequirements, planned: Records, flown: Records | None) -> Finding:

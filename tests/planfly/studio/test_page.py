@@ -400,9 +400,9 @@ def test_a_phone_drags_by_touch(studio: Studio, tmp_path: Path) -> None:
 
 
 def test_a_drag_is_coloured_in_time(page: Browser) -> None:
-    from benchmarks.studio import DRAG
+    from benchmarks.studio import DRAG, timed
 
-    moves = page.value(DRAG % {"mark": 3, "moves": 40})
+    moves = timed(page.value(DRAG % {"mark": 3, "moves": 40}))
     page.call("Page.reload")
     assert len(moves) == 40
     assert sorted(moves)[37] < 1000.0 * at_most(0.15)

@@ -2,6 +2,7 @@
 
 import base64
 import contextlib
+import gc
 import http.client
 import json
 import socket
@@ -9,6 +10,7 @@ import string
 from collections.abc import Iterator
 
 import numpy as np
+import psutil
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
@@ -17,9 +19,11 @@ from flight.mission_files.formats import mission_text
 from planfly.studio import connections, messages
 from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import PageProgram, Served, served
-from tests.soak import note, scaled
+from tests.soak import SOAK, note, scaled
 
-FUZZED = scaled(2000, 24)
+FUZZED, EDITED = scaled(2000, 24), scaled(1000, 25)
+# Edits before memory is looked at; what more it may be, MB.
+WARM, MOST_MEMORY = 5, 100.0 if SOAK else 20.0
 
 
 @pytest.fixture(scope="module")
@@ -261,6 +265,27 @@ def test_no_message_ends_the_server(studio: Served) -> None:
     with studio.page() as page:
         assert page.until("sheet")["name"] == "m.waypoints"
     note("studio: fuzzed messages", messages=FUZZED, closed=closed, servers_ended=0)
+
+
+def test_edits_take_little_memory(studio: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not SOAK:
+        monkeypatch.setattr("planfly.studio.jobs.Jobs.fly", lambda self, session: None)
+    rng, process, taken = np.random.default_rng(3), psutil.Process(), list[float]()
+    with studio.page() as page:
+        sheet = page.until("sheet")
+        items = [one for one in sheet["items"] if one["what"] == "waypoint"]
+        for number in range(WARM + EDITED):
+            if number in (WARM, WARM + EDITED - 1):
+                gc.collect()
+                taken.append(process.memory_info().rss / 2**20)
+            item = items[int(rng.integers(len(items)))]
+            east, north = (np.array(item["at"][:2]) + rng.normal(0.0, 20.0, 2)).tolist()
+            page.send(kind="move", rev=sheet["rev"], k=item["k"], east=east, north=north)
+            sheet = page.until("sheet")
+        page.send(kind="open", name="m.waypoints")
+        page.until("sheet", changed=False)
+    note("studio: memory after edits", edits=EDITED, more_mb=round(taken[1] - taken[0], 1))
+    assert taken[1] - taken[0] <= MOST_MEMORY
 
 
 def test_a_long_work_is_stopped(studio: Served) -> None:

@@ -1,6 +1,8 @@
 """The verdict about a moved item is the whole one's there, and beyond it nothing has changed."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -10,13 +12,15 @@ from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import geometric_findings
-from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.studio import edits
 from planfly.studio.moved_route import moved_route
 from planfly.studio.session import Session
+from planfly.studio.states import violated_legs
 from planfly.studio.windows import judge_windows
 from tests.planfly.studio.drafts import drawn_session
 from tests.soak import note, scaled
+from world.airspace.zones import Cylinder, Zone
 from world.errors import MissionError
 
 MISSIONS, MOVED = scaled(1000, 5), scaled(300, 6)
@@ -89,6 +93,42 @@ def test_windows_say_what_the_whole_says() -> None:
     assert windowed >= MISSIONS // 2
     assert compared > 20 * MISSIONS
     note("studio: windows against the whole", missions=MISSIONS, windowed=windowed, compared=compared, differing=0)
+
+
+def fenced(
+    requirements: RouteRequirements, findings: Sequence[Finding], begin: int
+) -> tuple[dict[int, set[int]], set[int]]:
+    """The zones that are violated on each leg, and those that are more than once."""
+    legs, again = dict[int, set[int]](), set[int]()
+    for item in findings:
+        if item.rule == "fence" and item.ok is False and item.place.index is not None:
+            again |= {item.place.index} if " times" in item.reason else set()
+            for leg in violated_legs(requirements, item):
+                legs.setdefault(leg + begin, set()).add(item.place.index)
+    return legs, again
+
+
+def test_windows_violate_the_zones_that_the_whole_does() -> None:
+    rng, found = np.random.default_rng(4), 0
+    session = drawn_session(11, 30, jumps=False)
+    (west, east), (south, north) = session.desk.scenario.bounds.tolist()
+    places = np.column_stack([rng.uniform(west, east, 400), rng.uniform(south, north, 400)]).tolist()
+    zones = [Zone(str(k), "exclusion", Cylinder(x, y, 120.0)) for k, (x, y) in enumerate(places)]
+    zones.append(Zone("stay", "inclusion", Cylinder(0.0, 0.0, 0.7 * east)))
+    desk = replace(session.desk, scenario=replace(session.desk.scenario, zones=tuple(zones)))
+    for k in edits.places(session.mission)[::6]:
+        x, y = places[min(range(400), key=lambda one: math.dist(places[one], session.place_of(k)[:2]))]
+        mission = edits.moved(session.mission, k, *desk.geographic(x, y))
+        _, windows = judge_windows(desk, mission, k)
+        whole = route_requirements(desk.setup(mission))
+        legs, again = fenced(whole, geometric_findings(whole), 0)
+        for one in windows:
+            seen, _ = fenced(one.requirements, one.findings, one.begin)
+            for leg in range(one.first, one.last):
+                # A zone that is entered twice is violated from the first time to the last for the whole.
+                assert seen.get(leg, set()) - again == legs.get(leg, set()) - again
+                found += len(seen.get(leg, ()))
+    assert found >= 5
 
 
 def test_a_moved_route_is_the_one_that_is_laid() -> None:
