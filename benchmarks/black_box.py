@@ -1,8 +1,9 @@
 """`planfly.optimise` on black boxes of others, beside the defaults of pymoo and cmaes.
 
-``python -m benchmarks.black_box functions [--seeds N]``: functions of the CEC 2005 kind (Suganthan et al., Nanyang
-Technological University 2005) in 20 variables, each moved and turned by a seed of its own, 100,000 evaluations; the
-median error of each method.
+``python -m benchmarks.black_box [--seeds N] functions``: functions of the CEC 2005 kind (Suganthan et al., Nanyang
+Technological University 2005) in 20 variables, each moved and turned by a seed of its own; the median error of each
+method.  Three seeds take four minutes of CPU.  Each result is kept in ``--kept FILE`` as it comes, and not computed
+again; a line of progress for each function goes to the standard error.
 
 ``python -m benchmarks.black_box paths TERRAIN [--seeds N]``: the cost of Phung and Ha, "Safety-enhanced UAV path
 planning with spherical vector-based particle swarm optimization", Applied Soft Computing 107, 2021, on the scenario
@@ -12,7 +13,10 @@ variables); the same with climb angles (30); and offsets from the straight line,
 """
 
 import argparse
+import json
 import math
+import sys
+import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -29,6 +33,9 @@ Floats = NDArray[np.float64]
 Cost = Callable[[Floats], Floats]
 
 VARIABLES, EVALUATIONS = 20, 100_000
+# Of each method on a function.
+ON_FUNCTIONS = 50_000
+KEPT = Path("runs") / "black-box-functions.json"
 MODELS: tuple[Model, ...] = ("multistart", "umda", "emna", "differential")
 # Seeds on which nothing was tuned begin here.
 FIRST_SEED = 100
@@ -189,7 +196,7 @@ def functions(seed: int) -> dict[str, Cost]:
 def by_model(model: Model, cost: Cost, seed: int) -> float:
     """Least value by `planfly.optimise`."""
     search = planfly.optimise([-5.0] * VARIABLES, [5.0] * VARIABLES, model=model, seed=seed)
-    return search.minimise(cost, evaluations=EVALUATIONS).value
+    return search.minimise(cost, evaluations=ON_FUNCTIONS).value
 
 
 def by_cmaes(cost: Cost, seed: int) -> float:
@@ -199,7 +206,7 @@ def by_cmaes(cost: Cost, seed: int) -> float:
     bounds, rng = np.tile([-5.0, 5.0], (VARIABLES, 1)), np.random.default_rng(seed)
     search = CMA(mean=np.zeros(VARIABLES), sigma=10.0 / 6.0, bounds=bounds, seed=seed)
     least, evaluations = math.inf, 0
-    while evaluations < EVALUATIONS:
+    while evaluations < ON_FUNCTIONS:
         if search.should_stop():
             mean = rng.uniform(-5.0, 5.0, VARIABLES)
             search = CMA(mean=mean, sigma=10.0 / 6.0, bounds=bounds, seed=int(rng.integers(2**31)))
@@ -225,22 +232,31 @@ def by_pymoo(name: str, cost: Cost, seed: int) -> float:
         def _evaluate(self, x: Floats, out: dict[str, Floats], *_: object, **__: object) -> None:
             out["F"] = cost(x)
 
-    found = minimize(Box(), {"DE": DE, "GA": GA, "PSO": PSO}[name](), ("n_eval", EVALUATIONS), seed=seed)
+    found = minimize(Box(), {"DE": DE, "GA": GA, "PSO": PSO}[name](), ("n_eval", ON_FUNCTIONS), seed=seed)
     return float(found.F[0])
 
 
-def measure_functions(seeds: int) -> None:
-    """Print the median error of every method on every function."""
+def measure_functions(seeds: int, kept: Path) -> None:
+    """Print the median error of every method on every function, with what is kept of earlier runs."""
     methods: dict[str, Callable[[Cost, int], float]] = {model: partial(by_model, model) for model in MODELS}
     methods |= {"cmaes": by_cmaes} | {f"pymoo {name}": partial(by_pymoo, name) for name in ("DE", "GA", "PSO")}
-    print(f"functions in {VARIABLES} variables: median error after {EVALUATIONS:,} evaluations, {seeds} seeds")
-    print(f"{'':12s}" + "".join(f"{name:>13s}" for name in methods))
+    kept.parent.mkdir(exist_ok=True)
+    known: dict[str, float] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
+    print(f"functions in {VARIABLES} variables: median error after {ON_FUNCTIONS:,} evaluations, {seeds} seeds")
+    print(f"{'':12s}" + "".join(f"{name:>13s}" for name in methods), flush=True)
     for function in functions(FIRST_SEED):
-        row = [
-            np.median([method(functions(seed)[function], seed) for seed in range(FIRST_SEED, FIRST_SEED + seeds)])
-            for method in methods.values()
-        ]
+        row, began = [], time.process_time()
+        for name, method in methods.items():
+            values = []
+            for seed in range(FIRST_SEED, FIRST_SEED + seeds):
+                key = f"{function}, {name}, {ON_FUNCTIONS}, {seed}"
+                if key not in known:
+                    known[key] = method(functions(seed)[function], seed)
+                    kept.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
+                values.append(known[key])
+            row.append(float(np.median(values)))
         print(f"{function:12s}" + "".join(f"{value:13.2g}" for value in row), flush=True)
+        print(f"  {function}: {time.process_time() - began:.0f} s of CPU", file=sys.stderr, flush=True)
 
 
 def main() -> None:
@@ -248,13 +264,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.black_box")
     parser.add_argument("--seeds", type=int, default=10)
     parts = parser.add_subparsers(dest="part", required=True)
-    parts.add_parser("functions")
+    parts.add_parser("functions").add_argument("--kept", type=Path, default=KEPT, help="file that keeps the results")
     parts.add_parser("paths").add_argument("terrain", type=Path)
     args = parser.parse_args()
     if args.part == "paths":
         measure_paths(args.terrain, args.seeds)
     else:
-        measure_functions(args.seeds)
+        measure_functions(args.seeds, args.kept)
 
 
 if __name__ == "__main__":

@@ -95,7 +95,9 @@ def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str],
     )
     record: dict[str, Any] = {"instances": len(tasks), "runs": runs, "solvable": int(solvable.sum())}
     rows = [(name, ratios[row], seconds[row]) for row, name in enumerate(algorithms)]
-    for name, found, spent in [*rows, ("the reference", reference[:, None], np.full((len(tasks), 1), np.nan))]:
+    if by_reference.any():
+        rows.append(("the reference", reference[:, None], np.full((len(tasks), 1), np.nan)))
+    for name, found, spent in rows:
         over = found / best[:, None]
         safe, solved = over[np.isfinite(over)], np.isfinite(over[by_reference])
         entry = record[name] = {
@@ -115,7 +117,9 @@ def measure(tasks: Sequence[Task], reference: Floats, algorithms: Sequence[str],
 
 def print_worst(names: Sequence[str], record: dict[str, Any], algorithm: str) -> None:
     """One line for each instance that an algorithm solves by a long path, slowly, or not at all."""
-    entry, solved = record[algorithm], np.isfinite(record["the reference"]["ratios"])[:, 0]
+    entry = record[algorithm]
+    # Without the reference nothing is known to have a path.
+    solved = np.isfinite(record["the reference"]["ratios"])[:, 0] if "the reference" in record else [False] * len(names)
     for name, over, spent, known in zip(names, entry["ratios"], entry["seconds"], solved, strict=True):
         if max(spent) > SLOW or (known and not max(over) <= 1.0 + LONG):
             print(f"    {name}: / best {' '.join(f'{ratio:.4f}' for ratio in over)}; CPU {max(spent):.2f} s")

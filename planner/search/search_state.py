@@ -75,6 +75,8 @@ Improved = Callable[[Floats], None]
 ARCHIVE_SIZE = 24
 # Additional margins to spheres and ground, m, with which a path is shortened until it is certified.
 EXTRA_MARGINS = (0.1, 2.0)
+# The same for further attempts from the first path, with corners as flown, where legs have to hold their turns.
+CORNER_MARGINS = (2.0, 5.0)
 # What a search keeps from missiles in gaps that are too narrow for its usual margin, beside the certificate's, m.
 NARROW_RESERVE = 1.0
 # Evaluations that `tighten` may take: with less budget left it is skipped.
@@ -245,11 +247,18 @@ class Search:
 
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""
-        for extra_margin in EXTRA_MARGINS:
+        attempts = [(margin, False) for margin in EXTRA_MARGINS]
+        if self.problem.search.legs_hold_turns:
+            attempts += [(margin, True) for margin in CORNER_MARGINS]
+        first = path
+        for extra_margin, corners_too in attempts:
+            path = first if corners_too else path
             if self._budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
-            path, made = shorten_path(self.problem.search, path, extra_margin=extra_margin, pause=self.pause)
+            path, made = shorten_path(
+                self.problem.search, path, extra_margin=extra_margin, corners_too=corners_too, pause=self.pause
+            )
             self.evaluations += made
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight():
                 return False

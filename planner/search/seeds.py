@@ -27,7 +27,7 @@ from planner.search.search_state import Search, SearchEnded, best_first, safe
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
 from planner.seeding.lattice import lattice_route, turning_step
-from planner.seeding.shortening import resample
+from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
 from world.geometry import path_length
@@ -189,6 +189,8 @@ MAX_ROUTE_SHARE = 0.99
 # evaluations after each move of all waypoints; scales of these moves relative to those of fitting, and rounds.
 FIRST_SEARCHES, FIRST_SEARCH, LATER_SEARCH = 4, 500, 600
 MOVES, ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
+# Where no shortened path is certified, another is followed that was shortened with these additional margins, m.
+FOLLOWED_MARGINS = (2.0, 5.0, 2.0)
 
 
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
@@ -216,16 +218,32 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
         already_safe = search.finished(found[1])
         if already_safe and path_length(route) > MAX_ROUTE_SHARE * path_length(found[0]):
             break
-        path, certificate = _search_along(search, route)
+        path, certificate, shortened = _search_along(search, route)
         if search.finished(certificate) and (not already_safe or path_length(path) < path_length(found[0])):
-            return path, certificate
+            return (path, certificate) if shortened else _follow_shortened(search, (path, certificate))
         if not already_safe and (certificate.ok, certificate.kill_distance) > (found[1].ok, found[1].kill_distance):
             found = path, certificate
     return found
 
 
-def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
-    """The best path found in a frame along a route (k, 3), and its certificate."""
+def _follow_shortened(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
+    """The best path along what shortening makes of a path, if it is shorter: shortening alone broke a constraint."""
+    if not search.shortens:
+        return found
+    for extra_margin in FOLLOWED_MARGINS:
+        if search.must_end():
+            break
+        path = resample(found[0], search.encoding.waypoints)
+        route, made = shorten_path(search.problem.search, path, extra_margin=extra_margin, corners_too=True)
+        search.evaluations += made
+        path, certificate, _ = _search_along(search, route)
+        if search.finished(certificate) and path_length(path) < path_length(found[0]):
+            found = path, certificate
+    return found
+
+
+def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
+    """The best path found in a frame along a route (k, 3), its certificate, and whether shortening has made it."""
     waypoints = search.encoding.waypoints
     pieces, _ = sample_route(route, waypoints - 1)
     encoding = route_encoding(search.problem.space, pieces[:, :2])
@@ -246,7 +264,7 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
     with suppress(SearchEnded):
         _improve_along(inner, vector, (path, route))
     search.evaluations, search.ended = inner.evaluations, inner.ended
-    return inner.best_path()
+    return *inner.best_path(), inner.shortest is not None
 
 
 def _improve_along(inner: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:

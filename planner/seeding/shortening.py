@@ -73,25 +73,27 @@ def _newton_step(
 
 
 class Shortening(NamedTuple):
-    """State: path (w, 3) m, active constraints, their multipliers, rounds done, and models evaluated."""
+    """State: path (w, 3) m, active constraints, their multipliers, rounds done, models evaluated, and `corners_too`."""
 
     path: Floats
     active: ActiveConstraints
     multipliers: Floats
     rounds: int
     models: int
+    corners_too: bool
 
 
 @compiled
 def begin_shortening(
-    data: ProblemArrays, path: Floats, samples: int, extra_margin: float
+    data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> Shortening:  # pragma: no cover - compiled
     """The shortening of a path (w, 3) m before its first round.
 
-    samples: of the ground on each leg. extra_margin: additional margin to spheres and ground, m.
+    samples: of the ground on each leg. extra_margin: additional margin to spheres and ground, m. corners_too: see
+    `active_constraints`.
     """
-    active = active_constraints(data, path, samples, extra_margin)
-    return Shortening(path.copy(), active, np.zeros(constraint_count(active)), 0, 0)
+    active = active_constraints(data, path, samples, extra_margin, corners_too)
+    return Shortening(path.copy(), active, np.zeros(constraint_count(active)), 0, 0, corners_too)
 
 
 class _Descent(NamedTuple):
@@ -110,7 +112,7 @@ def continue_shortening(
     data: ProblemArrays, under_way: Shortening, extra_margin: float, max_rounds: int
 ) -> Shortening:  # pragma: no cover - compiled
     """The shortening after up to `max_rounds` further rounds."""
-    here, active, multipliers, number, made = under_way
+    here, active, multipliers, number, made, corners_too = under_way
     limits, size = precompute_limits(data), 3 * (here.shape[0] - 2)
     descent = _Descent(
         np.array([data.west, data.south, data.floor]),
@@ -123,7 +125,7 @@ def continue_shortening(
     last = min(ROUNDS, number + max_rounds)
     while number < last:
         if number > 0:
-            renewed = active_constraints(data, here, active.samples, extra_margin)
+            renewed = active_constraints(data, here, active.samples, extra_margin, corners_too)
             multipliers = carry_multipliers(active, multipliers, renewed)
             active = renewed
         penalty = FIRST_PENALTY * (LAST_PENALTY / FIRST_PENALTY) ** (number / (ROUNDS - 1))
@@ -132,7 +134,7 @@ def continue_shortening(
         for k in range(values.size):
             multipliers[k] = max(0.0, multipliers[k] - penalty * values[k])
         number += 1
-    return Shortening(here, active, multipliers, number, made)
+    return Shortening(here, active, multipliers, number, made, corners_too)
 
 
 @inner
@@ -186,12 +188,18 @@ PAIRS_AT_ONCE = 400_000
 
 
 def shorten_path(
-    data: ProblemArrays, path: Floats, *, extra_margin: float = EXTRA_MARGIN, pause: Callable[[], None] = lambda: None
+    data: ProblemArrays,
+    path: Floats,
+    *,
+    extra_margin: float = EXTRA_MARGIN,
+    corners_too: bool = False,
+    pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
     """A path (w, 3) world m, shorter or with smaller violations than this one, and the number of models evaluated.
 
     A model counts as an evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
     milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
+    corners_too: whether corners as flown are held clear of the ground and below the steepest slopes, which is slower.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -209,7 +217,7 @@ def shorten_path(
     start = np.array(path, dtype=np.float64)
     # A grid's route ends at the height of a layer.
     start[0], start[-1] = data.start, data.destination
-    under_way: Shortening = begin_shortening(data, start, samples, extra_margin)
+    under_way: Shortening = begin_shortening(data, start, samples, extra_margin, corners_too)
     while under_way.rounds < ROUNDS:
         under_way = continue_shortening(data, under_way, extra_margin, min(ROUNDS, rounds))
         pause()

@@ -3,7 +3,8 @@
 The method of multipliers of Hestenes and Powell, in the form for inequalities of Rockafellar ("The multiplier method of
 Hestenes and Powell applied to convex programming", Journal of Optimization Theory and Applications 12, 1973): a
 constraint c >= 0 with multiplier m adds (max(0, m - p c)^2 - m^2) / 2 p to the length, and m becomes max(0, m - p c).
-Constraints are distances from missiles, heights above ground, slopes, turns, and lengths of legs against their turns.
+Constraints are distances from missiles, heights above ground, slopes, turns, and lengths of legs against their turns;
+where it is asked for, heights and slopes of flown corners too (`planner.seeding.flown_corners`).
 Their coefficients are computed once per round (`ActiveConstraints`). The curvature of the constraints is left out of
 the Hessian; a constraint couples at most four consecutive waypoints, so the Hessian is banded.
 """
@@ -30,6 +31,20 @@ from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_lim
 from planner.evaluation.problem import ProblemArrays, clearance_at
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, measure_lags
 from planner.evaluation.travel_cost import LegModel, model_leg
+from planner.seeding.flown_corners import (
+    NEAR_GROUND,
+    SAMPLES,
+    FlownCorners,
+    arc_room,
+    arc_room_slopes,
+    corner_point,
+    corner_slopes,
+    corners_near_ground,
+    ground_slopes,
+    height_above_required,
+    leg_of,
+    no_corners,
+)
 from world.frames import polymap
 from world.kernels import Records, copy_into, inner
 from world.terrain import pixel_height
@@ -55,7 +70,8 @@ class ActiveConstraints(NamedTuple):
     samples: number of ground samples on each leg. low: (w - 1,) height required above the clearance, m.
     climb, dive: (w - 1,) tangents. before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent
     of half the turn. roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
-    turns_in_legs: whether legs must hold their turns.
+    turns_in_legs: whether legs must hold their turns, and turn_margin: with how much beside them, m.
+    flown: the corners that are flown near the ground, or almost as steeply as can be.
     """
 
     pairs: Ints
@@ -68,13 +84,19 @@ class ActiveConstraints(NamedTuple):
     after: Floats
     roll: Floats
     turns_in_legs: bool
+    turn_margin: float
+    flown: FlownCorners
 
 
 @inner
 def active_constraints(
-    data: ProblemArrays, path: Floats, samples: int, extra_margin: float
+    data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> ActiveConstraints:  # pragma: no cover - compiled
-    """Active constraints near a path (w, 3); extra_margin: additional margin to spheres and ground, m."""
+    """Active constraints near a path (w, 3); extra_margin: additional margin to spheres and ground, m.
+
+    corners_too: whether flown corners are held clear of the ground and below the steepest slopes; legs then keep twice
+    the additional margin beside their turns.
+    """
     limits = precompute_limits(data)
     count = path.shape[0] - 1
     legs, corners, lags = np.zeros(count, dtype=LEG), np.zeros(count + 1, dtype=CORNER), np.zeros(count, HEIGHT_LAG)
@@ -94,7 +116,12 @@ def active_constraints(
     if data.legs_hold_turns:
         _turn_shares(data, limits, path, legs, before, after)
     pairs, distances = _near_missiles(data, path, corners, lags, extra_margin)
-    return ActiveConstraints(pairs, distances, samples, low, climb, dive, before, after, roll, data.legs_hold_turns)
+    flown = no_corners(path.shape[0], extra_margin)
+    turns = data.legs_hold_turns, TURN_MARGIN
+    if corners_too:
+        flown = corners_near_ground(data, limits, path, corners, lags, extra_margin)
+        turns = data.legs_hold_turns, max(TURN_MARGIN, 2.0 * extra_margin)
+    return ActiveConstraints(pairs, distances, samples, low, climb, dive, before, after, roll, *turns, flown)
 
 
 @inner
@@ -160,7 +187,7 @@ def _near_missiles(
 def constraint_count(active: ActiveConstraints) -> int:  # pragma: no cover - compiled
     """Number of constraints of `lagrangian`."""
     legs = active.low.size
-    count: int = active.pairs.shape[0] + legs * (active.samples + 4) + legs + 1
+    count: int = active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES)
     return count
 
 
@@ -194,8 +221,6 @@ TURN_LENGTH = 200.0
 SHORTEST_LEG = 15.0
 # Additional margin of slopes (m of height) and of leg lengths between turns, m: the accuracy that the last steps reach.
 SLOPE_MARGIN, TURN_MARGIN = 0.2, 1.0
-# Half-step of the finite difference for the ground's slope, m.
-GROUND_STEP = 8.0
 
 
 class LagrangianModel(NamedTuple):
@@ -330,22 +355,55 @@ def _add_ground(
             number = at + i * active.samples + k
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
-                column, row = polymap(to_pixel, x + GROUND_STEP, y)
-                rise = pixel_height(heights, column, row)
-                column, row = polymap(to_pixel, x - GROUND_STEP, y)
-                by_east = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
-                column, row = polymap(to_pixel, x, y + GROUND_STEP)
-                rise = pixel_height(heights, column, row)
-                column, row = polymap(to_pixel, x, y - GROUND_STEP)
-                by_north = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
-                first = slopes[0]
-                first[0], first[1], first[2] = -by_east, -by_north, 1.0
-                if math.isnan(by_east + by_north):
-                    first[0], first[1] = 0.0, 0.0
+                ground_slopes(data, x, y, slopes[0])
                 for axis in range(3):
                     slopes[1, axis] = share * slopes[0, axis]
                     slopes[0, axis] *= 1.0 - share
             merit += _add(value, i, 2, multipliers[number], penalty, model)
+    return merit
+
+
+@inner
+def _add_corners(
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    flown: FlownCorners,
+    path: Floats,
+    multipliers: Floats,
+    values: Floats,
+    penalty: float,
+    model: LagrangianModel,
+    at: int,
+) -> float:  # pragma: no cover - compiled
+    """Add the heights of flown corners above the required height, and lengths of steep arcs; see `_add_missiles`."""
+    merit, point, up, corner = 0.0, np.empty(3), np.empty(3), np.empty((3, 3))
+    for i in range(1, path.shape[0] - 1):
+        radius = flown.radii[i]
+        for k in range(3):
+            copy_into(corner[k], path[i - 1 + k])
+        for k in range(SAMPLES):
+            number = at + i * SAMPLES + k
+            values[number] = NEAR_GROUND
+            if radius <= 0.0:
+                continue
+            corner_point(data, corner[0], corner[1], corner[2], radius, k, point)
+            value = height_above_required(data, limits, point) - flown.lowered[i, leg_of(k)]
+            values[number] = value
+            if multipliers[number] - penalty * value > 0.0:
+                ground_slopes(data, point[0], point[1], up)
+                corner_slopes(data, corner, radius, k, up, point, model.slopes)
+            merit += _add(value, i - 1, 3, multipliers[number], penalty, model)
+        for k in range(2):
+            number, radius = at + path.shape[0] * SAMPLES + 2 * i + k, flown.steep_radii[i]
+            values[number] = NEAR_GROUND
+            if radius <= 0.0:
+                continue
+            sign, steepest = 1.0 - 2.0 * k, flown.slopes[i, k]
+            value = arc_room(corner[0], corner[1], corner[2], radius, sign, steepest) - flown.slope_margin
+            values[number] = value
+            if multipliers[number] - penalty * value > 0.0:
+                arc_room_slopes(corner, radius, sign, steepest, model.slopes)
+            merit += _add(value, i - 1, 3, multipliers[number], penalty, model)
     return merit
 
 
@@ -422,7 +480,7 @@ def _add_turns(
             slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * part, (1.0 - SETTLING_SHARE) * part
         _turn_slopes(of_before[i], of_after[i], -0.5 * active.after[i] * (1.0 + one * one), slopes[:3])
         _turn_slopes(of_before[i + 1], of_after[i + 1], -0.5 * active.before[i + 1] * (1.0 + two * two), slopes[1:])
-        values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - TURN_MARGIN
+        values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - active.turn_margin
         merit += _add(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit
 
@@ -460,4 +518,6 @@ def lagrangian(
     merit += _add_slopes(active, path, multipliers, values, penalty, model, at)
     at += 3 * (path.shape[0] - 1)
     merit += _add_turns(data, active, path, multipliers, values, penalty, model, at)
+    at += 2 * path.shape[0] - 1
+    merit += _add_corners(data, limits, active.flown, path, multipliers, values, penalty, model, at)
     return merit

@@ -17,7 +17,7 @@ from planner.search.search_state import Search
 from planner.search.seeds import MIN_DETOUR, search_other_sides, starting_vectors, straight_line
 from tests.instances import random_scenario
 from tests.soak import some
-from world.geometry import leg_courses
+from world.geometry import leg_courses, leg_runs
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, from_spec, load_scenario
 from world.scenario_file import parse_scenario
@@ -107,8 +107,12 @@ def test_where_the_way_is_nearly_straight_no_other_side_is_looked_for(
 # Traps: paths that turn back or go round, certified, and not looked for where a straight frame does.
 
 
-@pytest.mark.parametrize("name", ["trap-u", "trap-valley", "trap-wall", "trap-spiral"])
-def test_traps_are_left_by_ways_that_no_straight_frame_holds(
+# Lengths on the map by `benchmarks.traps.fine_grid`, m, and the share of them that a path may take.
+TRAPS = {"trap-u": (9389, 1.02), "trap-valley": (11431, 1.02), "trap-wall": (9732, 1.025), "trap-spiral": (14493, 1.06)}
+
+
+@pytest.mark.parametrize("name", TRAPS)
+def test_traps_are_left_by_short_ways_that_no_straight_frame_holds(
     name: str, make_limits: Callable[[Scenario], Limits]
 ) -> None:
     scenario = load_scenario(name)
@@ -116,6 +120,8 @@ def test_traps_are_left_by_ways_that_no_straight_frame_holds(
     assert plan.safe, plan.certificate.problems
     frame = rotated_frame(scenario.start, scenario.destination)
     assert np.diff(frame.rotate(plan.waypoints)[:, 0]).min() < -100.0
+    shortest, share = TRAPS[name]
+    assert leg_runs(plan.waypoints).sum() < share * shortest
 
 
 def test_the_spiral_goes_round(make_limits: Callable[[Scenario], Limits]) -> None:

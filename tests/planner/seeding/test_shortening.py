@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 def test_waypoints_stay_on_the_map_and_between_floor_and_ceiling() -> None:
     data = make_task("hard-60").problem.search._replace(ceiling=520.0, east=9700.0)
     start = resample(np.array([data.start, [9650.0, 3000.0, 515.0], data.destination]), 14)
-    path = continue_shortening(data, begin_shortening(data, start, 10, 0.0), 0.0, ROUNDS).path
+    path = continue_shortening(data, begin_shortening(data, start, 10, 0.0, False), 0.0, ROUNDS).path
     assert path[:, 2].max() <= 520.0
     assert path[:, 0].max() <= 9700.0
     np.testing.assert_array_equal(path[[0, -1]], start[[0, -1]])
@@ -41,7 +41,7 @@ def test_waypoints_stay_on_the_map_and_between_floor_and_ceiling() -> None:
 def test_no_round_moves_a_waypoint_further_than_its_steps() -> None:
     data = make_task("hard-60").problem.search
     start = resample(np.array([data.start, [2000.0, 8000.0, 590.0], data.destination]), 20)
-    under_way = begin_shortening(data, start, 10, 0.0)
+    under_way = begin_shortening(data, start, 10, 0.0, False)
     before = under_way.path.copy()
     for _ in range(ROUNDS):
         under_way = continue_shortening(data, under_way, 0.0, 1)

@@ -5,10 +5,12 @@ from typing import Literal
 import numpy as np
 import pytest
 
+from aircraft.tracking import no_tracking
 from benchmarks.task import make_task
 from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.evaluation.travel_cost import make_travel_cost, path_cost
+from planner.seeding.flown_corners import SAMPLES
 from planner.seeding.shortening import resample
 from planner.seeding.shortening_model import (
     BAND,
@@ -27,7 +29,7 @@ def bound_of(north: float = 0.0) -> tuple[np.ndarray, ActiveConstraints]:
     data = make_task("hard-60").problem.search
     path = resample(np.array([data.start, data.destination]), 8)
     path[1:-1, 1] += north
-    return path, active_constraints(data, path, 5, 0.0)
+    return path, active_constraints(data, path, 5, 0.0, False)
 
 
 def test_the_missiles_near_each_leg_are_those_within_reach_of_it() -> None:
@@ -52,7 +54,7 @@ def test_limits_of_slopes_and_what_is_wanted_are_the_problems_own() -> None:
     np.testing.assert_allclose(active.dive, np.tan(np.radians(24.5)))
     np.testing.assert_allclose(active.distances, data.missiles.missiles["radius"][active.pairs[:, 1]] + 15.0)
     assert not active.turns_in_legs
-    assert constraint_count(active) == len(active.pairs) + 7 * (5 + 4) + 8
+    assert constraint_count(active) == len(active.pairs) + 7 * (5 + 4) + 8 * (3 + SAMPLES)
 
 
 def test_turns_take_of_the_legs_what_a_corner_of_that_turn_takes() -> None:
@@ -61,7 +63,7 @@ def test_turns_take_of_the_legs_what_a_corner_of_that_turn_takes() -> None:
     data = task.problem.search
     path = resample(np.array([data.start, data.destination]), 8)
     path[3, 0] += 400.0
-    active = active_constraints(data, path, 5, 0.0)
+    active = active_constraints(data, path, 5, 0.0, False)
     assert active.turns_in_legs
     assert np.ptp(active.before[1:-1]) < 0.5 * active.before[1:-1].max()
     np.testing.assert_allclose(active.before[1:-1], active.after[1:-1])
@@ -91,12 +93,20 @@ def zigzag(data: ProblemArrays, share: float, waypoints: int = 9) -> np.ndarray:
     return path
 
 
-@pytest.mark.parametrize("name", ["hard-60", "jacksboro-air"])
-def test_the_gradient_is_that_of_the_augmented_length(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "corners"),
+    [("hard-60", ""), ("jacksboro-air", ""), ("jacksboro-air", "arcs"), ("jacksboro-air", "tracked")],
+)
+def test_the_gradient_is_that_of_the_augmented_length(name: str, corners: str) -> None:
     data = make_task(name).problem.search
+    if corners == "arcs":
+        data = data._replace(tracking=no_tracking())
     assert data.legs_hold_turns == (name == "jacksboro-air")
     path, limits = zigzag(data, 1.0 if name == "hard-60" else 0.3), precompute_limits(data)
-    active = active_constraints(data, path, 8, 0.5)
+    if corners:
+        # Along both legs of a corner, and so along its arc.
+        path[3, 2], path[5, 2] = path[4, 2] - 1000.0, path[4, 2] + 1000.0
+    active = active_constraints(data, path, 8, 0.5, bool(corners))
     # As if turns took far more of their legs: then these are too short.
     active = active._replace(before=40.0 * active.before, after=40.0 * active.after)
     count, size = constraint_count(active), 3 * (len(path) - 2)
@@ -121,8 +131,9 @@ def test_the_gradient_is_that_of_the_augmented_length(name: str) -> None:
     # Every kind of constraint is broken somewhere.
     pairs, legs = len(active.pairs), len(path) - 1
     ends = np.cumsum([pairs, legs * 8, 3 * legs, legs + 1, legs])
-    kinds = np.split(values, ends[:-1])
+    *kinds, heights, arcs = np.split(values, [*ends, ends[-1] + len(path) * SAMPLES])
     broken = [bool(kind.size > 0 and kind.min() < 0.0) for kind in kinds]
+    assert [kind.min() < 0.0 for kind in (heights, arcs)] == [bool(corners)] * 2
     # A number limits turns, or what legs have room for.
     assert broken == ([True, True, broken[2], False, True] if data.legs_hold_turns else [True, True, True, True, False])
 
@@ -134,7 +145,7 @@ def test_the_hessian_of_the_length_is_that_of_its_gradient() -> None:
     path, limits = zigzag(data, 1.0, 6), precompute_limits(data)
     # High above all of it nothing but the length is left.
     path[:, 2] += 5000.0
-    active = active_constraints(data, path, 4, 0.5)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
+    active = active_constraints(data, path, 4, 0.5, False)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
     count, size = constraint_count(active), 3 * (len(path) - 2)
     values, model = np.zeros(count), LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3)))
 
@@ -163,7 +174,7 @@ def test_the_gradient_of_time_and_energy_is_that_of_their_values(objective: Lite
     path, limits = zigzag(data, 0.1, 6), precompute_limits(data)
     # Far above all of it nothing but the cost is left.
     path[:, 2] += 1000.0
-    active = active_constraints(data, path, 4, 0.5)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
+    active = active_constraints(data, path, 4, 0.5, False)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
     active = active._replace(distances=np.zeros_like(active.distances))
     count, size = constraint_count(active), 3 * (len(path) - 2)
     values, model = np.zeros(count), LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3)))

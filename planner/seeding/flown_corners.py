@@ -1,0 +1,251 @@
+"""Heights and slopes of flown corners, with derivatives by the waypoints: what shortening keeps beside the legs.
+
+Round the end of a ridge a flight cuts its corners over higher ground than there is below the legs.  Without tracking
+error it is on the chords of fly-by arcs; with it, it is within a distance of the legs before and after the waypoint, to
+both sides.  These are the places that a certificate measures; samples of them are taken here.  An arc is shorter than
+the legs it replaces, and steeper: a way that climbs in circles has to climb less on them.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY
+from aircraft.tracking import corner_deviation
+from planner.evaluation.corners import ARC_STEP, fly_by_radii, half_blend_length
+from planner.evaluation.leg_constraints import PrecomputedLimits, slope_limits
+from planner.evaluation.problem import ProblemArrays, clearance_at
+from planner.evaluation.terrain_clearance import lag_at
+from world.frames import polymap
+from world.kernels import Records, inner
+from world.terrain import pixel_height
+
+Floats = NDArray[np.float64]
+
+# Samples of a corner: with tracking error along two legs, on both sides of each.
+ON_LEG = 4
+SAMPLES = 4 * ON_LEG
+# Corners that leave their legs by less, m, or come no nearer to the height that is required, m, are not sampled.
+MIN_DEPARTURE, NEAR_GROUND = 2.0, 60.0
+# The largest turn that is sampled, rad: at a half turn the tangent is infinite.
+MAX_TURN = 3.0
+# Half-steps of finite differences: of the ground, and of the place of a sample, m.
+GROUND_STEP, CORNER_STEP = 8.0, 0.5
+# Arcs that are flatter than this share of what can be flown are not constrained.
+STEEP = 0.8
+# Length of an arc that is kept beside what it needs to climb or sink, m, and as a share of the additional margin.
+ARC_MARGIN, ARC_SHARE = 1.0, 0.4
+
+
+class FlownCorners(NamedTuple):
+    """Corners of a path of w waypoints that are flown near the ground.
+
+    radii: (w,) of their turns, m; 0 for the others. lowered: (w, 2) what is flown below the legs before and after, m.
+    steep_radii: (w,) of the arcs that are almost as steep as can be flown; 0 for the others. slopes: (w, 2) tangents of
+    the steepest climb and dive there. slope_margin: of arcs, m of length.
+    """
+
+    radii: Floats
+    lowered: Floats
+    steep_radii: Floats
+    slopes: Floats
+    slope_margin: float
+
+
+@inner
+def no_corners(count: int, margin: float) -> FlownCorners:  # pragma: no cover - compiled
+    """None of so many corners; margin: additional, m."""
+    slope_margin = ARC_MARGIN + ARC_SHARE * margin
+    return FlownCorners(
+        np.zeros(count), np.full((count, 2), margin), np.zeros(count), np.zeros((count, 2)), slope_margin
+    )
+
+
+@inner
+def corners_near_ground(
+    data: ProblemArrays, limits: PrecomputedLimits, path: Floats, corners: Records, lags: Records, margin: float
+) -> FlownCorners:  # pragma: no cover - compiled
+    """The corners of a path (w, 3) that are flown near the ground; margin: additional, m."""
+    count = path.shape[0]
+    found, point = no_corners(count, margin), np.empty(3)
+    lowered = found.lowered
+    if data.fly_over:
+        return found
+    if data.legs_hold_turns and limits.slopes_by_aircraft:
+        _find_steep_arcs(data, path, corners, found)
+    radii = fly_by_radii(data, path)
+    for i in range(1, count - 1):
+        radius = corners[i].radius if data.tracking.has_error else radii[i]
+        if not 0.0 < radius < math.inf:
+            continue
+        before, after = _run(path[i - 1], path[i]), _run(path[i], path[i + 1])
+        if data.tracking.has_error:
+            if corners[i].excursion < MIN_DEPARTURE:
+                continue
+            begin = 1.0 - min(1.0, corners[i].before / before)
+            lowered[i, 0] += max(0.0, lag_at(lags[i - 1], begin), lag_at(lags[i - 1], 1.0))
+            lowered[i, 1] += max(0.0, lag_at(lags[i], 0.0), lag_at(lags[i], min(1.0, corners[i].after / after)))
+        else:
+            corner_point(data, path[i - 1], path[i], path[i + 1], radius, SAMPLES // 2, point)
+            if _run(point, path[i]) < MIN_DEPARTURE:
+                continue
+            change = abs((path[i, 2] - path[i - 1, 2]) / before - (path[i + 1, 2] - path[i, 2]) / after)
+            lowered[i, :] += 0.25 * change * change * half_blend_length(data.aircraft, path[i, 2])
+        for k in range(SAMPLES):
+            corner_point(data, path[i - 1], path[i], path[i + 1], radius, k, point)
+            if height_above_required(data, limits, point) < lowered[i, leg_of(k)] + NEAR_GROUND:
+                found.radii[i] = radius
+    return found
+
+
+@inner
+def _find_steep_arcs(
+    data: ProblemArrays, path: Floats, corners: Records, found: FlownCorners
+) -> None:  # pragma: no cover - compiled
+    """Fill radii and steepest slopes of the arcs that are almost as steep as can be flown, on either course."""
+    flat, step = np.zeros(3), np.zeros(3)
+    for i in range(1, path.shape[0] - 1):
+        if not 0.0 < corners[i].radius < math.inf or math.isinf(corners[i].tangent):
+            continue
+        climb, dive = math.inf, math.inf
+        flat[2] = path[i, 2]
+        for leg in (i - 1, i):
+            step[0], step[1], step[2] = path[leg + 1, 0] - path[leg, 0], path[leg + 1, 1] - path[leg, 1], path[i, 2]
+            up, down = slope_limits(data, flat, step)
+            climb, dive = min(climb, math.tan(up)), min(dive, math.tan(down))
+        found.slopes[i, 0], found.slopes[i, 1] = climb, dive
+        radius = corners[i].radius
+        arc = radius * min(MAX_TURN, 2.0 * math.atan(corners[i].tangent / radius))
+        for sign, steepest in ((1.0, climb), (-1.0, dive)):
+            if arc_room(path[i - 1], path[i], path[i + 1], radius, sign, steepest) < (1.0 - STEEP) * arc:
+                found.steep_radii[i] = radius
+
+
+@inner
+def arc_room(
+    before: Floats, at: Floats, after: Floats, radius: float, sign: float, steepest: float
+) -> float:  # pragma: no cover - compiled
+    """Length of the arc past the waypoint `at`, minus what it needs to climb (sign 1) or sink (-1) as it does, m.
+
+    Slopes are those of `aircraft.path_limits.arc_slope`; steepest: tangent of what can be flown.
+    """
+    run, on = _run(before, at), _run(at, after)
+    ux, uy, vx, vy = at[0] - before[0], at[1] - before[1], after[0] - at[0], after[1] - at[1]
+    turn = min(MAX_TURN, math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
+    rise = radius * math.tan(0.5 * turn) * ((at[2] - before[2]) / run + (after[2] - at[2]) / on)
+    room: float = radius * turn - sign * rise / steepest
+    return room
+
+
+@inner
+def leg_of(sample: int) -> int:  # pragma: no cover - compiled
+    """Whether a sample belongs to the leg before (0) or after (1) its corner."""
+    leg: int = 2 * sample // SAMPLES
+    return leg
+
+
+@inner
+def _run(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
+    return max(1e-3, math.hypot(b[0] - a[0], b[1] - a[1]))
+
+
+@inner
+def height_above_required(
+    data: ProblemArrays, limits: PrecomputedLimits, point: Floats
+) -> float:  # pragma: no cover - compiled
+    """Height of a point (3,) above the lowest that is allowed there, m; NaN off the terrain."""
+    column, row = polymap(data.to_pixel, point[0], point[1])
+    ground: float = pixel_height(data.heights, column, row)
+    height: float = point[2] - ground - clearance_at(limits.required, point[0], point[1])
+    return height
+
+
+@inner
+def corner_point(
+    data: ProblemArrays, before: Floats, at: Floats, after: Floats, radius: float, sample: int, out: Floats
+) -> None:  # pragma: no cover - compiled
+    """Fill the place (3,) of a sample of the corner at the waypoint `at`, whose turn has this radius, m.
+
+    Heights are those of the legs, or of the arc between its tangent points, and not lowered.
+    """
+    run, on = _run(before, at), _run(at, after)
+    ux, uy = (at[0] - before[0]) / run, (at[1] - before[1]) / run
+    vx, vy = (after[0] - at[0]) / on, (after[1] - at[1]) / on
+    climb, on_climb = (at[2] - before[2]) / run, (after[2] - at[2]) / on
+    cross = ux * vy - uy * vx
+    turn = min(MAX_TURN, math.atan2(abs(cross), ux * vx + uy * vy))
+    if data.tracking.has_error:
+        speed = math.sqrt(radius * GRAVITY * data.aircraft.tan_max_bank)
+        aside, length_before, length_after = corner_deviation(data.tracking, turn, speed)
+        tangent = radius * math.tan(0.5 * turn)
+        side = aside if sample % 2 == 0 else -aside
+        share = (sample // 2 % ON_LEG) / (ON_LEG - 1.0)
+        if leg_of(sample) == 0:
+            ahead = -share * min(run, max(tangent, length_before))
+            out[0], out[1] = at[0] + ux * ahead - uy * side, at[1] + uy * ahead + ux * side
+            out[2] = at[2] + ahead * climb
+        else:
+            ahead = share * min(on, max(tangent, length_after))
+            out[0], out[1] = at[0] + vx * ahead - vy * side, at[1] + vy * ahead + vx * side
+            out[2] = at[2] + ahead * on_climb
+        return
+    share = (sample + 1.0) / (SAMPLES + 1.0)
+    tangent, side = radius * math.tan(0.5 * turn), 1.0 if cross >= 0.0 else -1.0
+    # The middles of the chords are this far from the centre; the arc is further.
+    inside = radius * math.cos(0.5 * ARC_STEP)
+    ahead, aside = inside * math.sin(share * turn) - tangent, side * (radius - inside * math.cos(share * turn))
+    out[0], out[1] = at[0] + ux * ahead - uy * aside, at[1] + uy * ahead + ux * aside
+    out[2] = at[2] - tangent * climb + share * tangent * (climb + on_climb)
+
+
+@inner
+def corner_slopes(
+    data: ProblemArrays, corner: Floats, radius: float, sample: int, up: Floats, point: Floats, slopes: Floats
+) -> None:  # pragma: no cover - compiled
+    """Fill the derivatives (3, 3), by the waypoints of a corner (3, 3), of a value that rises by `up` (3,) at a sample.
+
+    point: scratch (3,).
+    """
+    for row in range(3):
+        for axis in range(3):
+            place, slopes[row, axis] = corner[row, axis], 0.0
+            for sign in (1.0, -1.0):
+                corner[row, axis] = place + sign * CORNER_STEP
+                corner_point(data, corner[0], corner[1], corner[2], radius, sample, point)
+                for k in range(3):
+                    slopes[row, axis] += sign * up[k] * point[k] / (2.0 * CORNER_STEP)
+            corner[row, axis] = place
+
+
+@inner
+def arc_room_slopes(
+    corner: Floats, radius: float, sign: float, steepest: float, slopes: Floats
+) -> None:  # pragma: no cover - compiled
+    """Fill the derivatives (3, 3) of `arc_room` by the waypoints of a corner (3, 3)."""
+    for row in range(3):
+        for axis in range(3):
+            place, slopes[row, axis] = corner[row, axis], 0.0
+            for way in (1.0, -1.0):
+                corner[row, axis] = place + way * CORNER_STEP
+                room = arc_room(corner[0], corner[1], corner[2], radius, sign, steepest)
+                slopes[row, axis] += way * room / (2.0 * CORNER_STEP)
+            corner[row, axis] = place
+
+
+@inner
+def ground_slopes(data: ProblemArrays, x: float, y: float, out: Floats) -> None:  # pragma: no cover - compiled
+    """Fill the derivatives (3,) of the height above ground at a place; 0 across where they are not known."""
+    heights, to_pixel = data.heights, data.to_pixel
+    column, row = polymap(to_pixel, x + GROUND_STEP, y)
+    rise = pixel_height(heights, column, row)
+    column, row = polymap(to_pixel, x - GROUND_STEP, y)
+    by_east = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
+    column, row = polymap(to_pixel, x, y + GROUND_STEP)
+    rise = pixel_height(heights, column, row)
+    column, row = polymap(to_pixel, x, y - GROUND_STEP)
+    by_north = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
+    out[0], out[1], out[2] = -by_east, -by_north, 1.0
+    if math.isnan(by_east + by_north):
+        out[0], out[1] = 0.0, 0.0
