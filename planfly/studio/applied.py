@@ -6,6 +6,7 @@ the finding asks for.  What a suggestion asks of the aircraft, such as a larger 
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from flight.mission.items import LANDINGS, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
-from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import Change, Suggestion
 from planfly.studio.desk import Desk, Judged
 from planfly.studio.edits import at_height, at_speed, moved, places
@@ -40,6 +41,9 @@ _PATH = (
 _SIDES = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0), "west": (-1.0, 0.0)}
 # Steps in which a turn is made gentler, as shares of the way to the straight line.
 _TURN_STEPS = 40
+# Changes by a step, m, which are made again while the finding fails: so often, and by so much more than is asked then.
+_STEPS = frozenset(("height", "descent", "inset", "distance", *_SIDES))
+_MOST_STEPS, _FURTHER, _AND = 10, 1.5, 2.0
 
 
 def can_apply(suggestion: Suggestion) -> bool:
@@ -55,11 +59,43 @@ def can_apply(suggestion: Suggestion) -> bool:
 
 
 def apply_suggestion(desk: Desk, judged: Judged, requirements: RouteRequirements, item: Finding, which: int) -> Mission:
-    """The mission with a suggestion of a finding made.  Raises MissionError where no item can be moved for it."""
+    """The mission with a suggestion of a finding made, until that finding passes.
+
+    A step that the path is to make is the least: where an item moves by so much, its path moves by less.  What is still
+    to do is done in further steps.  Raises MissionError where no item can be moved for it.
+    """
     if not 0 <= which < len(item.suggestions) or not can_apply(item.suggestions[which]):
         raise MissionError(f"{judged.mission.source}: this suggestion is no change of its items", field="suggestion")
-    sheet = _Sheet(desk, judged, requirements)
-    for change in item.suggestions[which]:
+    suggestion = item.suggestions[which]
+    # One waypoint alone first: each that moves may fail elsewhere.
+    counts = (1, None) if any(change.what == "distance" for change in suggestion) else (None,)
+    made = [_mended(desk, judged, requirements, item, suggestion, most) for most in counts]
+    return min(made, key=lambda one: len(one.verdict.failed)).mission
+
+
+def _mended(
+    desk: Desk, judged: Judged, requirements: RouteRequirements, item: Finding, suggestion: Suggestion, most: int | None
+) -> Judged:
+    """The mission with a suggestion made as often as its finding needs it, and judged.  most: waypoints that move."""
+    kinds = [change.what for change in suggestion]
+    judged = desk.judge(_changed(desk, judged, requirements, item, suggestion, most))
+    for _ in range(_MOST_STEPS if set(kinds) <= _STEPS else 0):
+        left = [one for one in judged.verdict.failed if (one.rule, one.place) == (item.rule, item.place)]
+        alike = [(one, more) for one in left for more in one.suggestions if [change.what for change in more] == kinds]
+        if not alike:
+            break
+        one, more = alike[0]
+        further = tuple(replace(change, wanted=_FURTHER * change.wanted + _AND) for change in more)
+        judged = desk.judge(_changed(desk, judged, route_requirements(judged.setup), one, further, most))
+    return judged
+
+
+def _changed(
+    desk: Desk, judged: Judged, requirements: RouteRequirements, item: Finding, suggestion: Suggestion, most: int | None
+) -> Mission:
+    """The mission with each change of a suggestion made once.  Raises MissionError where none moves an item."""
+    sheet = _Sheet(desk, judged, requirements, most)
+    for change in suggestion:
         _CHANGES[change.what](sheet, change, item)
     if not sheet.changed:
         raise MissionError(
@@ -71,9 +107,9 @@ def apply_suggestion(desk: Desk, judged: Judged, requirements: RouteRequirements
 class _Sheet:
     """A mission whose items are moved one after the other."""
 
-    def __init__(self, desk: Desk, judged: Judged, requirements: RouteRequirements) -> None:
+    def __init__(self, desk: Desk, judged: Judged, requirements: RouteRequirements, most: int | None) -> None:
         self.desk, self.mission, self.route = desk, judged.mission, judged.setup.route
-        self.requirements, self.changed = requirements, False
+        self.requirements, self.most, self.changed = requirements, most, False
 
     def index_of(self, waypoint: int) -> int | None:
         """The item of a waypoint of the route, by its place in the mission's list; None where it is of none."""
@@ -186,11 +222,11 @@ def _distance(sheet: _Sheet, change: Change, item: Finding) -> None:
     """The waypoints about a missile's sphere, moved away from it."""
     centre = sheet.desk.scenario.threats.position[change.place.index or 0]
     legs, points = violated_legs(sheet.requirements, item), sheet.points()
-    for k in sheet.ends_of(legs):
-        away = points[k, :2] - centre[:2]
-        length = float(np.hypot(*away))
-        if length > 1.0:
-            sheet.shift([k], np.array([*(change.wanted * away / length), 0.0]))
+    away = points[:, :2] - centre[:2]
+    length = np.hypot(away[:, 0], away[:, 1])
+    for k in sorted(sheet.ends_of(legs), key=lambda end: float(length[end]))[: sheet.most]:
+        if length[k] > 1.0:
+            sheet.shift([k], np.array([*(change.wanted * away[k] / length[k]), 0.0]))
 
 
 def _aside(sheet: _Sheet, change: Change, item: Finding) -> None:

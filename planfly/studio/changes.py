@@ -98,8 +98,8 @@ def same_items(before: Sequence[tuple[float, ...]], now: Sequence[tuple[float, .
     """
     found: dict[int, int] = {}
     # NaN is like no other number: what has none of a number has it in both.
-    plain = [[tuple(None if v != v else v for v in one) for one in side] for side in (before, now)]
-    for kind, a, a_end, b, b_end in SequenceMatcher(None, *plain, autojunk=False).get_opcodes():
+    old, new = ([tuple(None if v != v else v for v in one) for one in side] for side in (before, now))
+    for kind, a, a_end, b, b_end in SequenceMatcher(a=old, b=new, autojunk=False).get_opcodes():
         if kind == "equal" or (kind == "replace" and a_end - a == b_end - b):
             found.update(zip(range(a, a_end), range(b, b_end), strict=True))
     return found

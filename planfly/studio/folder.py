@@ -26,9 +26,19 @@ def folder_json(folder: Path | None) -> Json:
     except OSError:
         return {"folder": "", "files": []}
     return {
-        "folder": str(inside),
+        "folder": shown_path(inside),
         "files": [one.name for one in found[:_MOST_FILES] if one.resolve().parent == inside],
     }
+
+
+def shown_path(path: Path) -> str:
+    """A path as people write it, whole, from their home if it is in there.
+
+    >>> shown_path(Path.home() / "missions"), shown_path(Path("/srv"))
+    ('~/missions', '/srv')
+    """
+    whole, home = path.resolve(), Path.home().resolve()
+    return str("~" / whole.relative_to(home)) if whole.is_relative_to(home) else str(whole)
 
 
 def file_inside(folder: Path | None, name: str) -> Path:

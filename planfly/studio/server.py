@@ -25,7 +25,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from planfly.studio import messages
 from planfly.studio.documents import open_document, open_dropped
-from planfly.studio.folder import file_inside, folder_json
+from planfly.studio.folder import file_inside, folder_json, shown_path
 from planfly.studio.ground_picture import ground_grid, ground_picture
 from planfly.studio.jobs import Jobs
 from planfly.studio.messages import read_message
@@ -294,7 +294,7 @@ class Server:
                 async with self._order:
                     saved = await self._judged(work)
                 content = "" if message.over else base64.b64encode(saved.data).decode()
-                where = str(session.document.path.resolve().parent) if message.over and session.document.path else ""
+                where = shown_path(session.document.path.parent) if message.over and session.document.path else ""
                 answer = {"name": saved.name, "losses": list(saved.losses), "where": where, "data": content}
                 page.send({"kind": "saved", **answer})
             case messages.Hello():

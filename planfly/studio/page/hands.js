@@ -15,7 +15,7 @@ export class Hands {
     root.addEventListener("pointermove", (event) => this.move(event));
     root.addEventListener("pointerup", (event) => this.up(event));
     root.addEventListener("pointercancel", (event) => this.up(event, true));
-    root.addEventListener("pointerleave", () => !this.drag && app.hint(null));
+    root.addEventListener("pointerleave", () => { if (!this.drag) app.leave(); });
     root.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     root.addEventListener("dblclick", (event) => event.preventDefault());
     root.addEventListener("focusin", (event) => {

@@ -384,6 +384,10 @@ const app = {
     if (!now.hint) requestAnimationFrame(drawHint);
     now.hint = { lines, x, y, state };
   },
+  leave() {
+    app.hint(null);
+    $("place").textContent = "";
+  },
   showPlace(east, north) {
     const ground = groundAt(now.grid, east, north);
     $("place").textContent = `${plain(east / 1000, 2)} km E, ${plain(north / 1000, 2)} km N${Number.isNaN(ground) ? "" : `, ground ${plain(ground)} m`}`;

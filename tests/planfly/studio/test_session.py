@@ -241,14 +241,16 @@ def test_a_mission_comes_back_from_its_data() -> None:
     assert mission_from(mission_data(mission), mission) == mission
 
 
-def test_a_suggestion_applied_mends_its_finding() -> None:
+@pytest.mark.parametrize(("rule", "by"), [("clearance", -90.0), ("threat", 150.0)])
+def test_a_suggestion_applied_mends_its_finding(rule: str, by: float) -> None:
+    """At once, though a path that goes round a corner moves by less than its waypoint."""
     session = drawn_session(5, 12)
-    session.edit(messages.Raise(kind="raise", rev=session.rev, by=-90.0))
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
     findings = session.judged.verdict.findings
-    number, item = next((n, i) for n, i in enumerate(findings) if i.rule == "clearance" and i.suggestions)
+    number, item = next((n, i) for n, i in enumerate(findings) if i.rule == rule and i.suggestions)
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
     after = [one for one in session.judged.verdict.findings if (one.rule, one.place) == (item.rule, item.place)]
-    assert [one.ok for one in after] == [True]
+    assert not [one for one in after if one.ok is False]
 
 
 def test_a_scenario_opens_with_its_straight_line() -> None:
