@@ -329,7 +329,8 @@ def test_a_path_is_planned_between_two_items(page: Browser) -> None:
     page.value("document.getElementById('plan-first').selectedIndex = 1")
     page.value("document.getElementById('plan-last').selectedIndex = 3")
     page.value("document.querySelector('#panel-plan .main').click()")
-    page.wait_for("document.querySelector('#panel-plan .card button') !== null")
+    # A search is long on a machine with other work.
+    page.wait_for("document.querySelector('#panel-plan .card button') !== null", 150.0)
     page.value("document.querySelector('#panel-plan .card button').click()")
     page.wait_for("document.getElementById('undo').title === 'Undo: plan a part'")
     undo_all(page)
