@@ -6,6 +6,10 @@ at the height of the start from a random direction: for length, for time and for
 in JSBSim, and the flown times and the energy used are compared with those of the shortest path. Settings are the
 wind's increase with height (none; 1 m/s every 100 m, about that of a power law with exponent 1/4 between 100 m and
 500 m) and the aircraft (the Aerosonde at 25 m/s, the X8 at 18 m/s).
+
+``--bound`` instead prints a time that no path can beat where the wind is the same at every height, over that of the
+shortest path: straight to the destination, through whatever stands there, at the true airspeed of the ceiling; and that
+of the fastest straight path that climbs there and sinks again, through whatever stands there.
 """
 
 import argparse
@@ -18,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import Limits, PerformanceTable
+from aircraft.path_limits import Limits, PerformanceTable, ground_speed_on
 from flight.mission.from_plan import plan_mission
 from planfly.airframe import load_airframe
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
@@ -112,6 +116,45 @@ def measure(name: str, first: int, count: int, *, planned: bool) -> list[dict[st
     return rows
 
 
+def _straight_seconds(scenario: Scenario, limits: Limits, course: float, level: float) -> float:
+    """Least time (s) of straight paths through whatever stands there, that climb, stay level and sink."""
+    table, (climb, dive) = limits.performance(), (np.tan(slope) for slope in limits.slopes(course, level))
+    start, destination = np.array(scenario.start), np.array(scenario.destination)
+    run, least = float(np.hypot(*(destination - start)[:2])), np.inf
+    for top in np.linspace(max(start[2], destination[2]), scenario.ceiling, 20):
+        for share in (0.1, 0.2, 0.35, 0.5, 0.75, 1.0):
+            up, down = (top - start[2]) / (share * climb * run), 1.0 - (top - destination[2]) / (share * dive * run)
+            if up < down:
+                path = start + np.array([0.0, up, down, 1.0])[:, None] * (destination - start)
+                path[1:3, 2] = top
+                least = min(least, _by_legs(limits, table, path)[0])
+    return least
+
+
+def bounds(name: str, first: int, count: int) -> Floats:
+    """Times (n, 2) that no path beats, over the shortest path's by its legs; prints them, and times it by length."""
+    assert SETTINGS[name]["gradient"] == 0.0
+    ratios, detours = np.full((count, 2), np.nan), np.full(count, np.nan)
+    for row, number in enumerate(range(first, first + count)):
+        scenario = mission(number, objective="length", **SETTINGS[name])
+        airframe = load_airframe(scenario)
+        plan, table = make_plan(scenario, airframe, SEED), airframe.limits.performance()
+        if not plan.safe:
+            continue
+        seconds, _ = _by_legs(airframe.limits, table, np.array(plan.waypoints))
+        step = scenario.destination[:2] - scenario.start[:2]
+        run, course = float(np.hypot(*step)), float(np.arctan2(*step))
+        level = float(0.5 * (scenario.start[2] + scenario.ceiling))
+        fastest = run / ground_speed_on(table, course, float(scenario.ceiling))
+        ratios[row] = fastest / seconds, _straight_seconds(scenario, airframe.limits, course, level) / seconds
+        detours[row] = plan.objectives[0]
+        print(f"  {number}  {ratios[row, 0]:.4f}  {ratios[row, 1]:.4f}  length ratio {detours[row]:.4f}", flush=True)
+    middle = np.nanmedian(ratios, axis=0)
+    print(f"{name}: no path beats {middle[0]:.4f}, nor a straight one {middle[1]:.4f}, medians of {count}")
+    print(f"  shortest path / straight line, median {np.nanmedian(detours):.4f}")
+    return ratios
+
+
 def _sum_up(rows: list[dict[str, Any]]) -> None:
     """Print medians and extremes of the ratios, and how many flights were not flyable."""
     for goal, column in (("time", "seconds"), ("energy", "energy")):
@@ -134,7 +177,13 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file for the rows")
     parser.add_argument("--setting", default="", help="only settings whose name contains this")
     parser.add_argument("--planned", action="store_true", help="by the legs of the plans alone, without flights")
+    parser.add_argument("--bound", action="store_true", help="what no path can beat in the same wind at every height")
     args = parser.parse_args()
+    if args.bound:
+        for name in SETTINGS:
+            if args.setting in name and SETTINGS[name]["gradient"] == 0.0:
+                bounds(name, args.first, args.missions)
+        return
     record = {
         name: measure(name, args.first, args.missions, planned=args.planned)
         for name in SETTINGS
