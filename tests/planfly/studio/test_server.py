@@ -17,6 +17,7 @@ from websockets.sync.client import ClientConnection
 
 from flight.mission_files.formats import mission_text
 from planfly.studio import connections, messages
+from planfly.studio.jobs import LONG, Jobs
 from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import PageProgram, Served, served
 from tests.soak import SOAK, note, scaled
@@ -288,7 +289,11 @@ def test_edits_take_little_memory(studio: Served, monkeypatch: pytest.MonkeyPatc
     assert taken[1] - taken[0] <= MOST_MEMORY
 
 
-def test_a_long_work_is_stopped(studio: Served) -> None:
+def test_a_long_work_is_stopped(studio: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not SOAK:
+        # Of a campaign nothing counts here but that it takes long.
+        count = "tests.planfly.studio.light_works.count"
+        monkeypatch.setattr(Jobs, "ask", lambda self, kind, session: self._ask(LONG, kind, count, 10**6, session.rev))
     with studio.page() as page:
         page.until("sheet")
         page.send(kind="campaign")
