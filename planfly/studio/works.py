@@ -3,6 +3,7 @@
 Returns and campaigns, which take longer, are in `planfly.studio.long_works`.
 """
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +25,7 @@ from planfly.studio.pilot import Advance
 from planfly.studio.sheet import findings_json, rounded, states_json, verdict_json
 from planfly.studio.states import place_states
 from planner.plan import Plan
-from planner.search.plan_front import FrontPlan, front_plan, front_task, plan_front
+from planner.search.plan_front import FrontPlan, plan_front
 from planner.search.plan_path import plan_path
 from world.scenario import Scenario, from_spec
 
@@ -102,7 +103,11 @@ def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
         front = plan_front(scenario, limits, asked.ways, seed=asked.seed, progress=advance, stop=stop, finish=finish)
         return list(front.plans) or [front.default]
     made = plan_path(scenario, limits, seed=asked.seed, algorithm=asked.algorithm, progress=advance, stop=stop)
-    return [front_plan(front_task(scenario, limits), finish(made))]
+    made = finish(made)
+    # Beside no other nothing is to compare: what takes longer to work out is not known.
+    length = float(np.linalg.norm(np.diff(made.waypoints, axis=0), axis=1).sum())
+    clearance = float(made.certificate.clearance) + scenario.limits.min_clearance_m
+    return [FrontPlan(made, length, math.nan, clearance, math.nan, math.nan)]
 
 
 def _ended(deadline: float) -> str:

@@ -118,7 +118,7 @@ def plan_front(
     """
     task = front_task(scenario, limits)
     default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
-    first = front_plan(task, default)
+    first = _valued(task, default)
     reference = reference_point(task, first)
     if not default.safe:
         return Front((), task.fourth, first, reference, 0)
@@ -208,8 +208,8 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
     return np.array([MOST_LENGTH * length, most, required, MOST_LENGTH * fourth])
 
 
-def front_plan(task: FrontTask, plan: Plan) -> FrontPlan:
-    """A plan with its values in a task; its clearance is that of the certificate."""
+def _valued(task: FrontTask, plan: Plan) -> FrontPlan:
+    """A plan with its values; its clearance is that of the certificate."""
     row = task.values(np.array(plan.waypoints)[None])[0]
     required = task.problem.certified.clearance
     clearance = plan.certificate.clearance + required
@@ -334,7 +334,7 @@ def _certified(
             path = task.paths(search.vectors[row][None])[0]
             plan = finish(_plan(task, path, template))
             if plan.safe:
-                found.append(front_plan(task, plan))
+                found.append(_valued(task, plan))
         left = np.setdiff1d(left, left[order])
     return found
 

@@ -240,8 +240,8 @@ export class Panel {
     const of = this.waysOf = rev ?? this.now.rev;
     box.append(element("h2", {}, ways.length === 1 ? "Found" : `${ways.length} ways found`));
     ways.forEach((way, k) => {
-      const rows = [["Length", `${plain(way.length / 1000, 2)} km`], ["Seen by radars", `${plain(way.exposure)} s`], ["Above ground at least", `${plain(way.clearance)} m`], ["Time", `${plain(way.seconds)} s`]];
-      if (way.energy !== null) rows.push(["Energy", `${plain(way.energy)} Wh`]);
+      const figures = [["Length", way.length / 1000, 2, "km"], ["Seen by radars", way.exposure, 0, "s"], ["Above ground at least", way.clearance, 0, "m"], ["Time", way.seconds, 0, "s"], ["Energy", way.energy, 0, "Wh"]];
+      const rows = figures.filter((one) => one[1] !== null).map(([name, value, digits, unit]) => [name, `${plain(value, digits)} ${unit}`]);
       const take = element("button", { type: "button", onclick: () => { app.ways([]); app.commit({ kind: "choose", rev: of, which: k }); } }, "Take this way");
       const card = element("section", { class: "card", "data-state": way.state === "safe" ? "ok" : "fail", onpointerenter: () => app.ways(ways, k) },
         element("h3", {}, `Way ${k + 1}: ${[way.state, ...way.best].join(", ")}`), element("dl", {}, ...rows.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])),

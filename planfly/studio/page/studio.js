@@ -149,10 +149,21 @@ function onPreview(message) {
   hold();
   if (message.sheet) map.show(now.model);
   else map.update(now.model);
-  profile.show(now.model, now.world, now.grid, shownFlight());
+  drawProfileSoon();
   answers();
   hands.again();
   document.documentElement.dataset.shown = message.n;
+}
+
+// While a hand drags on the map the profile follows a frame later: the colours below the hand come first.
+let profileWaits = false;
+function drawProfileSoon() {
+  if (profileWaits) return;
+  profileWaits = true;
+  requestAnimationFrame(() => setTimeout(() => {
+    profileWaits = false;
+    profile.show(now.model, now.world, now.grid, shownFlight());
+  }));
 }
 
 function merged(model, windows) {
