@@ -193,7 +193,7 @@ export class Panel {
     return element("tr", { "data-k": item.k, "data-state": state, class: item.k === app.selected() ? "selected" : "" },
       element("td", {}, go), element("td", {}, item.what), element("td", {}, height),
       element("td", { class: "number" }, Number.isNaN(ground) || item.at[2] === null ? "\u2013" : plain(item.at[2] - ground)),
-      element("td", { class: "limit" }, text || "\u2013"), element("td", {}, remove));
+      element("td", { class: "limit" }, element("span", { title: text || null }, text || "\u2013")), element("td", {}, remove));
   }
 
   // ---- planner

@@ -92,7 +92,6 @@ export class Profile {
       const last = this.x(km * 1000) > this.width - 40;
       svg("text", { x: this.x(km * 1000), y: this.height - 7, "text-anchor": last ? "end" : "middle" }, grid).textContent = `${Number(km.toFixed(3))}${km === 0 ? " km" : ""}`;
     }
-    svg("text", { x: SIDES.left + 6, y: SIDES.top + 9, class: "unit" }, grid).textContent = "m AMSL";
   }
 
   cuts() {
@@ -127,6 +126,8 @@ export class Profile {
   }
 
   way() {
+    // Over all that stands behind the way.
+    svg("text", { x: SIDES.left + 6, y: SIDES.top + 9, class: "unit" }, this.back).textContent = "m AMSL";
     const { route, states } = this.model, parts = { ok: [], near: [], open: [], fail: [] };
     for (let i = 0; i + 1 < route.length; i++) {
       const ends = [i, i + 1].map((k) => `${this.x(this.at[k]).toFixed(1)} ${this.y(route[k][2]).toFixed(1)}`);

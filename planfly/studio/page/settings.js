@@ -3,7 +3,7 @@
 import { clear, element } from "/axes.js";
 
 // Entries of a scenario's [limits]: words, and what counts where there is none.
-const LIMITS = [["min_clearance_m", "Least clearance, m", ""], ["max_height_m", "Most above ground, m", "no limit"], ["corridor_m", "Corridor each side, m", "the autopilot's"], ["max_turn_deg", "Sharpest turn, degrees", "the aircraft's"], ["max_climb_deg", "Steepest climb, degrees", "the aircraft's"], ["max_dive_deg", "Steepest descent, degrees", "the aircraft's"]];
+const LIMITS = [["min_clearance_m", "Least clearance, m", ""], ["max_height_m", "Most over ground, m", "no limit"], ["corridor_m", "Corridor each side, m", "the autopilot's"], ["max_turn_deg", "Sharpest turn, °", "the aircraft's"], ["max_climb_deg", "Steepest climb, °", "the aircraft's"], ["max_dive_deg", "Steepest descent, °", "the aircraft's"]];
 const SURVEYS = [["", "as the mission says"], ["lines", "judged as lines"], ["path", "judged as any path"]];
 const PARAMETERS = /\.(parm|param|params)$/i;
 const MOST = 240 * 1024;
@@ -49,7 +49,7 @@ function flown(settings, offered, send) {
     field("Autopilot", list("set-autopilot", same(offered.autopilots, settings.autopilot), settings.autopilot, need("autopilot"))),
     field("Airspeed, m/s", number("set-airspeed", settings.airspeed, 0.5, need("airspeed"))),
     field("Wind, m/s", number("set-wind_speed", settings.wind_speed, 0.5, need("wind_speed"))),
-    field("Wind from, degrees", number("set-wind_from", settings.wind_from, 5, need("wind_from"))),
+    field("Wind from, °", number("set-wind_from", settings.wind_from, 5, need("wind_from"))),
     field("Turbulence", list("set-turbulence", same(offered.turbulence, settings.turbulence), settings.turbulence, need("turbulence"))),
   ];
 }
