@@ -12,6 +12,12 @@ def set_in(session: Session, **asked: object) -> None:
     session.change_settings(Settings.model_validate({"kind": "settings", **asked}))
 
 
+@pytest.fixture(scope="module")
+def kept() -> Session:
+    """A session that stays as it is, for all that is refused."""
+    return drawn_session(6, 14)
+
+
 def test_settings_are_judged_at_once() -> None:
     session = drawn_session(6, 14)
     set_in(session, wind_speed=9.0, wind_from=270.0, limits={"min_clearance_m": 10.0, "max_height_m": 800.0})
@@ -68,8 +74,8 @@ def test_parameters_are_flown_with_and_saved() -> None:
         ({"parameter_file": "a.parm", "parameter_text": "\n"}, "a.parm: no parameter"),
     ],
 )
-def test_a_value_that_is_not_allowed_is_refused_in_one_line(asked: dict[str, object], said: str) -> None:
-    session = drawn_session(6, 14)
+def test_a_value_that_is_not_allowed_is_refused_in_one_line(kept: Session, asked: dict[str, object], said: str) -> None:
+    session = kept
     before = session.rev, session.settings_json(), session.judged
     with pytest.raises(PlanflyError, match=said.replace("(", "[(]")) as refused:
         set_in(session, **asked)
