@@ -164,7 +164,7 @@ class FlyByPath:
 
 
 def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
-    """Join the legs of a route.  The route has at least one leg, and no leg without horizontal length.
+    """Join the legs of a route.  The route has at least one leg; only the first may have no length.
 
     A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
 
@@ -184,7 +184,8 @@ def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
     tangents, radii = _arcs(route, limits, courses, runs, turns)
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
-    slopes = np.diff(points[:, 2]) / runs
+    # A circle that the flight begins on may end where it begins.
+    slopes = np.divide(np.diff(points[:, 2]), runs, out=np.zeros_like(runs), where=runs > 0.0)
     at = 0.0
     begin = points[0, :2].copy()
     for leg in range(route.legs):

@@ -44,6 +44,8 @@ _TURN_STEPS = 40
 # Changes by a step, m, which are made again while the finding fails: so often, and by so much more than is asked then.
 _STEPS = frozenset(("height", "descent", "inset", "distance", *_SIDES))
 _MOST_STEPS, _FURTHER, _AND = 10, 1.5, 2.0
+# m beyond a sphere's edge at which a step aims, as the planner does: navigation may be off by a third of it.
+_ROOM = 15.0
 
 
 def can_apply(suggestion: Suggestion) -> bool:
@@ -226,7 +228,7 @@ def _distance(sheet: _Sheet, change: Change, item: Finding) -> None:
     length = np.hypot(away[:, 0], away[:, 1])
     for k in sorted(sheet.ends_of(legs), key=lambda end: float(length[end]))[: sheet.most]:
         if length[k] > 1.0:
-            sheet.shift([k], np.array([*(change.wanted * away[k] / length[k]), 0.0]))
+            sheet.shift([k], np.array([*((change.wanted + _ROOM) * away[k] / length[k]), 0.0]))
 
 
 def _aside(sheet: _Sheet, change: Change, item: Finding) -> None:

@@ -1,5 +1,6 @@
 """What the studio's two processes are asked, and what the pages are shown of it: flights, plans, returns, campaigns."""
 
+import pickle
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,7 +20,7 @@ from world.errors import MissionError, PlanflyError
 
 # s between two reports of how far a work is.
 _REPORTING = 0.12
-# A seed's plan is a way of its own; so many beyond the first are searched.
+# The two processes.
 PILOT, LONG = "flight", "long"
 
 
@@ -37,10 +38,11 @@ class _Asked:
 class Jobs:
     """Both processes, what each is at, and the newest flight.
 
-    on_answer: called with the process's name from a thread of its own.
+    on_answer: called with the process's name from a thread of its own.  pack: as `Pilot` has it.
     """
 
     on_answer: Callable[[str, Answer], None]
+    pack: Callable[[Work | None], bytes] = pickle.dumps
     _pilots: dict[str, Pilot] = field(default_factory=dict)
     _asked: dict[str, _Asked] = field(default_factory=dict)
     _number: int = 0
@@ -144,7 +146,9 @@ class Jobs:
 
     def _pilot(self, name: str) -> Pilot:
         if name not in self._pilots:
-            self._pilots[name] = Pilot(f"planfly studio: {name}", lambda answer: self.on_answer(name, answer))
+            self._pilots[name] = Pilot(
+                f"planfly studio: {name}", lambda answer: self.on_answer(name, answer), pack=self.pack
+            )
         return self._pilots[name]
 
     # ------------------------------------------------------------------

@@ -5,8 +5,10 @@ on.  The process is spawned, never forked, because the server has threads.  One 
 """
 
 import multiprocessing
+import pickle
 import threading
 from collections.abc import Callable
+from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from importlib import import_module
 from multiprocessing.connection import Connection
@@ -65,12 +67,19 @@ class Pilot:
     What it is asked is sent from a thread, the newest alone: a process that reads nothing holds up nobody.
     """
 
-    def __init__(self, name: str, on_answer: Callable[[Answer], None], patience: float = PATIENCE) -> None:
+    def __init__(
+        self,
+        name: str,
+        on_answer: Callable[[Answer], None],
+        patience: float = PATIENCE,
+        pack: Callable[[Work | None], bytes] = pickle.dumps,
+    ) -> None:
         """Nothing is started before `ask`.
 
-        on_answer: called from a thread of its own.  patience: s in which a work ends that is cancelled.
+        on_answer: called from a thread of its own.  patience: s in which a work ends that is cancelled.  pack: pickles
+        a work, called from the sending thread; what another thread may change meanwhile has to be pickled by that one.
         """
-        self._name, self._on_answer, self._patience = name, on_answer, patience
+        self._name, self._on_answer, self._patience, self._pack = name, on_answer, patience, pack
         self._changed = threading.Condition(threading.RLock())
         self._process: multiprocessing.process.BaseProcess | None = None
         self._pipe: Connection | None = None
@@ -138,9 +147,17 @@ class Pilot:
                 work, self._sent = self._asked, True
                 pipe = self._pipe if work is None else self._ready()
                 self._open += [] if work is None else [work.number]
+            if pipe is None:
+                continue
             try:
-                if pipe is not None:
-                    pipe.send(work)
+                data = self._pack(work)
+            except (CancelledError, RuntimeError):
+                with self._changed:
+                    if self._closed:
+                        return
+                raise
+            try:
+                pipe.send_bytes(data)
             except (OSError, TypeError, ValueError):
                 # The process has ended: another one does it.
                 with self._changed:

@@ -11,6 +11,7 @@ import contextlib
 import functools
 import hmac
 import json
+import pickle
 import struct
 import threading
 from collections.abc import Callable
@@ -29,7 +30,7 @@ from planfly.studio.folder import file_inside, folder_json, shown_path
 from planfly.studio.ground_picture import ground_grid, ground_picture
 from planfly.studio.jobs import Jobs
 from planfly.studio.messages import read_message
-from planfly.studio.pilot import INTERNAL, Answer, internal_text
+from planfly.studio.pilot import INTERNAL, Answer, Work, internal_text
 from planfly.studio.session import Session, StaleEdit
 from planfly.studio.settings import PARAMETER_FILES
 from planfly.studio.sheet import Json
@@ -85,7 +86,7 @@ class Server:
         self._drawing = ThreadPoolExecutor(1, "studio-draw")
         self._order = asyncio.Lock()
         self._grounds: dict[tuple[int, bool], tuple[bytes, ...]] = {}
-        self.jobs = Jobs(self._answered_elsewhere)
+        self.jobs = Jobs(self._answered_elsewhere, self._packed)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._taking: asyncio.Future[None] | None = None
         self._unkept, self._unwelcomed = "", 0
@@ -123,6 +124,10 @@ class Server:
 
     async def _judged(self, work: Callable[[], Given]) -> Given:
         return await asyncio.get_running_loop().run_in_executor(self._judging, work)
+
+    def _packed(self, work: Work | None) -> bytes:
+        """A work pickled where missions are judged, which fill their caches meanwhile."""
+        return self._judging.submit(pickle.dumps, work).result()
 
     # ------------------------------------------------------------------
     # One page.
@@ -296,7 +301,7 @@ class Server:
                 content = "" if message.over else base64.b64encode(saved.data).decode()
                 where = shown_path(session.document.path.parent) if message.over and session.document.path else ""
                 answer = {"name": saved.name, "losses": list(saved.losses), "where": where, "data": content}
-                page.send({"kind": "saved", **answer})
+                page.send({"kind": "saved", "unsaved": session.is_unsaved, **answer})
             case messages.Hello():
                 raise ValueError("a page says its token once")
             case _:

@@ -45,7 +45,7 @@ class Session:
     rev: grows with every change.  judged, requirements: of the mission as it is.
     plans: paths that were planned and may be chosen, with the items that they would replace.
     world_rev: grows with every change of the world.  document_rev: with every other document.
-    named: the file that the command named, the only one that is written over.
+    named: the file that the command named, the only one that is written over.  written: the mission as saved last.
     left: documents that another was opened in place of, as they were left; undone: those whose opening was undone.
     """
 
@@ -60,6 +60,7 @@ class Session:
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
     kept_rev: int = 0
     named: Path | None = None
+    written: Mission | None = None
     document_rev: int = 1
     left: list[_Place] = field(default_factory=list)
     undone: list[_Place] = field(default_factory=list)
@@ -116,6 +117,11 @@ class Session:
     def is_changed(self) -> bool:
         """Whether it differs from what was opened."""
         return self.mission is not self.history.first
+
+    @property
+    def is_unsaved(self) -> bool:
+        """Whether it differs from what was opened and from what was saved last."""
+        return self.is_changed and self.mission is not self.written
 
     # ------------------------------------------------------------------
     # Edits.
@@ -314,6 +320,7 @@ class Session:
             "name": self.document.name,
             "document": self.document_rev,
             "changed": self.is_changed,
+            "unsaved": self.is_unsaved,
             "undo": self.undo_text,
             "redo": self.redo_text,
             "over": self.document.kind if self.document.path is not None else "",
@@ -333,7 +340,10 @@ class Session:
 
     def save(self, form: str) -> Saved:
         """The mission as a file.  Raises PlanflyError."""
-        return save_document(self.document, self.desk, self.judged, form)
+        saved = save_document(self.document, self.desk, self.judged, form)
+        if form != "kml":
+            self.written = self.mission
+        return saved
 
     def save_over(self) -> Saved:
         """Write the mission over the file that the command named.  Raises PlanflyError where there is none."""

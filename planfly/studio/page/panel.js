@@ -266,7 +266,7 @@ export class Panel {
     const box = clear(this.boxes.files), { app, now } = this;
     const over = now?.over ? element("p", {}, element("button", { type: "button", class: "main", onclick: () => this.save() }, `Save over ${now.name}`), element("small", {}, "Ctrl+S")) : null;
     this.lossBox = this.lossBox || element("div", { role: "status" });
-    box.append(element("h2", {}, "Save"), this.lossBox, over, ...FORMS.map(([form, name, more]) => element("p", {}, element("button", { type: "button", onclick: () => app.send({ kind: "save", form }) }, name), element("small", {}, more))));
+    box.append(element("h2", {}, "Save"), this.lossBox, ...(over ? [over] : []), ...FORMS.map(([form, name, more]) => element("p", {}, element("button", { type: "button", onclick: () => app.send({ kind: "save", form }) }, name), element("small", {}, more))));
     const pick = element("input", { type: "file", id: "pick", onchange: (event) => event.target.files[0] && this.openFile(event.target.files[0]) });
     box.append(element("h2", {}, "Open"), element("p", { class: "more" }, "Drop a file anywhere, or choose one: a mission (.waypoints, .plan, plan.json), a flight log whose mission is opened (.mcap, .bin, .tlog, .ulg, .gpx, .igc, .kml, .kmz), or the autopilot's parameters (.parm, .param)."), element("p", {}, element("label", { for: "pick", class: "hidden" }, "File to open"), pick));
     if (this.folder) box.append(...this.byPath());

@@ -63,9 +63,7 @@ function onSheet(sheet) {
   }
   answers();
   panel.sheet(sheet);
-  $("name").textContent = sheet.name + (sheet.changed ? " \u2022" : "");
-  $("name").title = sheet.changed ? `${sheet.name}, changed` : sheet.name;
-  document.title = `${sheet.changed ? "\u2022 " : ""}${sheet.name} \u2013 planfly studio`;
+  showName(sheet.name, sheet.unsaved);
   for (const side of ["undo", "redo"]) {
     $(side).disabled = !sheet[side];
     $(side).title = sheet[side] ? `${side === "undo" ? "Undo" : "Redo"}: ${sheet[side]}` : side === "undo" ? "Nothing to undo" : "Nothing to redo";
@@ -285,6 +283,12 @@ function setAnswer(id, state, words, title) {
   box.querySelector("span").textContent = words;
 }
 
+function showName(name, unsaved) {
+  $("name").textContent = name + (unsaved ? " \u2022" : "");
+  $("name").title = unsaved ? `${name}, not saved` : name;
+  document.title = `${unsaved ? "\u2022 " : ""}${name} \u2013 planfly studio`;
+}
+
 function progress() {
   const works = Object.values(now.work).filter(Boolean);
   $("stop").hidden = !works.length;
@@ -457,7 +461,7 @@ const link = new Link({
   stopped: onStopped,
   choices: (message) => panel.choices(message),
   ways: (message) => { now.work.plan = null; progress(); panel.ways(message); answers(); },
-  saved: (message) => panel.saved(message),
+  saved: (message) => { showName(now.sheet.name, message.unsaved); panel.saved(message); },
   returns: (message) => { now.work.returns = null; progress(); panel.returns(message); },
   campaign: (message) => { now.work.campaign = null; progress(); panel.campaign(message); },
   fault: onFault,

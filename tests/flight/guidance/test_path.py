@@ -21,6 +21,7 @@ from flight.guidance.path import (
     profile,
     project,
 )
+from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from tests.sampled_paths import sample_path
 from tests.setups import MakeSetup
@@ -38,6 +39,16 @@ RADIUS = 25.0**2 / (9.80665 * math.tan(math.radians(30.0)))
 
 def _path(setup: FlightSetup) -> FlyByPath:
     return fly_by_path(setup.route, setup.limits)
+
+
+def test_a_first_leg_without_length_has_no_slope(make_setup: MakeSetup) -> None:
+    """As of a circle to a height that the flight begins at."""
+    limits = make_setup(np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0]])).limits
+    way = np.array([[0.0, 0.0, 500.0], [0.0, 0.0, 500.0], [0.0, 1000.0, 520.0], [1000.0, 1000.0, 520.0]])
+    path = fly_by_path(Route(way, np.full(3, 25.0), np.zeros(4), np.zeros(4, bool), np.arange(4), ""), limits)
+    assert path.length == pytest.approx(2000.0, abs=150.0)
+    assert path.nodes["slope"][0] == pytest.approx(20.0 / 1000.0, rel=0.2)
+    assert np.isfinite(path.nodes["height"]).all()
 
 
 def _end(piece: Record) -> tuple[Floats, float]:

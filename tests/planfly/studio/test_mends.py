@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import pickle
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ from logs.recording.example_log import write_example_log
 from planfly.studio import documents, edits, messages
 from planfly.studio.documents import World, open_document, open_dropped, straight_plan
 from planfly.studio.jobs import LONG, Jobs
-from planfly.studio.pilot import Answer
+from planfly.studio.pilot import Answer, Work
 from planfly.studio.server import MAX_UNWELCOMED, NO_TOKEN, TOO_MANY, Page, Server
 from planfly.studio.session import Session, StaleEdit, open_session
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
@@ -268,6 +270,20 @@ def sent(page: Page) -> list[dict[str, Any]]:
     while not page.frames.empty():
         found.append(json.loads(page.frames.get_nowait()))
     return found
+
+
+class ByWhom:
+    """Becomes the name of the thread that pickles it."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return str, (threading.current_thread().name,)
+
+
+def test_works_are_pickled_where_missions_are_judged() -> None:
+    """Judging fills caches of the mission: pickled beside it, a flight was lost, and every one after it."""
+    server = server_of(drawn_session(5, 12))
+    work = pickle.loads(server._packed(Work(1, "works.fly", ByWhom())))
+    assert work.payload.startswith("studio-judge")
 
 
 def test_a_stale_drag_is_answered() -> None:

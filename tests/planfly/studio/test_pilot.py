@@ -1,9 +1,11 @@
 """The process that works for the studio: the newest work alone, cancelled, and started again where it died."""
 
 import os
+import pickle
 import queue
 import signal
 import time
+from typing import Any
 
 import pytest
 
@@ -17,7 +19,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals")
 class Heard:
     """A pilot and what it answers."""
 
-    def __init__(self, **more: float) -> None:
+    def __init__(self, **more: Any) -> None:
         self.answers: queue.SimpleQueue[Answer] = queue.SimpleQueue()
         self.pilot = Pilot("test", self.answers.put, **more)
 
@@ -79,5 +81,22 @@ def test_a_process_that_reads_nothing_holds_up_nobody() -> None:
         heard.next("progress")
         heard.pilot.cancel()
         assert heard.next("cancelled").number == 4
+    finally:
+        heard.pilot.close()
+
+
+def test_a_work_is_pickled_by_whom_it_is_given_to() -> None:
+    """Who judges the mission meanwhile fills its caches: a dictionary that grows while it is pickled is an error."""
+    packed: list[int] = []
+
+    def pack(work: Work | None) -> bytes:
+        packed.append(0 if work is None else work.number)
+        return pickle.dumps(work)
+
+    heard = Heard(pack=pack)
+    try:
+        heard.pilot.ask(Work(1, COUNT, 3))
+        assert heard.next("done").value == 3
+        assert packed == [1]
     finally:
         heard.pilot.close()

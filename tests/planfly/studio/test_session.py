@@ -122,9 +122,14 @@ def test_a_moved_mission_saved_is_read_as_it_is() -> None:
     session = drawn_session(7, 14)
     k = edits.places(session.mission)[3]
     session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=100.0, north=200.0))
+    session.save("kml")
+    assert session.sheet()["unsaved"] is True
     for form in ("waypoints", "plan"):
         saved = session.save(form)
+        assert (session.sheet()["unsaved"], session.sheet()["changed"]) == (False, True)
         assert parse_mission(saved.data.decode(), saved.name).items == session.mission.items
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
+    assert session.sheet()["unsaved"] is True
 
 
 def test_what_a_form_does_not_hold_is_said() -> None:
