@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import AMSL, LANDINGS, TAKEOFFS, Command, Mission
@@ -33,6 +34,8 @@ from world.errors import LogError, MissionError, PlanflyError
 from world.files import temporary_folder
 from world.scenario import Scenario, embedded_names, load_scenario
 
+Floats = NDArray[np.float64]
+
 # A file that is dropped on the page, bytes.
 MAX_DROPPED = 16 * 2**20
 # What may be dropped: all that `planfly check` reads and that names no other file.
@@ -40,6 +43,8 @@ DROPPED = (".waypoints", ".txt", ".plan", ".json", ".mcap", ".bin", ".tlog", ".u
 # What a mission is opened from and saved as; and what else is saved.
 KINDS = {"waypoints": ".waypoints", "plan": ".plan", "plan.json": ".json", "kml": ".kml"}
 SAVED = KINDS | {"parm": ".parm"}
+# Places that are so near are one: a file's grid of 1e-7 degrees, and m.
+_SAME_DEGREES, _SAME_PLACE = 2e-7, 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,7 +282,8 @@ def _saved_plan(name: str, desk: Desk, judged: Judged) -> Saved:
     if plan is not None:
         return Saved(name, plan_json(plan).encode())
     made = certified_plan(desk, judged)
-    losses = ["the items: a plan holds places alone, and its mission is made of them anew"] if not desk.planned else []
+    anew = not desk.planned or planned_mission(made, desk.airframe).items != judged.mission.items
+    losses = ["the items: a plan holds places alone, and its mission is made of them anew"] if anew else []
     if not made.feasible:
         problem = (made.certificate.problems or ("violations are counted",))[0]
         losses.append(f"it is a plan that is not feasible: {problem}")
@@ -314,10 +320,52 @@ def certified_plan(desk: Desk, judged: Judged) -> Plan:
         or any(one.frame not in AMSL and one.has_position for one in mission.items)
     ):
         raise MissionError(f"{name}: a plan holds plain waypoints above mean sea level, once each", file=name)
+    if (made := _between_its_ways(desk, mission)) is not None:
+        return made
     _refuse_what_no_plan_holds(mission)
-    waypoints = np.array(route.waypoints)[route.items >= 0]
-    limits = desk.airframe.limits.surely()
-    problem = make_problem(scenario, limits)
+    return _scored(desk, np.array(route.waypoints)[route.items >= 0])
+
+
+def _scored(desk: Desk, waypoints: Floats) -> Plan:
+    problem = make_problem(desk.scenario, desk.airframe.limits.surely())
     certificate = certify(problem, waypoints)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
-    return Plan(*(scenario, waypoints, counts[0], objectives[0], certificate, desk.seed, "edited", 0, np.zeros((0, 3))))
+    return Plan(
+        desk.scenario, waypoints, counts[0], objectives[0], certificate, desk.seed, "edited", 0, np.zeros((0, 3))
+    )
+
+
+def _between_its_ways(desk: Desk, mission: Mission) -> Plan | None:
+    """The plan that was edited with its ways to the ground as they were, None where there are none.
+
+    The ways were found free with the turns at their ends: the legs in the air next to them have to be the plan's, too.
+    Raises MissionError where they are not.
+    """
+    base = desk.opened.plan
+    if base is None or base.ways is None or (base.ways.climb, base.ways.descent) == (None, None):
+        return None
+    climb, descent, points = base.ways.climb, base.ways.descent, desk.points(mission)
+    before = 0 if climb is None else 1 + len(climb.waypoints)
+    after = 0 if descent is None else len(descent.waypoints) + len(descent.line_up) + 1
+    waypoints = points[before : len(points) - after]
+    kept = len(waypoints) > 1 and all(
+        way is None or np.allclose(waypoints[ends], base.waypoints[ends], atol=_SAME_PLACE)
+        for way, ends in ((climb, slice(2)), (descent, slice(-2, None)))
+    )
+    if kept:
+        made = replace(_scored(desk, waypoints), ways=base.ways)
+        own = [one for one in base.certificate.problems if one.startswith(("climb-out: ", "landing: "))]
+        made = replace(made, certificate=replace(made.certificate, problems=(*made.certificate.problems, *own)))
+        if _are_places_of(planned_mission(made, desk.airframe), mission):
+            return made
+    why = "its ways to the ground, or the legs next to them, are not its plan's any more: save a .plan, or plan again"
+    raise MissionError(f"{mission.source}: {why}", file=mission.source)
+
+
+def _are_places_of(one: Mission, other: Mission) -> bool:
+    """Whether two missions do the same at the same places."""
+    done = [[(item.command, item.has_position or item.params) for item in mission.items] for mission in (one, other)]
+    if done[0] != done[1]:
+        return False
+    here, there = (np.array([(item.lat_deg, item.lon_deg, item.alt) for item in it.items]) for it in (one, other))
+    return bool((np.abs(here - there) <= (_SAME_DEGREES, _SAME_DEGREES, _SAME_PLACE)).all())

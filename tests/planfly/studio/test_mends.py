@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import planfly
@@ -20,6 +21,8 @@ from planfly.studio.jobs import LONG, Jobs
 from planfly.studio.pilot import Answer, Work
 from planfly.studio.server import MAX_UNWELCOMED, NO_TOKEN, TOO_MANY, Page, Server
 from planfly.studio.session import Session, StaleEdit, open_session
+from planner.plan import read_plan
+from tests.planfly.made_plans import default_run
 from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from world.errors import MissionError, PlanflyError
 from world.frames import to_geo
@@ -115,6 +118,39 @@ def test_what_a_plan_of_waypoints_would_drop_is_refused() -> None:
     way = (*items[1:3], speed, replace(items[5], seq=5))
     session = session_of(Mission(session.mission.home, way, source="s"))
     with pytest.raises(MissionError, match="change of speed"):
+        session.save("plan.json")
+
+
+def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them_stay(tmp_path: Path) -> None:
+    file, again = tmp_path / "plan.json", tmp_path / "again.json"
+    file.write_bytes(default_run()[2]["plan.json"])
+    base = read_plan(file)
+    assert base.ways is not None
+    session, _ = open_session(str(file), World())
+    places = edits.places(session.mission)
+    first = next(
+        n
+        for n, k in enumerate(places)
+        if np.allclose(session.desk.points(session.mission)[n], base.waypoints[0], atol=0.02)
+    )
+    middle = places[first + len(base.waypoints) // 2]
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=-2.0, ks=[middle]))
+    saved = session.save("plan.json")
+    again.write_bytes(saved.data)
+    made = read_plan(again)
+    raised = made.waypoints - base.waypoints
+    assert raised[len(raised) // 2] == pytest.approx([0.0, 0.0, -2.0], abs=0.02)
+    assert np.abs(np.delete(raised, len(raised) // 2, axis=0)).max() < 0.02
+    assert (made.certificate.problems, made.certificate == base.certificate) == ((), False)
+    reopened, _ = open_session(str(again), World())
+    kinds = [item.command for item in reopened.mission.items]
+    assert kinds == [item.command for item in session.mission.items]
+    assert kinds[-1] == Command.NAV_LAND
+    here, there = (one.desk.points(one.mission) for one in (session, reopened))
+    assert np.abs(here - there).max() < 0.02
+    # The turn at the first waypoint is the climb-out's, too.
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=1.0, ks=[places[first + 1]]))
+    with pytest.raises(MissionError, match="legs next to them"):
         session.save("plan.json")
 
 
