@@ -151,11 +151,16 @@ class Pilot:
                 continue
             try:
                 data = self._pack(work)
-            except (CancelledError, RuntimeError):
+            except (CancelledError, *INTERNAL) as error:
                 with self._changed:
                     if self._closed:
                         return
-                raise
+                    if work is not None:
+                        self._open = [one for one in self._open if one != work.number]
+                        self._asked = None if self._asked is work else self._asked
+                if work is not None:
+                    self._on_answer(Answer(work.number, "fault", internal_text(error)))
+                continue
             try:
                 pipe.send_bytes(data)
             except (OSError, TypeError, ValueError):
@@ -165,7 +170,7 @@ class Pilot:
                         self._pipe = self._process = None
                     if work is not None and self._asked is work:
                         self._sent = False
-                        self._open.remove(work.number)
+                        self._open = [one for one in self._open if one != work.number]
 
     def _end(self, pipe: Connection, number: int) -> None:
         """End a process that is still at a work that was cancelled; what is wanted now is done by another one."""

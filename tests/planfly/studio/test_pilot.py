@@ -77,10 +77,16 @@ def test_a_process_that_reads_nothing_holds_up_nobody() -> None:
         assert {number: one.kind for number, one in ended.items()} == {1: "cancelled", 2: "cancelled", 3: "done"}
         assert ended[3].value == 2**24
         assert heard.pilot.pid != pid
+        # One alone, which is being sent when the process is ended.
         heard.pilot.ask(Work(4, f"{WORKS}.sleep", 600.0))
-        heard.next("progress")
+        assert heard.next("progress").number == 4
+        heard.pilot.ask(Work(5, f"{WORKS}.length", b"x" * 2**24))
+        ended = {answer.number: answer for answer in (heard.next("cancelled", "done") for _ in range(2))}
+        assert {number: one.kind for number, one in ended.items()} == {4: "cancelled", 5: "done"}
+        heard.pilot.ask(Work(6, f"{WORKS}.sleep", 600.0))
+        assert heard.next("progress").number in (5, 6)
         heard.pilot.cancel()
-        assert heard.next("cancelled").number == 4
+        assert heard.next("cancelled").number == 6
     finally:
         heard.pilot.close()
 
@@ -91,6 +97,8 @@ def test_a_work_is_pickled_by_whom_it_is_given_to() -> None:
 
     def pack(work: Work | None) -> bytes:
         packed.append(0 if work is None else work.number)
+        if len(packed) == 2:
+            raise RuntimeError("dictionary changed size during iteration")
         return pickle.dumps(work)
 
     heard = Heard(pack=pack)
@@ -98,5 +106,11 @@ def test_a_work_is_pickled_by_whom_it_is_given_to() -> None:
         heard.pilot.ask(Work(1, COUNT, 3))
         assert heard.next("done").value == 3
         assert packed == [1]
+        # One that cannot be pickled is a fault, and not the end of all that come after it.
+        heard.pilot.ask(Work(2, COUNT, 3))
+        fault = heard.next("fault")
+        assert (fault.number, "changed size" in fault.value) == (2, True)
+        heard.pilot.ask(Work(3, COUNT, 4))
+        assert heard.next("done").value == 4
     finally:
         heard.pilot.close()
