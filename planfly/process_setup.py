@@ -31,7 +31,7 @@ def prepare_child() -> None:
     """Collect garbage seldom in a process that one of planfly's own started, a campaign's worker or planner.
 
     A sixth of what a short campaign takes went into looking for garbage in its processes.  Where address space is
-    limited, import nothing without room for it (`world.address_space`).
+    limited, import nothing that does not fit (`world.address_space`).
     """
     if _MARK in os.environ:
         gc.set_threshold(200_000, 50, 50)
@@ -39,7 +39,7 @@ def prepare_child() -> None:
 
 
 def watch_address_space() -> None:
-    """Where this process's address space is limited, import modules only where there is room for them."""
+    """Where this process's address space is limited, import only modules that fit."""
     limit = limit_of_address_space()
     if limit is None:
         return

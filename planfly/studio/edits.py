@@ -107,7 +107,7 @@ def next_index(mission: Mission, after: int) -> int:
 def inserted(mission: Mission, after: int, lat_deg: float, lon_deg: float, height: float | None = None) -> Mission:
     """A mission with a waypoint more behind a place, at `next_index`, in the frame of that place.
 
-    height: in that frame, m; None for that of the place.  Raises MissionError where there is no room for one more.
+    height: in that frame, m; None for that of the place.  Raises MissionError for more items than a mission may have.
 
     >>> way = tuple(MissionItem(k, 16, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (1, 2))
     >>> longer = inserted(Mission(None, way), 0, 46.01, 8.0)

@@ -105,7 +105,7 @@ class Server:
 
     async def _keep(self) -> None:
         if self._kept is not None and (self.session.has_news or self.session.kept_rev):
-            # Without room on the disk the studio goes on, and what is done is not kept: the pages say so once.
+            # On a full disk the studio goes on, and what is done is not kept: the pages say so once.
             try:
                 await self._judged(lambda: self.session.keep(self._kept or Path()))
             except (OSError, PlanflyError) as error:

@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 
 import planfly
+from flight.mission.items import Frame, Mission, MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
 from logs.verdict.findings import verdict_json
 from planfly.studio import edits, messages
 from planfly.studio.documents import World, open_document, open_dropped, straight_plan
 from planfly.studio.kept import mission_data, mission_from
 from planfly.studio.session import Session, StaleEdit, open_session
-from tests.planfly.studio.drafts import drawn_session, session_of
+from tests.planfly.studio.drafts import drawn_session, session_of, world_of
 from tests.soak import note, scaled
 from world.errors import MissionError, PlanflyError
+from world.frames import to_geo
 
 EDITS = scaled(1000, 12)
 
@@ -256,6 +258,28 @@ def test_a_suggestion_applied_mends_its_finding(rule: str, by: float) -> None:
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
     after = [one for one in session.judged.verdict.findings if (one.rule, one.place) == (item.rule, item.place)]
     assert not [one for one in after if one.ok is False]
+
+
+def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:
+    """Three standard deviations of 1.5 m, where the way passed 100 m inside the sphere, along a chord."""
+    scenario, _ = world_of("jacksboro")
+    threats = scenario.threats
+    m = int(np.flatnonzero(threats.kill_radius > 0.0)[0])
+    centre, radius = threats.position[m], float(threats.kill_radius[m])
+    near = centre[:2] + (radius - 100.0) * np.array([1.0, 0.0])
+    places = [(near[0], near[1] + along, centre[2] + 5.0) for along in (-3000.0, 0.0, 3000.0)]
+    items = []
+    for seq, (east, north, up) in enumerate(places, 1):
+        lat, lon = (float(one) for one in to_geo(scenario.origin, east, north))
+        items.append(
+            MissionItem(seq, 16, int(Frame.GLOBAL), (0.0,) * 4, round(lat, 7), round(lon, 7), round(float(up), 3))
+        )
+    session = session_of(Mission(drawn_session(5, 12).mission.home, tuple(items), source="chord"))
+    findings = session.judged.verdict.findings
+    number = next(n for n, one in enumerate(findings) if (one.place.kind, one.place.index) == ("missile", m))
+    session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
+    points = np.asarray(session.requirements.path.points)
+    assert np.linalg.norm(points - centre, axis=1).min() - radius > 4.5
 
 
 def test_a_scenario_opens_with_its_straight_line() -> None:
