@@ -53,6 +53,8 @@ class Fake:
         self.physics.connect((args.model.partition(":")[2], args.sim_port_out))
         _, host, port = args.serial0.split(":")
         self.link = socket.create_connection((host, int(port)))
+        # Otherwise each message waits for the one before it to be acknowledged, some thousand frames.
+        self.link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.link.setblocking(False)
         self.mav = mavlink.MAVLink(None, 1, 1)
         self.items: list[Any] = []

@@ -25,7 +25,7 @@ FAULTS = (
 )
 MANUAL, MISSION = 1 << 16, 4 << 16 | 4 << 24
 # As a PX4 that is not yet up, it answers every fifth step for so long, s.
-WAKES = 1.0
+WAKES = 0.3
 GRAVITY = 9.80665
 # m.  Of its circle about the mission's last item.
 CIRCLE = 150.0
