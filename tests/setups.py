@@ -131,13 +131,13 @@ def setup_maker(aircraft: Aircraft) -> MakeSetup:
     return make
 
 
-def standard() -> Floats:
-    """13 km with turns up to 45 degrees, climbs to 6 and dives to 5."""
+def standard(leg: float = 1450.0) -> Floats:
+    """Nine legs, 13 km of 1450 m each, with turns up to 45 degrees, climbs to 6 and dives to 5."""
     way, course = [np.array([0.0, 0.0, 500.0])], 0.3
     for turn, slope in ((0, 0), (40, 6), (-45, -5), (30, 4), (45, -3), (-35, 0), (-45, 6), (20, -5), (45, 0)):
         course += math.radians(turn)
         up = math.tan(math.radians(slope))
-        way.append(way[-1] + 1450.0 * np.array([math.sin(course), math.cos(course), up]))
+        way.append(way[-1] + leg * np.array([math.sin(course), math.cos(course), up]))
     return np.array(way)
 
 

@@ -12,7 +12,7 @@ import rasterio
 from numpy.typing import NDArray
 from rasterio.windows import Window
 
-from tests.soak import at_most
+from tests.soak import SOAK, at_most
 from tests.world.made.elevation_files import from_origin
 
 SIDE, PITCH = 10_000, 1.0 / 3600.0
@@ -83,6 +83,7 @@ def test_an_area_of_twenty_kilometres_takes_a_few_megabytes(tiles: tuple[Path, P
     assert heights == pytest.approx([1062.0, 1072.0], abs=0.05)
 
 
+@pytest.mark.skipif(not SOAK, reason="a small part of it is read above: in make soak")
 def test_a_quarter_of_the_tile_takes_no_more_than_its_heights_and_marks(tiles: tuple[Path, Path]) -> None:
     """The heights' own memory, flags of the same number of pixels, and what is unpacked at a time."""
     more, spent, pixels, _ = read(tiles, 54_000.0)

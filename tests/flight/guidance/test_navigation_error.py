@@ -14,7 +14,7 @@ from world.kernels import Record
 
 
 def test_navigation_errors_have_their_size_and_their_rate() -> None:
-    dt, count = 1 / 60, scaled(200_000, 80_000)
+    dt, count = 1 / 60, scaled(200_000, 30_000)
     random = np.random.default_rng(5)
     for sigma, time_constant in (ERRORS["rtk"], ERRORS["gnss"]):
         lags: Record = np.zeros(1, NAVIGATION_LAGS)[0]

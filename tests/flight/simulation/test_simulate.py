@@ -28,6 +28,8 @@ from world.errors import FlightError
 from world.kernels import field_names
 
 Floats = NDArray[np.float64]
+# As long as its turns and slopes take to settle.
+WAY = standard() if SOAK else standard(800.0)
 
 
 OUTPUTS = field_names(OUTPUT)
@@ -126,7 +128,7 @@ def _digest(track: Track) -> str:
 
 
 def test_calm(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
-    flown = simulate(make_setup(standard()), aerosonde)
+    flown = simulate(make_setup(WAY), aerosonde)
     track = flown.track
     assert flown.ended == "completed"
     _within(track, (0.10, 0.6), (0.05, 0.3))
@@ -137,13 +139,13 @@ def test_calm(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     assert np.abs(track.airspeed - 25.0).max() < 1.25
     # Guidance may go beyond the planned bank by its reserve, and the roll loop over its command by next to nothing.
     assert math.degrees(np.abs(track.attitude[:, 0]).max()) < 30.0 + math.degrees(BANK_RESERVE) + 0.5
-    assert track.position[-1] == pytest.approx(standard()[-1], abs=1.0)
-    assert track.position[0] == pytest.approx(standard()[0], abs=1e-3)
+    assert track.position[-1] == pytest.approx(WAY[-1], abs=1.0)
+    assert track.position[0] == pytest.approx(WAY[0], abs=1e-3)
 
 
 def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # 60 km from the map's origin, where north is not the map's: velocity, attitude and wind stand in map axes.
-    way = standard()[:4] + np.array([60_000.0, 20_000.0, 0.0])
+    way = WAY[:4] + np.array([60_000.0, 20_000.0, 0.0])
     setup = make_setup(way, wind=(8.0, 60.0), origin={"lat_deg": 60.0, "lon_deg": 10.0})
     flown = simulate(setup, aerosonde)
     track = flown.track
@@ -168,7 +170,7 @@ def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraf
 
 @pytest.mark.parametrize(("from_deg", "seed"), some([(0.0, 1), (120.0, 2), (240.0, 3)], 2))
 def test_wind_and_moderate_turbulence(make_setup: MakeSetup, aerosonde: Aircraft, from_deg: float, seed: int) -> None:
-    flown = simulate(make_setup(standard(), wind=(10.0, from_deg), turbulence="moderate", seed=seed), aerosonde)
+    flown = simulate(make_setup(WAY, wind=(10.0, from_deg), turbulence="moderate", seed=seed), aerosonde)
     assert flown.ended == "completed"
     _within(flown.track, (0.15, 1.0), (0.3, 1.0))
     gusts = flown.track.wind - flown.track.wind.mean(axis=0)
@@ -183,13 +185,13 @@ def test_wind_and_moderate_turbulence(make_setup: MakeSetup, aerosonde: Aircraft
 def test_an_aircraft_that_differs_from_its_model(
     make_setup: MakeSetup, aerosonde: Aircraft, variation: Variation
 ) -> None:
-    calm = simulate(make_setup(standard()), aerosonde, variation=variation)
+    calm = simulate(make_setup(WAY), aerosonde, variation=variation)
     assert calm.ended == "completed"
     _within(calm.track, (0.15, 1.5), (0.15, 1.5))
-    windy = simulate(make_setup(standard(), wind=(10.0, 200.0), turbulence="moderate"), aerosonde, variation=variation)
+    windy = simulate(make_setup(WAY, wind=(10.0, 200.0), turbulence="moderate"), aerosonde, variation=variation)
     assert windy.ended == "completed"
     _within(windy.track, (0.25, 2.0), (0.3, 1.5))
-    assert _digest(calm.track) != _digest(simulate(make_setup(standard()), aerosonde).track)
+    assert _digest(calm.track) != _digest(simulate(make_setup(WAY), aerosonde).track)
 
 
 _FLY_AGAIN = """
@@ -205,7 +207,7 @@ print(hashlib.sha256(b"".join(getattr(track, name).tobytes() for name in COLUMNS
 
 def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: Aircraft, tmp_path: Path) -> None:
     def setup(seed: int) -> FlightSetup:
-        return make_setup(standard()[:4], wind=(7.0, 30.0), turbulence="light", seed=seed)
+        return make_setup(WAY[:4], wind=(7.0, 30.0), turbulence="light", seed=seed)
 
     def fly(seed: int, **more: Any) -> str:
         return _digest(simulate(setup(seed), aerosonde, **more).track)
@@ -232,7 +234,7 @@ def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: A
 
 def test_a_seed_of_the_wind_wins(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     def fly(seed: int, own: int | None) -> str:
-        setup = make_setup(standard()[:2], turbulence="light", seed=seed)
+        setup = make_setup(WAY[:2], turbulence="light", seed=seed)
         scenario = replace(setup.scenario, wind=replace(setup.scenario.wind, seed=own))
         return _digest(simulate(replace(setup, scenario=scenario), aerosonde).track)
 
@@ -241,7 +243,7 @@ def test_a_seed_of_the_wind_wins(make_setup: MakeSetup, aerosonde: Aircraft) -> 
 
 
 def test_not_a_number(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
-    flight = Flight(make_setup(standard()), aerosonde)
+    flight = Flight(make_setup(WAY), aerosonde)
     for _ in range(8):
         rows, ended = flight.block(60)
         assert not ended

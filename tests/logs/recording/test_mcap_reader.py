@@ -74,9 +74,9 @@ def test_no_flipped_bit_is_taken_for_data(
     path = tmp_path / "bit.mcap"
     # All over the file, and densely in its last part, where the chunks with the rows are.
     # Twice so many, of a finished log and of an unfinished one.
-    flips = scaled(25_000, 30)
+    flips = scaled(25_000, 15)
     positions = [*rng.integers(0, len(whole), size=flips), *rng.integers(len(whole) - 90_000, len(whole), size=flips)]
-    for position in [*positions, *range(0, scaled(60, 30))]:
+    for position in [*positions, *range(0, scaled(60, 15))]:
         data = bytearray(whole)
         data[position] ^= 1 << int(rng.integers(8))
         path.write_bytes(data)

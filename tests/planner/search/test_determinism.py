@@ -3,7 +3,9 @@
 All changes at once; each by itself with PLANFLY_SOAK=1.
 """
 
+import contextlib
 import hashlib
+import io
 import os
 import subprocess
 import sys
@@ -16,12 +18,12 @@ from tests.soak import SOAK
 
 ROOT = Path(__file__).parents[3]
 SCRIPT = """
-import hashlib, sys
+import hashlib
 from planfly.pipeline import make_plan
 from planfly.airframe import load_airframe
 from planner.plan import plan_json
 from world.scenario import load_scenario
-for name in sys.argv[1:]:
+for name in NAMES:
     scenario = load_scenario(name)
     print(hashlib.sha256(plan_json(make_plan(scenario, load_airframe(scenario), 7)).encode()).hexdigest())
 """
@@ -31,7 +33,7 @@ NAMES = ("hard-07", "jacksboro-air", "paper-07") if SOAK else ("hard-07",)
 def hashes(**changes: str) -> str:
     environment = os.environ | {"PYTHONPATH": str(ROOT)} | changes
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", SCRIPT, *NAMES],
+        [sys.executable, "-W", "ignore", "-c", f"NAMES = {NAMES}\n{SCRIPT}"],
         env=environment,
         capture_output=True,
         text=True,
@@ -42,7 +44,9 @@ def hashes(**changes: str) -> str:
 
 @pytest.fixture(scope="module")
 def plain() -> str:
-    found = hashes()
+    with contextlib.redirect_stdout(io.StringIO()) as here:
+        exec(SCRIPT, {"NAMES": NAMES})
+    found = here.getvalue()
     assert len(found.split()) == len(NAMES)
     assert len(found.split()[0]) == len(hashlib.sha256().hexdigest())
     return found

@@ -1,6 +1,6 @@
 """ArduPlane's law flies home as ArduPlane did: 38 kept flights, and what each rule of a return is by itself.
 
-Every fifth of them, one that hits the ground among them; all with PLANFLY_SOAK=1.
+Every eighth of them, one that hits the ground among them; all with PLANFLY_SOAK=1.
 """
 
 import math
@@ -30,7 +30,7 @@ def kind(flight: str) -> str:
     return "default" if KEPT[flight]["rtl_altitude_m"] == "100" else "climbs"
 
 
-@pytest.mark.parametrize("flight", some(KEPT, 5))
+@pytest.mark.parametrize("flight", some(KEPT, 8))
 def test_a_return_is_flown_as_arduplane_flew_it(flight: str) -> None:
     real, flown = KEPT[flight], flown_return(flight)
     assert f"NAV_RETURN_TO_LAUNCH: to {real['target']}, " in flown.route.notes[0]
@@ -45,7 +45,7 @@ def test_a_return_is_flown_as_arduplane_flew_it(flight: str) -> None:
         assert abs(flown.arrived - float(real["to_circle_s"])) < ARRIVAL
 
 
-@pytest.mark.parametrize("flight", some(KEPT, 5))
+@pytest.mark.parametrize("flight", some(KEPT, 8))
 def test_on_the_way_it_is_where_arduplane_was(flight: str) -> None:
     flown = flown_return(flight)
     for time, east, north, up in kept_track(flight):
