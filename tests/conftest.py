@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from flight.dynamics import model_check
 from planfly.process_setup import prepare_process
 from planfly.terminal import output
 from tests.shared import remove_made
@@ -50,6 +51,18 @@ def _no_estimates_of_other_runs(tmp_path_factory: pytest.TempPathFactory) -> Ite
         patch.setattr(output, "_times_file", lambda: tmp_path_factory.getbasetemp() / "none" / "durations.json")
         patch.setattr(output, "_keep_time", lambda *_: None)
         patch.setattr(output, "_LOOKS_EVERY", 86_400.0)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _models_are_tried_here() -> Iterator[None]:
+    """A model's first run is this process's own: in a process before it, it takes half a second for each folder.
+
+    That one is tried in tests/flight/dynamics/test_model_check.py, and everywhere in a soak.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        if not SOAK:
+            patch.setattr(model_check, "_try", lambda *_: 0)
         yield
 
 

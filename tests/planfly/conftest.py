@@ -11,12 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from flight.dynamics import model_check
 from logs.views import drawing
 from planfly.cli import main
 from tests.logs.blank_pictures import draw_nothing
 from tests.shared import made_once
-from tests.soak import SOAK, at_most
+from tests.soak import at_most
 from tests.stopwatch import Stopwatch, processes_of
 
 FIELD = """name = "field"
@@ -40,18 +39,6 @@ speed_mps = 3
 from_deg = 250
 turbulence = "light"
 """
-
-
-@pytest.fixture(autouse=True, scope="session")
-def _models_are_tried_here() -> Iterator[None]:
-    """A model's first run is this process's own: in a process before it, it takes half a second for each folder.
-
-    That one is tried with the models themselves, in tests/flight/dynamics, and here in a soak.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        if not SOAK:
-            patch.setattr(model_check, "_try", lambda *_: 0)
-        yield
 
 
 class Served:
