@@ -11,6 +11,7 @@ from aircraft.identification.alignment import Clocks, Signals, align
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import Flow
 from tests.aircraft.identification.flown_truth import SENSORS, flown_truth
+from tests.soak import scaled
 
 
 def flown(
@@ -69,7 +70,7 @@ def test_gusts_do_not_count_for_the_scale() -> None:
 
 def test_gusts_that_an_aircraft_drifts_with_count_little() -> None:
     """Turned seldom and drifting soon, its way made good has the gusts in it: taken as the air's they cost 0.37 %."""
-    flights = [flown(1.0, turns=True, seed=seed, seconds=1600.0, leg=80.0, drift=3.0) for seed in range(8)]
+    flights = [flown(1.0, turns=True, seed=seed, seconds=1600.0, leg=80.0, drift=3.0) for seed in range(scaled(8, 4))]
     errors = [airspeed_scale(*one)[0] - 1.0 for one in flights]
     assert abs(np.mean(errors)) < 0.0025
 

@@ -168,7 +168,7 @@ def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraf
     assert float(track.energy[-1]) == pytest.approx(float((track.current * 44.4 * TICK / 3600).sum()), rel=0.05)
 
 
-@pytest.mark.parametrize(("from_deg", "seed"), some([(0.0, 1), (120.0, 2), (240.0, 3)], 2))
+@pytest.mark.parametrize(("from_deg", "seed"), some([(0.0, 1), (120.0, 2), (240.0, 3)], 3))
 def test_wind_and_moderate_turbulence(make_setup: MakeSetup, aerosonde: Aircraft, from_deg: float, seed: int) -> None:
     flown = simulate(make_setup(WAY, wind=(10.0, from_deg), turbulence="moderate", seed=seed), aerosonde)
     assert flown.ended == "completed"

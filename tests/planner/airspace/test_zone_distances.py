@@ -8,6 +8,7 @@ import pytest
 from benchmarks.airspace.scenarios import ring_distance, star
 from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zone_excess
 from planner.airspace.zone_limits import ZoneMargins, add_margins
+from tests.soak import scaled
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneKind, ZoneLevel, make_polygon
 from world.terrain import Terrain, gridded
 
@@ -98,7 +99,7 @@ def test_deeper_and_longer_is_dearer(charge: Charge) -> None:
 def test_nothing_is_charged_only_where_fine_samples_keep_the_margin(charge: Charge, kind: ZoneKind) -> None:
     rng = np.random.default_rng(11)
     free = 0
-    for _ in range(300):
+    for _ in range(scaled(300, 100)):
         ring = star(rng, rng.uniform(-300.0, 300.0, 2), float(rng.uniform(200.0, 1500.0)), int(rng.integers(3, 12)))
         a, b = rng.uniform(-1200.0, 1200.0, (2, 2))
         places = a + np.linspace(0.0, 1.0, 2000)[:, None] * (b - a)
@@ -110,7 +111,7 @@ def test_nothing_is_charged_only_where_fine_samples_keep_the_margin(charge: Char
         elif away.min() > 16.0:
             assert charged == 0.0
             free += 1
-    assert free > 10
+    assert free > scaled(10, 2)
 
 
 CERTIFIED_MARGINS = ZoneMargins(10.0, 5.0, 0.75)

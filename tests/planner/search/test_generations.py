@@ -14,6 +14,7 @@ from planner.search.algorithms import ALGORITHMS
 from planner.search.generations import MAX_GENERATIONS, path_generations, waypoint_generations
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search, best_first
+from tests.soak import some
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, load_scenario
 
@@ -66,7 +67,7 @@ def ratio(plan: Plan) -> float:
 def test_the_way_is_found_without_seeds(threats: str, most: float, make_limits: Callable[[Scenario], Limits]) -> None:
     """The best known ratios are 1.010, 1.012 and 1.129; UMDA without seeds is safe in half of its runs on the last."""
     scenario = load_scenario(f"hard-{threats}")
-    for seed in (1, 2):
+    for seed in some((1, 2), 2):
         plan = plan_path(scenario, make_limits(scenario), seed=seed, algorithm="fda")
         assert plan.safe, plan.certificate.problems
         assert ratio(plan) < most

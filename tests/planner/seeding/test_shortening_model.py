@@ -35,7 +35,7 @@ def bound_of(north: float = 0.0) -> tuple[np.ndarray, ActiveConstraints]:
 def test_the_missiles_near_each_leg_are_those_within_reach_of_it() -> None:
     path, active = bound_of()
     data = make_task("hard-60").problem.search
-    shares = np.linspace(0.0, 1.0, 2001)[:, None]
+    shares = np.linspace(0.0, 1.0, 501)[:, None]
     pairs = {(int(leg), int(missile)) for leg, missile in active.pairs}
     for k, missile in enumerate(data.missiles.missiles):
         place = np.array([missile["east"], missile["north"], missile["up"]])

@@ -15,6 +15,7 @@ from logs.verdict.measures.zone_visits import (
     look_at_zone,
     path_zones,
 )
+from tests.soak import scaled
 from tests.world.airspace.test_zone_kernels import star
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel, make_polygon
@@ -252,7 +253,7 @@ def test_no_place_is_beyond_the_bounds(kind: str) -> None:
     shapes = (make_polygon([star(rng, 9)]), Cylinder(100.0, -200.0, 600.0))
     band = (ZoneLevel(100.0, "amsl"), ZoneLevel(300.0, "amsl"))
     tight = 0
-    for k in range(200):
+    for k in range(scaled(200, 60)):
         zone = Zone("z", "exclusion" if kind == "exclusion" else "inclusion", shapes[k % 2], *band)
         records = zone_records([zone])
         length = float(rng.uniform(5.0, 300.0))
@@ -275,7 +276,7 @@ def test_no_place_is_beyond_the_bounds(kind: str) -> None:
         assert low - 1e-9 <= min(depths)
         assert max(depths) <= high + 1e-9
         tight += high - max(depths) < 0.1 * length
-    assert tight > 40
+    assert tight > scaled(40, 10)
 
 
 def test_along_an_edge_the_bound_is_exact() -> None:
