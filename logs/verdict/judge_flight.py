@@ -100,7 +100,7 @@ def _levels(
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
-        predicted = (*unflyable_items(requirements.setup), *geometric_findings(requirements))
+        predicted = (*unflyable_items(requirements.setup), *geometric_findings(requirements, flown))
         fails = any(item.ok is False for item in predicted)
         passes = not fails and not left_open(predicted)
         differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)

@@ -10,6 +10,7 @@ from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Verdict, make_findi
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
+from logs.verdict.rule import Judge, Rule
 from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines, undecided_text
 from planner.plan import Plan, Violation
@@ -29,9 +30,12 @@ def unflyable_items(setup: FlightSetup) -> list[Finding]:
     return [item for item in mission_findings(setup) if item.ok is False] if asked else []
 
 
-def geometric_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
-    """Findings of a route's geometry against the aircraft's envelope."""
-    return _judged(requirements, None, (), geometric=True)
+def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:
+    """Findings of a route's geometry against the aircraft's envelope.
+
+    flown: those of its flight, from which rules that say the same of both are taken.
+    """
+    return _judged(requirements, None, (), geometric=True, flown=flown)
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
@@ -63,16 +67,23 @@ def _judged(
     *,
     geometric: bool,
     whole: bool = True,
+    flown: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
     """Findings of all rules, and then those of how the flight ended, merged.
 
-    whole: whether those count that judge the flight as one.
+    whole: whether those count that judge the flight as one.  flown: as of `geometric_findings`.
     """
+
+    def asked(rule: Rule, judge: Judge) -> Sequence[Finding]:
+        if rule.of_route and flown is not None:
+            return [item for item in flown if item.rule == rule.name]
+        return judge(requirements, aligned, geometric=geometric)
+
     findings: tuple[Finding, ...] = tuple(
         item
         for rule in RULES.values()
         if rule.judge is not None and (whole or not rule.whole)
-        for item in rule.judge(requirements, aligned, geometric=geometric)
+        for item in asked(rule, rule.judge)
     )
     findings = (*findings, *at_end)
     for rule in RULES.values():

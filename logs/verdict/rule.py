@@ -92,6 +92,7 @@ class Rule:
     An imported flight is judged by `judge`, stretch by stretch, as far as the log holds what ``log`` asks for.
     suggest: what would make a failed finding pass.
     whole: whether it judges the flight as one, and says nothing of a leg, a corner, a threat or a zone.
+    of_route: whether it says the same of a flight as of its planned path, and so is asked once for both.
 
     In a headline:
     urgency: failures of a greater one are named first.
@@ -115,6 +116,7 @@ class Rule:
     suggest: Suggest | None = None
     log: LogNeeds = LogNeeds()
     whole: bool = False
+    of_route: bool = False
     urgency: int = 0
     phrase: Callable[[Finding], str] | None = None
     unjudged: str = ""

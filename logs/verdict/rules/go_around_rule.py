@@ -386,6 +386,7 @@ RULE = Rule(
     margin=None,
     tolerances=("GO_AROUND_ROOM", "NEAR_LINE_UP", "GO_AROUND_ERROR", "EARLY_TOUCH", "ON_THE_SPOT"),
     judge=go_around_findings,
+    of_route=True,
     phrase=lambda item: located("go-around", item, shortened(item.brief)),
     warns=True,
 )

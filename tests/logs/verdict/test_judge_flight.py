@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import verdict_json
+from logs.verdict.findings import make_finding, verdict_json
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.judge_geometry import geometric_findings
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.rules.registry import RULES
@@ -166,3 +167,11 @@ def test_routes_inside_every_limit_are_flyable_on_both_levels(
     verdict = judge(setup, fly_path(setup, rate=20.0, blend=60.0))
     assert verdict.flyable, verdict.summary
     assert judge_geometry(setup).flyable
+
+
+def test_what_a_flight_cannot_change_is_judged_once_for_flight_and_geometry(setup: FlightSetup) -> None:
+    """A go-around is flown by a point mass from the planned glide: of all rules it costs the most."""
+    of_flight = [make_finding(rule, FLIGHT, ok=False, reason="as flown") for rule in ("go_around", "turn")]
+    found = geometric_findings(route_requirements(setup), of_flight)
+    assert [item for item in found if item.reason == "as flown"] == of_flight[:1]
+    assert len(found) == len(geometric_findings(route_requirements(setup))) + 1
