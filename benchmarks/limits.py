@@ -192,7 +192,7 @@ def _held_bank(track: Track) -> float:
 def calm_limits(*, whole: bool) -> list[Limit]:
     """Slopes and shortest legs of the Aerosonde in calm air; fewer of them unless ``whole``."""
     aircraft = load_aircraft("aerosonde")
-    found = [slope_limit(aircraft, 1.0), slope_limit(aircraft, -1.0)]
+    found = [slope_limit(aircraft, side) for side in ((1.0, -1.0) if whole else (1.0,))]
     turns = [(turn, way) for turn in (60.0, 30.0, 45.0, 90.0, 120.0) for way in (False, True)]
     found += [leg_limit(aircraft, math.radians(turn), way) for turn, way in (turns if whole else turns[:1])]
     return found

@@ -21,6 +21,7 @@ from planfly.airframe import bank_limit, load_airframe
 from planfly.pipeline import make_setup
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
+from tests.soak import some
 from world.scenario import from_spec
 
 SPEED = 25.0 * (1.0 - 0.0065 * 500.0 / 288.15) ** -2.128
@@ -179,7 +180,7 @@ def test_the_bank_that_was_flown_counts_before_the_one_that_could_be() -> None:
     assert "flown wider" in item.reason
 
 
-@pytest.mark.parametrize("radius", [10.0, 30.0])
+@pytest.mark.parametrize("radius", some([10.0, 30.0], 2))
 def test_a_circle_of_a_tiny_own_radius_keeps_its_corridor(radius: float) -> None:
     verdict = flown(TIME, WP_LOITER_RAD=radius)
     assert not [item for item in verdict.failed if item.rule == "corridor"]

@@ -58,8 +58,10 @@ def test_a_return_is_flyable_on_every_level_though_it_turns_about() -> None:
         assert "to home, 2.7 km away, sinking 200 m on a straight slope to 200 m AMSL" in found.reason
 
 
-@pytest.mark.parametrize("up", [110.0, 300.0, 20.0])
-@pytest.mark.parametrize("north", some([-30.0, 0.0, 60.0, 150.0, 260.0, 400.0], 3))
+@pytest.mark.parametrize(
+    ("north", "up"),
+    some([(north, up) for north in (-30.0, 0.0, 60.0, 150.0, 260.0, 400.0) for up in (110.0, 300.0, 20.0)], 7),
+)
 def test_a_return_from_near_its_target_comes_to_its_end(north: float, up: float) -> None:
     # North over home, or short of it, or past it; level, to sink, to climb.
     way = (wp(0, north - 1500, up), wp(0, north, up), RTL)
