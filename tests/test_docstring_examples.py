@@ -16,8 +16,11 @@ MODULES = sorted(
     for file in (ROOT / package).rglob("*.py")
     if ">>> " in file.read_text(encoding="utf-8")
 )
-# Each makes whole runs, or many returns; the tests of the API do, too.
-LONG = {"planfly.api.running", "planfly.api.reporting", "planfly.api.flying", "planfly.api.returning"}
+# Each makes whole runs, many returns, or pages with pictures; other tests of these modules do, too.
+LONG = {
+    "planfly.api.running", "planfly.api.reporting", "planfly.api.flying", "planfly.api.returning", "planfly.api.fronts",
+    "planfly.pipeline", "planner.search.plan_front", "logs.views.report.page", "logs.views.report.compare",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("module", [name for name in MODULES if SOAK or name not in LONG])

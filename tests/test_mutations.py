@@ -49,7 +49,7 @@ def test_a_modules_own_tests_come_first_and_its_limits_are_found_where_they_are_
     assert covering_tests(mutant)[1:] == [["tests/logs/verdict"]]
     reserve = replacing("limits", "logs/verdict/tolerances.py", "RESERVE = 0.2", "RESERVE = 0.1")
     assert "tests/logs/verdict/rules/limits/test_energy_rule_limits.py" in covering_tests(reserve)[0]
-    stages = [stage for one in some(chosen_mutants(200), 20) for stage in covering_tests(one)]
+    stages = [stage for one in some(chosen_mutants(200), 66) for stage in covering_tests(one)]
     assert all((ROOT / test).exists() for stage in stages for test in stage)
 
 

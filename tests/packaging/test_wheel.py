@@ -158,11 +158,14 @@ def test_it_runs_from_another_folder_in_an_environment_of_its_own(wheel: Path, t
     # What it depends on, as this environment has it; an editable planfly there is found by a hook, not by its folder.
     (packages / "dependencies.pth").write_text("\n".join(path for path in sys.path if "site-packages" in path))
     python = python_of(place)
-    done = run(python, folder, "-m", "planfly", "scenarios")
+    code = (
+        "import planfly, world.raster\nfrom planfly.cli import main\nmain(['scenarios'])\n"
+        "print(planfly.__file__)\nprint(world.raster.open_raster('jacksboro').shape)"
+    )
+    done = run(python, folder, "-c", code)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("jacksboro")
-    code = "import planfly, world.raster\nprint(planfly.__file__)\nprint(world.raster.open_raster('jacksboro').shape)"
-    where, shape = run(python, folder, "-c", code).stdout.splitlines()
+    *_, where, shape = done.stdout.splitlines()
     assert Path(where).is_relative_to(place)
     assert shape == "(344, 403)"
     assert list(folder.iterdir()) == []

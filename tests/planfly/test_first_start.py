@@ -19,12 +19,12 @@ from world.compile_events import kernel_is_compiled
 
 ROOT = Path(__file__).parents[2]
 CODE = """
-import sys, numpy as np
+import sys
 from planfly.first_start import warm_up
-from world.terrain import steepest_slopes
+from world.geometry import wrap
 with warm_up():
     for _ in range(2):
-        steepest_slopes(np.zeros((2, 2), np.float32), 1.0)
+        wrap(4.0)
 """
 SAID = "compiling numeric kernels, which later runs load"
 WAY_OUT = "NUMBA_CACHE_DIR=FOLDER names one that can"

@@ -12,6 +12,7 @@ from planfly.own_packages import PACKAGES, hidden_package
 ROOT = Path(planfly.__file__).parents[1]
 # The interpreter's own command: a script whose folder, not the current one, is on Python's path.
 COMMAND = Path(sys.executable).with_name("planfly")
+IMPORTS = "import planfly, logs.theme"
 
 
 def run(folder: Path, *arguments: str, path: str = "") -> "subprocess.CompletedProcess[str]":
@@ -94,18 +95,18 @@ def test_the_installed_command_does_so_for_pythonpath(tmp_path: Path) -> None:
     assert done.stderr.startswith(f"planfly: {tmp_path / 'aircraft.py'}: hides")
     assert len(done.stderr.splitlines()) == 1
     # The current folder alone is not where a script's modules come from.
-    assert run(tmp_path, str(COMMAND), "scenarios").returncode == 0
+    assert run(tmp_path, str(COMMAND), "--version").returncode == 0
 
 
 def test_the_way_out_that_the_line_names_leads_out(tmp_path: Path) -> None:
     (tmp_path / "logs.py").touch()
-    assert python(tmp_path, "-P", "-m", "planfly", "scenarios").returncode == 0
+    assert python(tmp_path, "-P", "-c", IMPORTS).returncode == 0
 
 
 def test_a_folder_of_files_hides_nothing(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs" / "flight.mcap").touch()
-    assert python(tmp_path, "-m", "planfly", "scenarios").returncode == 0
+    assert python(tmp_path, "-c", IMPORTS).returncode == 0
 
 
 def test_a_link_to_our_own_files_hides_nothing(tmp_path: Path) -> None:

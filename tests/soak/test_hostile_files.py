@@ -64,7 +64,7 @@ def make_valid(folder: Path) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_hostile_files_are_judged_or_refused(kind: str, tmp_path: Path) -> None:
     make_valid(tmp_path)
-    count = scaled(1000, 3 if kind == "jsbsim" else 10)
+    count = scaled(1000, 2 if kind == "jsbsim" else 5)
     found, first, crashes = [], 0, []
     while first < count:
         done = subprocess.run(

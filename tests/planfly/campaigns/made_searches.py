@@ -32,7 +32,7 @@ class HerePilots:
 
 @contextmanager
 def flying_here() -> Iterator[None]:
-    """Fly without workers; outside the soak, fewer points stand for all that may be drawn."""
+    """Fly without workers; outside the soak, fewer points stand for all that may be drawn, and rounds are of more."""
 
     @contextmanager
     def hired(_workers: Workers, base: CampaignBase, fly: FlyOne) -> Iterator[HerePilots]:
@@ -42,6 +42,7 @@ def flying_here() -> Iterator[None]:
         patch.setattr(find_winds_module, "worker_pool", hired)
         if not SOAK:
             patch.setattr(find_winds_module, "_POPULATION", 512)
+            patch.setattr(find_winds_module, "_MAX_EACH", 12)
         yield
 
 

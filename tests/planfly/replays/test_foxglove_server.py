@@ -77,6 +77,15 @@ class Viewer:
         self.socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
 
 
+@pytest.fixture(scope="module")
+def gate(log_path: Path) -> Iterator[tuple[subprocess.Popen[str], Viewer]]:
+    """A server that lets two more pages in, and its viewer; the last test that uses it ends it."""
+    needed("foxglove", "foxglove-sdk")
+    needed("websockets", "websockets")
+    with served(str(log_path), "--allow-origin", "https://mine.example,http://localhost:8080") as running:
+        yield running
+
+
 @contextlib.contextmanager
 def served(*argv: str) -> Iterator[tuple[subprocess.Popen[str], Viewer]]:
     """The server in a process of its own, and a viewer connected to the address that it prints."""
@@ -138,19 +147,18 @@ def test_a_viewer_is_given_the_log(log_path: Path, track: Track) -> None:
     assert viewer.times[-1] == rows[-1][0]
 
 
-def test_the_subprotocol_is_the_one_that_is_stated(log_path: Path) -> None:
+def test_the_subprotocol_is_the_one_that_is_stated(gate: tuple[subprocess.Popen[str], Viewer]) -> None:
     """In what is printed and in the help; a viewer that asks for the older name alone is refused."""
-    needed("foxglove", "foxglove-sdk")
     from websockets.exceptions import WebSocketException
     from websockets.sync.client import connect
 
     from planfly.commands.registry import build_parser
 
-    with served(str(log_path)) as (_, viewer):
-        assert viewer.socket.subprotocol == SUBPROTOCOL == "foxglove.sdk.v1"
-        host, port = viewer.socket.remote_address[:2]
-        with pytest.raises(WebSocketException):
-            connect(f"ws://{host}:{port}", subprotocols=["foxglove.websocket.v1"], proxy=None)  # type: ignore[list-item]  # a plain string
+    _, viewer = gate
+    assert viewer.socket.subprotocol == SUBPROTOCOL == "foxglove.sdk.v1"
+    host, port = viewer.socket.remote_address[:2]
+    with pytest.raises(WebSocketException):
+        connect(f"ws://{host}:{port}", subprotocols=["foxglove.websocket.v1"], proxy=None)  # type: ignore[list-item]  # a plain string
     commands = next(action for action in build_parser()._actions if hasattr(action, "choices") and action.choices)
     assert SUBPROTOCOL in " ".join(commands.choices["replay"].format_help().split())
 
@@ -167,45 +175,40 @@ def status(url: str, **asked: Any) -> int:
         return int(refused.response.status_code)
 
 
-def test_a_page_of_another_site_is_refused_and_told_once(log_path: Path) -> None:
+def test_the_server_behind_the_gate_is_one_that_no_browser_opens(gate: tuple[subprocess.Popen[str], Viewer]) -> None:
+    """Its port speaks TLS alone, with a certificate that nobody vouches for."""
+    process, viewer = gate
+    ports = {one.laddr.port for one in psutil.Process(process.pid).net_connections("inet") if one.status == "LISTEN"}
+    (behind,) = ports - {viewer.socket.remote_address[1]}
+    with socket.create_connection(("127.0.0.1", behind)) as plain:
+        plain.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n\r\n")
+        plain.settimeout(60.0)
+        assert plain.recv(100)[:4] != b"HTTP"
+    with socket.create_connection(("127.0.0.1", behind)) as plain, pytest.raises(ssl.SSLCertVerificationError):
+        ssl.create_default_context().wrap_socket(plain, server_hostname="localhost")
+
+
+def test_a_page_of_another_site_is_refused_and_told_once(gate: tuple[subprocess.Popen[str], Viewer]) -> None:
     """Whatever its Origin and its Host; Foxglove's page, its program and a page that is named are let in."""
-    needed("foxglove", "foxglove-sdk")
-    needed("websockets", "websockets")
-    with served(str(log_path), "--allow-origin", "https://mine.example,http://localhost:8080") as (process, viewer):
-        port = viewer.socket.remote_address[1]
-        url = f"ws://127.0.0.1:{port}"
-        for origin in ("https://evil.example", "https://app.foxglove.dev.evil.example", "null", "http://127.0.0.1", ""):
-            assert status(url, origin=origin) == 403, origin
-        assert status(url, origin="https://evil.example") == 403
-        for origin in ("https://app.foxglove.dev", "file://", "https://mine.example", "http://localhost:8080", None):
-            assert status(url, origin=origin) == 101, origin
-        # A name of the site's own that leads to this machine; the address is given apart from it.
-        with socket.create_connection(("127.0.0.1", port)) as plain:
-            assert status(f"ws://evil.example:{port}", sock=plain) == 403
-        with socket.create_connection(("127.0.0.1", port)) as plain:
-            assert status(f"ws://localhost:{port}", sock=plain) == 101
-        process.kill()
-        assert process.stdout is not None
-        told = [line for line in process.stdout if line.startswith("foxglove  refused")]
+    process, viewer = gate
+    port = viewer.socket.remote_address[1]
+    url = f"ws://127.0.0.1:{port}"
+    for origin in ("https://evil.example", "https://app.foxglove.dev.evil.example", "null", "http://127.0.0.1", ""):
+        assert status(url, origin=origin) == 403, origin
+    assert status(url, origin="https://evil.example") == 403
+    for origin in ("https://app.foxglove.dev", "file://", "https://mine.example", "http://localhost:8080", None):
+        assert status(url, origin=origin) == 101, origin
+    # A name of the site's own that leads to this machine; the address is given apart from it.
+    with socket.create_connection(("127.0.0.1", port)) as plain:
+        assert status(f"ws://evil.example:{port}", sock=plain) == 403
+    with socket.create_connection(("127.0.0.1", port)) as plain:
+        assert status(f"ws://localhost:{port}", sock=plain) == 101
+    process.kill()
+    assert process.stdout is not None
+    told = [line for line in process.stdout if line.startswith("foxglove  refused")]
     assert len(told) == len(set(told)) == 6
     assert "foxglove  refused a page of https://evil.example\n" in told
     assert f"foxglove  refused a request to evil.example:{port}\n" in told
-
-
-def test_the_server_behind_the_gate_is_one_that_no_browser_opens(log_path: Path) -> None:
-    """Its port speaks TLS alone, with a certificate that nobody vouches for."""
-    needed("foxglove", "foxglove-sdk")
-    with served(str(log_path)) as (process, viewer):
-        ports = {
-            one.laddr.port for one in psutil.Process(process.pid).net_connections("inet") if one.status == "LISTEN"
-        }
-        (behind,) = ports - {viewer.socket.remote_address[1]}
-        with socket.create_connection(("127.0.0.1", behind)) as plain:
-            plain.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n\r\n")
-            plain.settimeout(60.0)
-            assert plain.recv(100)[:4] != b"HTTP"
-        with socket.create_connection(("127.0.0.1", behind)) as plain, pytest.raises(ssl.SSLCertVerificationError):
-            ssl.create_default_context().wrap_socket(plain, server_hostname="localhost")
 
 
 @pytest.mark.parametrize("origin", ["example.com", "https://example.com/page", "https://Example.com", "https://", "*"])

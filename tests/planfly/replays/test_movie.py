@@ -33,10 +33,10 @@ def test_a_gif_holds_the_frames(
     log: FlightLog, log_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target = tmp_path / "film.gif"
-    command = ["replay", str(log_path), "--movie", str(target), "--speed", "24"]
+    command = ["replay", str(log_path), "--movie", str(target), "--speed", "60"]
     assert main(command) == 0
     assert f"movie     {target}" in capsys.readouterr().out
-    wanted = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0).frames())
+    wanted = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 60.0).frames())
     with Image.open(target) as film:
         assert film.n_frames == len(wanted)
         film.seek(len(wanted) - 1)
@@ -115,13 +115,13 @@ def test_an_mp4_is_what_ffmpeg_makes_of_the_frames(
     else:
         monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     target = tmp_path / "film.mp4"
-    assert main(["replay", str(log_path), "--movie", str(target), "--speed", "24"]) == 0
-    frames = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0).frames())
+    assert main(["replay", str(log_path), "--movie", str(target), "--speed", "60"]) == 0
+    frames = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 60.0).frames())
     assert target.read_bytes() == b"".join(frame.tobytes() for frame in frames)
     told = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
     assert f"{frames[0].shape[1]}x{frames[0].shape[0]}" in told
     assert told[told.index("-r") + 1] == str(RATE)
     fake.write_text(f"#!{sys.executable}\nimport sys\nsys.exit('Unknown encoder')\n", encoding="utf-8")
-    assert main(["replay", str(log_path), "--movie", str(target), "--speed", "24", "--overwrite"]) == 1
+    assert main(["replay", str(log_path), "--movie", str(target), "--speed", "60", "--overwrite"]) == 1
     assert "ffmpeg: status 1: Unknown encoder" in capsys.readouterr().err
     assert target.stat().st_size > 1000

@@ -22,7 +22,7 @@ from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import PageProgram, Served, served
 from tests.soak import SOAK, note, scaled
 
-FUZZED, EDITED = scaled(2000, 24), scaled(1000, 25)
+FUZZED, EDITED = scaled(2000, 12), scaled(1000, 10)
 # Edits before memory is looked at; what more it may be, MB.
 WARM, MOST_MEMORY = 5, 100.0 if SOAK else 20.0
 

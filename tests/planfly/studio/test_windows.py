@@ -23,7 +23,7 @@ from tests.soak import note, scaled
 from world.airspace.zones import Cylinder, Zone
 from world.errors import MissionError
 
-MISSIONS, MOVED = scaled(1000, 5), scaled(300, 6)
+MISSIONS, MOVED, ZONES = scaled(1000, 5), scaled(300, 6), scaled(400, 150)
 # A window's path is rounded from its own beginning, and heights over ground differ by what that is worth, m.
 ROUNDED = 0.02
 Judged = dict[tuple[str, str, int], list[Any]]
@@ -112,12 +112,12 @@ def test_windows_violate_the_zones_that_the_whole_does() -> None:
     rng, found = np.random.default_rng(4), 0
     session = drawn_session(11, 30, jumps=False)
     (west, east), (south, north) = session.desk.scenario.bounds.tolist()
-    places = np.column_stack([rng.uniform(west, east, 400), rng.uniform(south, north, 400)]).tolist()
+    places = np.column_stack([rng.uniform(west, east, ZONES), rng.uniform(south, north, ZONES)]).tolist()
     zones = [Zone(str(k), "exclusion", Cylinder(x, y, 120.0)) for k, (x, y) in enumerate(places)]
     zones.append(Zone("stay", "inclusion", Cylinder(0.0, 0.0, 0.7 * east)))
     desk = replace(session.desk, scenario=replace(session.desk.scenario, zones=tuple(zones)))
-    for k in edits.places(session.mission)[::6]:
-        x, y = places[min(range(400), key=lambda one: math.dist(places[one], session.place_of(k)[:2]))]
+    for k in edits.places(session.mission)[::8]:
+        x, y = places[min(range(ZONES), key=lambda one: math.dist(places[one], session.place_of(k)[:2]))]
         mission = edits.moved(session.mission, k, *desk.geographic(x, y))
         _, windows = judge_windows(desk, mission, k)
         whole = route_requirements(desk.setup(mission))

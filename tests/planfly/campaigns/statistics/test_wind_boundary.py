@@ -20,7 +20,7 @@ from planfly.campaigns.statistics.wind_boundary import (
     next_flights,
 )
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
-from tests.soak import scaled, some
+from tests.soak import SOAK, scaled, some
 
 NOTHING = np.zeros((1, 0))
 PARTS = (0.025, 0.5, 0.975)
@@ -129,7 +129,7 @@ def test_ways_of_failing_that_draws_decide_are_told_apart() -> None:
     for seed in range(scaled(20, 1)):
         for numbers, found in ((normal_numbers(5, seed), known), (no_numbers(), unknown)):
             direction, random = Direction(20.0, 0.99, numbers), np.random.default_rng(seed)
-            fly(direction, 300, partial(_two_ways, random), together=10)
+            fly(direction, 300, partial(_two_ways, random), together=10 if SOAK else 30)
             found.append(direction.boundary())
     assert np.median([abs(one.estimate - truth) for one in known]) < 0.5
     assert sum(one.low - 0.1 <= truth <= one.high + 0.1 for one in known) >= 0.75 * len(known)
@@ -162,8 +162,9 @@ def test_narrow_passes_that_no_failing_follows_from_do_not_move_it() -> None:
     found = []
     for seed in range(scaled(20, 1)):
         direction, random = Direction(20.0, 0.99, normal_numbers(3, seed)), np.random.default_rng(seed)
-        for _ in range(25):
-            for speed, draw in next_flights(direction, 12):
+        together = 12 if SOAK else 30
+        for _ in range(300 // together):
+            for speed, draw in next_flights(direction, together):
                 drawn = direction.numbers.first(draw + 1)[draw]
                 failed = drawn[0] + 0.1 * random.normal() > 2.0 - 0.25 * (speed - 10.0)
                 margin = abs(random.normal(0.8, 0.2))

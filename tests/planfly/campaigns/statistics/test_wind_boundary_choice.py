@@ -10,6 +10,7 @@ from planfly.campaigns.statistics.censored_regression import PROBIT
 from planfly.campaigns.statistics.failure_modes import FailureMode
 from planfly.campaigns.statistics.wind_boundary import Direction, FailureFit, _Belief, _gains_between, next_flights
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
+from tests.soak import scaled
 
 
 def test_halves_come_first() -> None:
@@ -53,7 +54,7 @@ def test_draws_that_tell_are_chosen_and_every_third_is_not() -> None:
     def outcome(speed: float, drawn: np.ndarray) -> frozenset[str]:
         return frozenset({"slope"}) if random.normal() < -4.0 + 0.5 * (speed - 10.0) + 2.0 * drawn[0] else frozenset()
 
-    fly(direction, 240, outcome)
+    fly(direction, 240, outcome, together=12)
     numbers = np.abs(direction.numbers.first(5000)[direction.draws])
     chosen, plain = numbers[[k for k in range(60, 240) if k % 3]], numbers[60::3]
     assert chosen[:, 0].mean() > 1.1
@@ -140,10 +141,11 @@ def test_what_is_chosen_tells_more_than_what_comes() -> None:
         return frozenset({"slope"}) if random.normal() < -4.0 + 0.5 * (speed - 10.0) + 2.0 * drawn[0] else frozenset()
 
     chosen, plain = (Direction(20.0, 0.99, normal_numbers(4, 3)) for _ in range(2))
-    fly(chosen, 300, outcome, together=10)
+    flights = scaled(300, 150)
+    fly(chosen, flights, outcome, together=10)
     # 10 + (4 + 2.236 z) / 0.5, where Phi(z) is 0.01.
     truth = 10.0 + (4.0 + np.sqrt(5.0) * norm.ppf(0.01)) / 0.5
-    for draw in range(300):
+    for draw in range(flights):
         plain.add(truth + (draw % 3), draw, outcome(truth + (draw % 3), plain.numbers.first(draw + 1)[draw]))
     assert chosen.boundary().low < truth < chosen.boundary().high
     assert chosen.boundary().estimate == pytest.approx(truth, abs=0.6)
