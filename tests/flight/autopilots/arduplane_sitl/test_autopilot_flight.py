@@ -111,7 +111,7 @@ def test_an_autopilot_flies_the_mission_to_its_end(fake_autopilot: MakeFake, tmp
             ("crash-in-air", "ended with exit code 1"),
             ("reboot", "began anew in the air: frame 1 after frame"),
         ],
-        2,
+        3,
     ),
 )
 @pytest.mark.usefixtures("short_run_in")
