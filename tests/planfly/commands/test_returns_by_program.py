@@ -3,16 +3,19 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import planfly
 from logs.verdict.returns.judge_returns import badness, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
+from planfly import program_returns
 from planfly.cli import main
 from planfly.program_returns import ProgramReturn, ProgramReturns, worst_apart
-from tests.autopilots import need_arduplane, write_fake, write_fake_px4
+from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
 from tests.logs.verdict.returns.hill import SCENARIO, hill_setup, mission_text
+from tests.soak import SOAK
 
 # A mound, 90 m high, 400 m from home, and a mission behind it at 180 m: a straight slope from there to 100 m over home
 # passes it at some 125 m, and what sinks to 20 m at once does not.
@@ -26,34 +29,47 @@ def mound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "mound.waypoints").write_text(mission_text(1150.0, 1300.0, amsl=180.0), encoding="utf-8")
     (tmp_path / "flat.toml").write_text(MOUND.replace("= 400", "= 8000"), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
+    if not SOAK:
+        shorten_run_in(monkeypatch)
     return tmp_path
 
 
 ASKED = ["returns", "mound.waypoints", "--scenario", "mound.toml", "--every", "3", "--points", "1", "--json", "a.json"]
 
 
-def test_a_return_that_a_program_flies_as_the_law_does_agrees(mound: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("unrendered")
+def test_a_return_that_a_program_flies_as_the_law_does_agrees(
+    mound: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Outside the soak by the law itself: a program circles at home for five minutes."""
+    if not SOAK:
+        fly = program_returns.fly_and_judge
+
+        def by_law(*given: Any, autopilot: Path, **how: Any) -> Any:
+            return fly(*given, **how)
+
+        monkeypatch.setattr(program_returns, "fly_and_judge", by_law)
     flat = [word.replace("mound.toml", "flat.toml") for word in ASKED]
     assert main([*flat, "--autopilot", str(write_fake(mound)), "--out", "drawn"]) == 0
-    out = capsys.readouterr().out
-    assert "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst flown, all of them as by the law" in out
+    assert " itself: 1 of the worst flown, all of them as by the law" in capsys.readouterr().out
     (one,) = json.loads((mound / "a.json").read_text(encoding="utf-8"))["by_program"]["returns"]
     assert (one["agrees"], one["worse"], one["reason"]) == (True, False, "")
     assert one["program"]["kind"] == one["law"]["kind"] == "safe"
     assert one["program"]["target"] == "home"
-    assert (mound / "drawn" / "worst-return-1.BIN").read_bytes() == b"\xa3\x95fake"
     # Its log is a flight like any other, which ends in its circle at home.
     assert Path(one["log"]) == Path("drawn/worst-return-1.mcap")
     assert planfly.read_log(mound / one["log"]).ended == "completed"
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_harm_that_a_program_does_counts_where_the_law_does_none(
     mound: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([*ASKED, "--autopilot", str(write_fake(mound, "dives-home"))]) == 4
+    assert main([*ASKED, "--autopilot", str(write_fake(mound, "dives-home")), "--out", "drawn"]) == 4
     out = capsys.readouterr().out
     assert "returns 1 hits the ground" in out
-    assert "1 of the worst flown, 0 of them as by the law; 1 worse than by the law" in out
+    program = "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst flown"
+    assert f"{program}, 0 of them as by the law; 1 worse than by the law" in out
     assert "the program's counts" in out
     answer = json.loads((mound / "a.json").read_text(encoding="utf-8"))
     (one,) = answer["by_program"]["returns"]
@@ -61,6 +77,8 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
     assert answer["ranges"][0]["kind"] == "ground"
     # On the mound.
     assert 0.0 < answer["ranges"][0]["clearance_east_m"] < 600.0
+    assert (mound / "drawn" / "worst-return-1.BIN").read_bytes() == b"\xa3\x95fake"
+    assert planfly.read_log(mound / one["log"]).ended == "ground contact"
 
 
 def test_no_program_but_arduplanes_is_flown(mound: Path, capsys: pytest.CaptureFixture[str]) -> None:
