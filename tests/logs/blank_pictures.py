@@ -9,6 +9,6 @@ NAMES = ("map", "profile", "scene", "turns", "envelope", "time", "exposure", "co
 
 
 def draw_nothing(patch: pytest.MonkeyPatch) -> None:
-    """Have a report of a flight all its pictures, each of them blank."""
+    """Have a report all the pictures that it asks for, each of them blank."""
     blank = png_bytes(new_figure(1.0))
-    patch.setattr(figures, "draw_pictures", lambda *_, **__: {f"{name}.png": blank for name in NAMES})
+    patch.setattr(figures, "draw_pictures", lambda views, **_: {f"{name}.png": blank for name in views})
