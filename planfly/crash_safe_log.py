@@ -167,8 +167,8 @@ class CrashSafeLog:
     ) -> None:
         """Close the log of a flight that has been judged."""
         with uninterrupted(), self._named_errors():
-            self._open = False
             self._recorder.finish(ended, verdict, reference, returns)
+            self._open = False
 
     @contextlib.contextmanager
     def _named_errors(self) -> Iterator[None]:

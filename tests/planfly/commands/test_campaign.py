@@ -2,8 +2,7 @@
 
 import json
 import shutil
-import subprocess
-import sys
+import threading
 import time
 from pathlib import Path
 
@@ -85,21 +84,27 @@ def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys
 
 
 @pytest.mark.parametrize("command", some([["campaign", "--flights", "2000"], ["winds", "--directions", "4"]], 2))
-def test_a_folder_that_is_removed_ends_it_at_the_next_flight(tmp_path: Path, command: list[str]) -> None:
+def test_a_folder_that_is_removed_ends_it_at_the_next_flight(
+    tmp_path: Path, command: list[str], scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     """With exit code 1 and a line that says so, long before its last flight."""
     mission, scenario = write_short(tmp_path)
     out = tmp_path / "out"
-    line = [*command[:1], str(mission), "--scenario", str(scenario), "--workers", "1", "--out", str(out), *command[1:]]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "planfly", *line], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
-    table, end = out / f"{command[0]}.sqlite", time.monotonic() + 300.0
-    # The log of what is written grows with the first flights.
-    while process.poll() is None and time.monotonic() < end and not _grown(Path(f"{table}-wal")):
-        time.sleep(0.02)
-    shutil.rmtree(out)
-    _, told = process.communicate(timeout=300.0)
-    assert process.returncode == 1, told
+    table = out / f"{command[0]}.sqlite"
+
+    def remove() -> None:
+        end = time.monotonic() + 300.0
+        # The log of what is written grows with the first flights.
+        while time.monotonic() < end and not _grown(Path(f"{table}-wal")):
+            time.sleep(0.02)
+        shutil.rmtree(out)
+
+    remover = threading.Thread(target=remove)
+    remover.start()
+    line = [*command[:1], str(mission), "--scenario", str(scenario), "--scheduler", scheduler, "--out", str(out)]
+    assert main([*line, *command[1:]]) == 1
+    remover.join()
+    told = capsys.readouterr().err
     last = told.splitlines()[-1]
     assert last.startswith(f"planfly: {table}: was removed, or another file took its place")
     assert "Traceback" not in told

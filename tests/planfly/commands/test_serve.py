@@ -58,9 +58,20 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     assert not [line for line in vehicle.lines if line.startswith("frames dropped")]
 
 
-def test_a_served_flight_is_the_flight_of_fly_at_real_time(serve: Callable[..., Served]) -> None:
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """A vehicle at real time for two tests, the second of which kills it; in a soak that has vehicles of its own."""
+    folder = tmp_path_factory.mktemp("real")
+    (folder / "field.toml").write_text(FIELD, encoding="utf-8")
+    vehicle = Served(folder, "--scenario", "field.toml")
+    yield vehicle
+    if vehicle.process.poll() is None:
+        assert vehicle.stop() == 0
+
+
+def test_a_served_flight_is_the_flight_of_fly_at_real_time(real: Served) -> None:
     """Rates within 5 %, under 15 % of a core, and the very flight that ``planfly fly`` gives."""
-    vehicle = serve("--scenario", "field.toml")
+    vehicle = real
     with UdpStation(vehicle.port) as station:
         assert station.upload(NEAR) == 0
         station.fly()
@@ -82,14 +93,52 @@ def test_a_served_flight_is_the_flight_of_fly_at_real_time(serve: Callable[..., 
         reached = [m.seq for m in station.log if m.get_type() == "MISSION_ITEM_REACHED"]
         assert reached == [1, 2, 3]
         assert "verdict (flown): FLYABLE" in station.texts()
-        assert station.upload(STEEP) == 0
-    assert vehicle.stop() == 0
     log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
     assert log.complete
     assert log.ended == "completed"
     again = simulate(log.setup, load_airframe(log.setup.scenario).aircraft)
     assert again.track.position.tobytes() == log.track.position.tobytes()
     assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 0
+
+
+def flown_until_a_power_cut(vehicle: Served, logs: str, seed: int) -> tuple[Path, float]:
+    """Kill -9 of all of a vehicle's processes, in flight, at any moment: its log, and how long it has flown, s."""
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(LONG) == 0
+        station.fly()
+        begun = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0).time_boot_ms
+        last = station.listen(random.Random(seed).uniform(1.0, 4.0))
+        vehicle.kill()
+    flown = max(m.time_boot_ms for m in last if m.get_type() == "GLOBAL_POSITION_INT") - begun
+    return max((vehicle.folder / logs).iterdir()), flown / 1000.0
+
+
+@pytest.mark.parametrize("first", range(0, scaled(200, 1), AT_ONCE))
+def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], real: Served, first: int) -> None:
+    """What is logged is exact, and no more than a second is lost; a few vehicles at once, since they mostly wait."""
+
+    def flown(seed: int) -> tuple[Path, float]:
+        if not SOAK:
+            return flown_until_a_power_cut(real, "logs", seed)
+        logs = f"logs-{seed}"
+        return flown_until_a_power_cut(serve("--scenario", "field.toml", "--log", logs), logs, seed)
+
+    seeds = range(first, min(first + AT_ONCE, scaled(200, 1)))
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        found = list(pool.map(flown, seeds))
+    lost = []
+    for path, seconds in found:
+        log = read_log(path)
+        assert not log.complete
+        assert log.end_time >= seconds - 1.0
+        whole = simulate(log.setup, load_airframe(log.setup.scenario).aircraft).track
+        count = len(log.track)
+        assert count > 30
+        assert np.array_equal(whole.position[:count], log.track.position)
+        assert np.array_equal(whole.controls[:count], log.track.controls)
+        lost.append(seconds - log.end_time)
+    tally("kill -9 of a served flight", kills=len(lost), damaged=0)
+    widen("kill -9 of a served flight", longest_lost_s=round(max(lost), 3))
 
 
 def test_a_mission_that_cannot_be_flown_is_armed_only_by_force(quick: Served) -> None:
@@ -158,40 +207,6 @@ def test_its_sockets_are_those_of_the_table_of_the_network_page(quick: Served) -
     assert listening(quick.process.pid) == table()["`serve`"]
 
 
-def flown_until_a_power_cut(serve: Callable[..., Served], seed: int) -> tuple[Path, float]:
-    """Kill -9 of all of a vehicle's processes, in flight, at any moment: its log, and how long it has flown, s."""
-    vehicle = serve("--scenario", "field.toml", "--log", f"logs-{seed}")
-    with UdpStation(vehicle.port) as station:
-        assert station.upload(LONG) == 0
-        station.fly()
-        begun = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0).time_boot_ms
-        last = station.listen(random.Random(seed).uniform(1.0, 4.0))
-        vehicle.kill()
-    flown = max(m.time_boot_ms for m in last if m.get_type() == "GLOBAL_POSITION_INT") - begun
-    return vehicle.folder / f"logs-{seed}" / "flight-001.mcap", flown / 1000.0
-
-
-@pytest.mark.parametrize("first", range(0, scaled(200, 1), AT_ONCE))
-def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], first: int) -> None:
-    """What is logged is exact, and no more than a second is lost; a few vehicles at once, since they mostly wait."""
-    seeds = range(first, min(first + AT_ONCE, scaled(200, 1)))
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        found = list(pool.map(lambda seed: flown_until_a_power_cut(serve, seed), seeds))
-    lost = []
-    for path, flown in found:
-        log = read_log(path)
-        assert not log.complete
-        assert log.end_time >= flown - 1.0
-        whole = simulate(log.setup, load_airframe(log.setup.scenario).aircraft).track
-        count = len(log.track)
-        assert count > 30
-        assert np.array_equal(whole.position[:count], log.track.position)
-        assert np.array_equal(whole.controls[:count], log.track.controls)
-        lost.append(flown - log.end_time)
-    tally("kill -9 of a served flight", kills=len(lost), damaged=0)
-    widen("kill -9 of a served flight", longest_lost_s=round(max(lost), 3))
-
-
 def test_the_vehicle_outlives_the_process_that_flies(quick: Served) -> None:
     """The vehicle stays, says so, and flies the next mission."""
     with UdpStation(quick.port) as station:
@@ -204,26 +219,6 @@ def test_the_vehicle_outlives_the_process_that_flies(quick: Served) -> None:
         assert station.upload(ROUTE) == 0
         station.fly()
         station.until(done)
-
-
-def test_ctrl_c_in_flight_closes_the_log(serve: Callable[..., Served], tmp_path: Path) -> None:
-    """The mission is from a file, with a gap in its numbers, and is given to stations that ask for it."""
-    lines = ["0 1 0 16 0 0 0 0 46 8 0 1", "3 0 0 16 0 0 0 0 46 8 100 1", "7 0 3 16 0 0 0 0 46 8.03 100 1"]
-    (tmp_path / "m.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n", encoding="ascii")
-    vehicle = serve("m.waypoints", "--scenario", "field.toml")
-    with UdpStation(vehicle.port) as station:
-        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-        station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
-        assert station.until(lambda m: m.get_type() == "MISSION_COUNT").count == 3
-        station.send(mavlink.MAVLink_mission_request_int_message(1, 1, 2, 0))
-        back = station.until(lambda m: m.get_type() == "MISSION_ITEM_INT")
-        assert (back.seq, back.frame, back.x, back.y) == (2, 3, LAT, LON + 300_000)
-        station.fly()
-        station.listen(1.0)
-    assert vehicle.stop() == 0
-    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
-    assert log.complete
-    assert log.ended == "stopped: the vehicle was shut down"
 
 
 @pytest.mark.skipif(not SOAK, reason="a stranger who attacks a signed link hears nothing either: in make soak")
@@ -274,18 +269,28 @@ def attacks(key: bytes, heard: bytes) -> dict[str, list[bytes]]:
     }
 
 
-def test_no_attack_on_a_signed_link_ends_a_flight(serve: Callable[..., Served], tmp_path: Path) -> None:
-    """Timestamps of the far future, wrong link ids, replay, rollback and a flood, all in flight."""
+def test_no_attack_on_a_signed_link_ends_a_flight_but_ctrl_c(serve: Callable[..., Served], tmp_path: Path) -> None:
+    """Timestamps of the far future, wrong link ids, replay, rollback and a flood, all in flight.
+
+    The mission is from a file, with a gap in its numbers, and is given to stations that ask for it; the log is closed.
+    """
     key = bytes(range(32))
     (tmp_path / "key").write_text(key.hex(), encoding="ascii")
     (tmp_path / "key").chmod(0o600)
-    vehicle = serve("--scenario", "field.toml", "--sign-key", "key")
+    lines = ["0 1 0 16 0 0 0 0 46 8 0 1", "3 0 0 16 0 0 0 0 46 8 100 1", "7 0 3 16 0 0 0 0 46 8.03 100 1"]
+    (tmp_path / "m.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n", encoding="ascii")
+    vehicle = serve("m.waypoints", "--scenario", "field.toml", "--sign-key", "key")
     with UdpStation(vehicle.port, system=254) as station, UdpStation(vehicle.port, mute=True) as thief:
         for mav in (station.mav, station.parser):
             mav.signing.secret_key = key
             mav.signing.timestamp = int((time.time() - EPOCH_2015) * 1e5)
         station.mav.signing.sign_outgoing = True
-        assert station.upload(LONG) == 0
+        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
+        assert station.until(lambda m: m.get_type() == "MISSION_COUNT").count == 3
+        station.send(mavlink.MAVLink_mission_request_int_message(1, 1, 2, 0))
+        back = station.until(lambda m: m.get_type() == "MISSION_ITEM_INT")
+        assert (back.seq, back.frame, back.x, back.y) == (2, 3, LAT, LON + 300_000)
         station.fly()
         station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0)
         heard = mavlink.MAVLink_param_request_read_message(1, 1, b"", 0).pack(station.mav)
@@ -306,7 +311,9 @@ def test_no_attack_on_a_signed_link_ends_a_flight(serve: Callable[..., Served], 
     counts = {word: int(count.replace(",", "")) for count, word in (part.split() for part in told[16:].split(", "))}
     assert counts == {reason: len(datagrams) for reason, datagrams in tried.items()}
     assert sum("more than a day ahead" in line for line in vehicle.lines) == 1
-    assert read_log(vehicle.folder / "logs" / "flight-001.mcap").complete
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert log.complete
+    assert log.ended == "stopped: the vehicle was shut down"
 
 
 @pytest.mark.skipif(not SOAK, reason="others stand by, too, and this one is the largest: in make soak")

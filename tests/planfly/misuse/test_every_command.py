@@ -80,6 +80,7 @@ def test_600_mb_of_address_space(name: str, inputs: Path, tmp_path: Path) -> Non
     whole(folder, inputs)
 
 
+@pytest.mark.skipif(not SOAK, reason="a worker's need is said in test_worker_pool.py, too: in make soak")
 @some("campaign")
 def test_32_descriptors(name: str, inputs: Path, tmp_path: Path) -> None:
     given, folder = EVERY[name], tmp_path / "work"

@@ -64,7 +64,8 @@ class Case:
 
 
 FEW = (
-    Case(("plan", "endless.toml", "--out", "plan.json"), "planning", 0.5, signal.SIGTERM),
+    # It is ended by Ctrl-C in tests/planfly/commands/test_plan.py.
+    *((Case(("plan", "endless.toml", "--out", "plan.json"), "planning", 0.5, signal.SIGTERM),) if SOAK else ()),
     Case(
         ("fly", "long.waypoints", "--scenario", "field.toml", "--log", "f.mcap"),
         "flying",
@@ -110,9 +111,10 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "field.toml").write_text(FIELD, encoding="utf-8")
     (folder / "long.waypoints").write_text(LONG, encoding="ascii")
     (folder / "round.waypoints").write_text(ROUND, encoding="ascii")
-    head, tail = scenario_text("endless", make_instance(0, 7), "a search that does not end").split("[planner]\n")
-    text = f"{head}[planner]\n{PLANNER}\n[flight]{tail.split('[flight]')[1]}"
-    (folder / "endless.toml").write_text(text, encoding="utf-8")
+    if SOAK:
+        head, tail = scenario_text("endless", make_instance(0, 7), "a search that does not end").split("[planner]\n")
+        text = f"{head}[planner]\n{PLANNER}\n[flight]{tail.split('[flight]')[1]}"
+        (folder / "endless.toml").write_text(text, encoding="utf-8")
     return folder
 
 

@@ -6,12 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from itertools import product
 from pathlib import Path
 
 import pytest
 
 from planfly.terminal.signal_watch import end_process
-from tests.soak import at_most
+from tests.soak import at_most, some
 from tests.stopwatch import Stopwatch
 from world.interruption import unfinished
 
@@ -54,8 +55,7 @@ spin(1)
 """
 
 
-@pytest.mark.parametrize("body", BODIES)
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("number", "body"), some(product((signal.SIGINT, signal.SIGTERM), BODIES), 2))
 def test_a_process_ends_whatever_it_does(body: str, number: signal.Signals, tmp_path: Path) -> None:
     text, least = BODIES[body]
     mine = tmp_path / "mine"
