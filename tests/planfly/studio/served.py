@@ -70,7 +70,7 @@ def served(what: str | Path, **more: Any) -> Iterator[Served]:
 
     def run() -> None:
         try:
-            planfly.open_studio(what, port=0, browser=False, stop=ended.is_set, on_message=said.put, **more)
+            planfly.open_studio(what, browser=False, stop=ended.is_set, on_message=said.put, **({"port": 0} | more))
         except BaseException as error:  # the test that waits is to see it
             faults.append(error)
             said.put("")

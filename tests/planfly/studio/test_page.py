@@ -1,6 +1,7 @@
 """The page in a real Chromium: what hands do, what is shown, and what happens when the server goes."""
 
 import base64
+import contextlib
 import json
 import os
 import signal
@@ -19,8 +20,8 @@ from planfly.studio.kept import mission_from
 from tests.browser import Browser
 from tests.logs.views.report.page_in_browser import grave_findings, prefer
 from tests.planfly.studio.drafts import drawn_session
-from tests.planfly.studio.served import Served
-from tests.soak import SOAK, at_most
+from tests.planfly.studio.served import Served, served
+from tests.soak import SOAK, at_most, scaled
 
 ROOT = Path(__file__).parents[3]
 TABS = ("verdict", "items", "plan", "settings", "files")
@@ -40,7 +41,7 @@ UNNAMED = """[...document.querySelectorAll('button, input, select, [role=button]
 
 
 class Studio:
-    """A studio's process of a mission file."""
+    """A studio of a mission file: outside a soak in a thread of this process, which has imported what it needs."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.file = folder, folder / "m.waypoints"
@@ -50,6 +51,15 @@ class Studio:
 
     def start(self) -> None:
         """Start it, on the port of the last time."""
+        if SOAK:
+            self._start_process()
+        else:
+            self._ending = contextlib.ExitStack()
+            started = served(self.file, scenario="jacksboro", port=self.port, keep=self.folder / "kept")
+            self.address = self._ending.enter_context(started).address
+        self.port = int(self.address.split(":")[2].partition("/")[0])
+
+    def _start_process(self) -> None:
         command = [sys.executable, "-m", "planfly", "studio", "m.waypoints", "--scenario", "jacksboro", "--no-browser"]
         self.process = subprocess.Popen(
             [*command, "--port", str(self.port), "--keep", "kept"], cwd=self.folder, stdout=subprocess.PIPE, text=True,
@@ -61,14 +71,16 @@ class Studio:
             line = self.process.stdout.readline()
             assert self.process.poll() is None
         self.address = line.split()[-1]
-        self.port = int(self.address.split(":")[2].partition("/")[0])
 
     def kill(self) -> None:
-        """End it as a crash does."""
+        """End it, in a soak as a crash does."""
         self.end(signal.SIGKILL)
 
     def end(self, how: int = signal.SIGTERM) -> None:
         """End it, and what it wrote to."""
+        if not SOAK:
+            self._ending.close()
+            return
         self.process.send_signal(how)
         self.process.communicate(timeout=20)
 
@@ -378,32 +390,36 @@ def test_what_was_done_survives_a_reload_and_a_server_that_dies(page: Browser, s
         assert program.until("world")["settings"]["wind_speed"] == 6.5
 
 
-def test_a_phone_drags_by_touch(studio: Studio, tmp_path: Path) -> None:
-    with Browser(tmp_path, 420, 900, phone=True) as phone:
-        phone.go(studio.address)
-        phone.wait_for(READY)
-        assert phone.value("document.documentElement.scrollWidth <= innerWidth")
-        assert phone.value(OVERLAPS) == 0
-        before = undo_text(phone)
-        x, y = centre(phone, ".mark .dot", 2)
+def test_a_phone_drags_by_touch(browser: Browser, studio: Studio) -> None:
+    phone = browser
+    prefer(phone, "light", 420)
+    phone.problems.clear()
+    phone.go(studio.address)
+    phone.wait_for(READY)
+    assert phone.value("document.documentElement.scrollWidth <= innerWidth")
+    assert phone.value(OVERLAPS) == 0
+    before = undo_text(phone)
+    x, y = centre(phone, ".mark .dot", 2)
 
-        def touch(kind: str, dx: float) -> None:
-            points: list[dict[str, Any]] = [] if kind == "touchEnd" else [{"x": x + dx, "y": y, "id": 1}]
-            phone.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+    def touch(kind: str, dx: float) -> None:
+        points: list[dict[str, Any]] = [] if kind == "touchEnd" else [{"x": x + dx, "y": y, "id": 1}]
+        phone.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
 
-        touch("touchStart", 0.0)
-        for k in range(1, 13):
-            touch("touchMove", 4.0 * k)
-        touch("touchEnd", 0.0)
-        phone.wait_for(f"document.getElementById('undo').title !== {json.dumps(before)}")
-        assert undo_text(phone).startswith("Undo: move item")
-        assert phone.problems == []
+    touch("touchStart", 0.0)
+    for k in range(1, 13):
+        touch("touchMove", 4.0 * k)
+    touch("touchEnd", 0.0)
+    phone.wait_for(f"document.getElementById('undo').title !== {json.dumps(before)}")
+    assert undo_text(phone).startswith("Undo: move item")
+    assert phone.problems == []
+    prefer(phone, "light", 1400)
+    phone.go("about:blank")
 
 
 def test_a_drag_is_coloured_in_time(page: Browser) -> None:
     from benchmarks.studio import DRAG, timed
 
-    moves = timed(page.value(DRAG % {"mark": 3, "moves": 40}))
-    page.call("Page.reload")
-    assert len(moves) == 40
-    assert sorted(moves)[37] < 1000.0 * at_most(0.15)
+    count = scaled(40, 15)
+    moves = timed(page.value(DRAG % {"mark": 3, "moves": count}))
+    assert len(moves) == count
+    assert sorted(moves)[count - 3] < 1000.0 * at_most(0.15)
