@@ -62,7 +62,7 @@ def test_without_its_zones_and_its_greatest_height_the_same_way_is_planned_throu
 
 
 def test_a_way_between_many_zones_of_many_corners() -> None:
-    scenario = crowded_scenario(*((200, 50) if SOAK else (40, 20)))
+    scenario = crowded_scenario(*((200, 50) if SOAK else (60, 30)))
     plan = make_plan(scenario, load_airframe(scenario), 1)
     assert plan.safe
     places = sampled(plan.waypoints)[:, :2]
