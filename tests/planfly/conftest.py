@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from logs.views import drawing
+from logs.views import drawing, figures
 from planfly.cli import main
 from tests.logs.blank_pictures import draw_nothing
 from tests.shared import made_once
@@ -153,8 +153,10 @@ def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
-    """PNGs without content, for tests that look at their names: rendering is most of what pictures take."""
+    """Pictures without content, for tests that look at their names: drawing is most of what reports take."""
+    monkeypatch.setattr(figures, "draw", lambda _: None)
     monkeypatch.setattr(drawing, "png_bytes", lambda _: b"\x89PNG")
+    monkeypatch.setattr(drawing, "svg_bytes", lambda _: b"<svg></svg>")
 
 
 @pytest.fixture(scope="session")
