@@ -3,6 +3,7 @@
 Limits, airframe, plan, path, local map, the route's requirements and the track's alignment are each made there alone.
 """
 
+import json
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -118,8 +119,12 @@ def test_run_makes_everything_once(count: Count) -> None:
 
 @pytest.mark.usefixtures("blank_pictures")
 def test_a_round_more_makes_only_what_its_tighter_limits_change(count: Count) -> None:
+    """And where no round flies, each of them is shown not to."""
     twice = dict.fromkeys(("plan_path", *FLIGHT), 2)
-    assert count("run", "tight", "--refine", "1", code=4) == ONCE | twice | {"make_limits": 2}
+    assert count("run", "tight", "--refine", "1", "--out", "out", code=4) == ONCE | twice | {"make_limits": 2}
+    rounds = json.loads(Path("out", "rounds.json").read_text(encoding="utf-8"))
+    assert [entry["flyable"] for entry in rounds] == [False, False]
+    assert rounds[-1]["next"].startswith("ended: ")
 
 
 def test_plan_loads_the_airframe_alone(count: Count) -> None:

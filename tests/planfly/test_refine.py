@@ -76,23 +76,12 @@ def test_a_plan_over_the_hill_becomes_one_round_it(tmp_path: Path, capsys: pytes
     plan = json.loads((out / "plan.json").read_text(encoding="utf-8"))
     assert plan["scenario"]["limits"]["max_climb_deg"] == "aircraft"
     assert "rounds\n" in capsys.readouterr().out
-
-
-@pytest.mark.usefixtures("blank_pictures")
-def test_what_cannot_fly_is_shown_not_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = tmp_path / "out"
-    assert main(["run", "tight", "--out", str(out), "--refine", "1"]) == 4
-    rounds = rounds_of(out)
-    assert len(rounds) >= 2
-    assert not any(entry["flyable"] for entry in rounds)
-    assert str(rounds[-1]["next"]).startswith("ended: ")
     # Run again, the old rounds are cleared away, whatever else lies there stays.
     (out / "mine.txt").write_text("keep", encoding="utf-8")
     (tmp_path / "field.toml").write_text(f"{FIELD}[planner]\npopulation = 20\ngenerations = 5\n", encoding="utf-8")
     assert main(["run", str(tmp_path / "field.toml"), "--out", str(out), "--overwrite"]) == 0
     assert (out / "mine.txt").exists()
     assert not list(out.glob("round*"))
-    capsys.readouterr()
 
 
 # A cylinder south of the straight line, 20 m less than its radius away.

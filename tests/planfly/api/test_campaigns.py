@@ -17,10 +17,11 @@ from planfly.campaigns.report import OutputDirectory
 from planfly.campaigns.statistics.decision import Estimate, Goal
 from planfly.campaigns.statistics.wind_boundary import Direction
 from planfly.campaigns.tables import DATABASE, AskedFlight, Store, WindsStore
-from planfly.campaigns.worker_pool import Workers
+from planfly.campaigns.worker_pool import FlyOne, Workers
 from planfly.stages import Advance
 from tests.planfly.campaigns.made_campaigns import all_fly, short_base, table, write_short
 from tests.planfly.campaigns.statistics.made_directions import no_numbers
+from tests.soak import SOAK
 
 FLIGHTS = tuple((number, speed, speed < 8.0) for number in range(4) for speed in (2.0, 6.0, 7.5, 8.5, 10.0, 14.0))
 
@@ -129,7 +130,18 @@ def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:
     assert "fence" in {rule for rule, _ in fly_one(with_both, 0).failed}
 
 
-def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path) -> None:
+def without_pool(monkeypatch: pytest.MonkeyPatch, fly: FlyOne) -> None:
+    """Have every flight of a campaign in its table before a pool would be asked for it."""
+
+    def flown(base: CampaignBase, goal: Goal, workers: Workers, store: Store, advance: Advance) -> Estimate:
+        for index in range(goal.flights):
+            store.add(fly(base, index, None))
+        return fly_campaign(base, goal, workers, store, advance)
+
+    monkeypatch.setattr(campaigns, "fly_campaign", flown)
+
+
+def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same mission, draws and flights; the line that repeats it names the plan in the campaign's folder."""
     plan = planfly.plan("paper-07", seed=1, out=tmp_path / "plan.json")
     bases = [
@@ -141,6 +153,8 @@ def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path) -> None:
     assert bases[0].world_hash() == bases[1].world_hash()
     assert (tmp_path / "a" / "plan.json").read_bytes() == (tmp_path / "b" / "plan.json").read_bytes()
     assert bases[0].scenario.wind.speed == 4.0
+    if not SOAK:
+        without_pool(monkeypatch, fly_one)
     found = planfly.campaign(plan, flights=2, workers=1, seed=3, wind=(4.0, 90.0), out=tmp_path / "c")
     assert found.columns["outcome"].tolist() == [fly_one(bases[1], k).outcome for k in (0, 1)]
     page = (tmp_path / "c" / "report.html").read_text(encoding="utf-8")
@@ -150,12 +164,7 @@ def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path) -> None:
 def test_a_campaign_whose_folder_does_not_stay_gives_its_table(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the flights made up, which a pool would fly: the store holds its table as long as it is open."""
 
-    def fly(base: CampaignBase, goal: Goal, workers: Workers, store: Store, advance: Advance) -> Estimate:
-        for index in range(goal.flights):
-            store.add(all_fly(base, index))
-        return fly_campaign(base, goal, workers, store, advance)
-
-    monkeypatch.setattr(campaigns, "fly_campaign", fly)
+    without_pool(monkeypatch, all_fly)
     plan = planfly.plan("paper-07", seed=1)
     found = planfly.campaign(plan, flights=5, wind=(4.0, 90.0))
     assert found.columns["outcome"].tolist() == ["flyable"] * 5

@@ -22,9 +22,9 @@ from tests.planfly.studio.drafts import drawn_session
 from tests.planfly.studio.served import PageProgram, Served, served
 from tests.soak import SOAK, note, scaled
 
-FUZZED, EDITED = scaled(2000, 12), scaled(1000, 10)
+FUZZED, EDITED = scaled(2000, 12), scaled(1000, 7)
 # Edits before memory is looked at; what more it may be, MB.
-WARM, MOST_MEMORY = 5, 100.0 if SOAK else 20.0
+WARM, MOST_MEMORY = 3, 100.0 if SOAK else 20.0
 
 
 @pytest.fixture(scope="module")
