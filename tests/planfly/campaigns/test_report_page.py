@@ -1,28 +1,34 @@
 """The page: whole, with its pictures inside and nothing fetched."""
 
 import re
-from pathlib import Path
 from xml.etree import ElementTree
+
+import pytest
 
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.report import campaign_page
 from tests.planfly.campaigns.made_report import made_report
 
 
-def test_it_holds_pictures_tables_and_no_link(base: CampaignBase, tmp_path: Path) -> None:
-    with made_report(base, tmp_path) as (store, summary):
-        page = campaign_page(base, summary, store, "planfly campaign <x>").decode()
-        assert page == campaign_page(base, summary, store, "planfly campaign <x>").decode()
+@pytest.fixture(scope="module")
+def pages(base: CampaignBase, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Made twice."""
+    with made_report(base, tmp_path_factory.mktemp("page")) as (store, summary):
+        return [campaign_page(base, summary, store, "planfly campaign <x>").decode() for _ in range(2)]
+
+
+def test_it_holds_pictures_tables_and_no_link(pages: list[str]) -> None:
+    page, again = pages
+    assert page == again
     assert page.count('<svg role="img" aria-label="') == 2 * 5
     assert "planfly campaign &lt;x&gt;" in page
     assert "leg 1" in page
     assert not re.search(r'(src|href)="(?!data:|#)', page)
 
 
-def test_its_pictures_are_dark_where_the_page_is(base: CampaignBase, tmp_path: Path) -> None:
+def test_its_pictures_are_dark_where_the_page_is(pages: list[str]) -> None:
     """Every colour that is drawn is a variable of the page's style, which has a light and a dark one for each."""
-    with made_report(base, tmp_path) as (store, summary):
-        page = campaign_page(base, summary, store, "planfly campaign x").decode()
+    page = pages[0]
     pictures = re.findall(r"<svg .*?</svg>", page, re.DOTALL)
     # Each twice: wide, and narrow for a phone.
     assert len(pictures) == 2 * 5

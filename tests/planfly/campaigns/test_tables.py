@@ -154,7 +154,7 @@ def test_what_is_no_table_is_one_line(tmp_path: Path) -> None:
 
 def test_memory_is_that_of_the_numbers(base: CampaignBase, tmp_path: Path) -> None:
     """A flight takes 8 bytes a column: of 100,000 some 60 MB, where its row takes three kilobytes in the file."""
-    count = 100_000 if SOAK else 10_000
+    count = 100_000 if SOAK else 4_000
     path = kept(tmp_path / "c.sqlite", [replace(fly_one(base, 0), worker="tcp://127.0.0.1:40123")])
     numbers = f"WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n WHERE k < {count - 1}) "
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from aircraft.identification.estimate import Equation, Estimate
 from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means, prior_sds
@@ -41,7 +42,10 @@ def test_the_share_of_the_log_is_what_it_takes_off_the_priors_variance() -> None
     assert rows["ident/lift-slope"].share == 0
 
 
-def test_the_page_says_what_was_found_and_what_was_not() -> None:
+def test_the_page_says_what_was_found_and_what_was_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    # A browser is shown the pictures themselves.
+    blank = dict.fromkeys(("fit-0.png", "fit-1.png", "fit-2.png", "replay.png"), b"")
+    monkeypatch.setattr("logs.views.report.identification.draw_pictures", lambda _: blank)
     page = identification_page(facts())
     for said in (
         "mine, from 10.0 minutes of flight", "climb at full throttle", "7.7", "not seen in these logs",
