@@ -29,14 +29,19 @@ def log(log_path: Path) -> FlightLog:
     return read_log(log_path)
 
 
+@pytest.fixture(scope="module")
+def wanted(log: FlightLog) -> list[np.ndarray]:
+    """The film's frames, of a minute a second."""
+    return list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 60.0).frames())
+
+
 def test_a_gif_holds_the_frames(
-    log: FlightLog, log_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    wanted: list[np.ndarray], log_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target = tmp_path / "film.gif"
     command = ["replay", str(log_path), "--movie", str(target), "--speed", "60"]
     assert main(command) == 0
     assert f"movie     {target}" in capsys.readouterr().out
-    wanted = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 60.0).frames())
     with Image.open(target) as film:
         assert film.n_frames == len(wanted)
         film.seek(len(wanted) - 1)
@@ -94,7 +99,7 @@ def test_what_cannot_be_filmed(
 
 @pytest.mark.parametrize("extra", [False, True])
 def test_an_mp4_is_what_ffmpeg_makes_of_the_frames(
-    extra: bool, log: FlightLog, log_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    extra: bool, wanted: list[np.ndarray], log_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     """A program in place of ffmpeg, on the path or of the extra, keeps its arguments and its input."""
@@ -116,10 +121,9 @@ def test_an_mp4_is_what_ffmpeg_makes_of_the_frames(
         monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     target = tmp_path / "film.mp4"
     assert main(["replay", str(log_path), "--movie", str(target), "--speed", "60"]) == 0
-    frames = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 60.0).frames())
-    assert target.read_bytes() == b"".join(frame.tobytes() for frame in frames)
+    assert target.read_bytes() == b"".join(frame.tobytes() for frame in wanted)
     told = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
-    assert f"{frames[0].shape[1]}x{frames[0].shape[0]}" in told
+    assert f"{wanted[0].shape[1]}x{wanted[0].shape[0]}" in told
     assert told[told.index("-r") + 1] == str(RATE)
     fake.write_text(f"#!{sys.executable}\nimport sys\nsys.exit('Unknown encoder')\n", encoding="utf-8")
     assert main(["replay", str(log_path), "--movie", str(target), "--speed", "60", "--overwrite"]) == 1

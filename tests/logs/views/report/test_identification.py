@@ -1,7 +1,6 @@
-"""The page of an identification: what it says, and that a browser shows it at both widths without a complaint."""
+"""The page of an identification: what it says; `tests.logs.views.report.test_page_in_browser` shows it to a browser."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +8,6 @@ import pytest
 from aircraft.identification.estimate import Equation, Estimate
 from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means, prior_sds
 from logs.views.report.identification import IdentificationFacts, ReplayedLog, identification_page, parameter_rows
-from tests.browser import Browser
-from tests.logs.views.report.page_in_browser import prefer, until
 
 WAVE = np.sin(np.arange(2000) / 40.0)
 
@@ -60,21 +57,3 @@ def test_the_page_says_what_was_found_and_what_was_not(monkeypatch: pytest.Monke
     shown = identification_page(bare)
     assert "The check" not in shown
     assert "Performance only" in shown
-
-
-def test_a_browser_shows_it_wide_and_narrow(tmp_path: Path) -> None:
-    file = tmp_path / "identify.html"
-    file.write_text(identification_page(facts()), encoding="utf-8")
-    with Browser(tmp_path / "profile", 1280, 900) as browser:
-        for width in (1280, 390):
-            prefer(browser, "light", width)
-            browser.open(file)
-            browser.settle()
-            assert browser.value("document.querySelectorAll('.chart').length") == 4
-            browser.value("document.querySelector('.chart').scrollIntoView()")
-            # The library is unpacked first.
-            until(browser, "document.querySelector('.chart').dataset.drawn")
-            # No part of the page is wider than the screen.
-            assert browser.value("document.documentElement.scrollWidth") <= width
-            assert browser.problems == []
-            assert browser.requests == []

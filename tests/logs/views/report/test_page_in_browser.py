@@ -1,6 +1,6 @@
 """The page of a report works in a browser: wide and narrow, by mouse and keys, light and dark, and without a script."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,10 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_flight
+from logs.views import drawing, figures
+from logs.views.figures import View, draw_pictures
 from logs.views.report.compare import compare_logs, write_comparison
+from logs.views.report.identification import identification_page
 from logs.views.report.page import write_report
 from tests.browser import Browser
 from tests.logs.views.report.page_in_browser import (
@@ -26,6 +29,7 @@ from tests.logs.views.report.page_in_browser import (
     spread,
     until,
 )
+from tests.logs.views.report.test_identification import facts
 from tests.soak import SOAK
 
 pytestmark = [pytest.mark.client, pytest.mark.xdist_group("browser")]
@@ -47,9 +51,18 @@ def page(tmp_path_factory: pytest.TempPathFactory, browser: Browser, setup: Flig
     folder = tmp_path_factory.mktemp("report")
     verdict = judge_flight(setup, track, "completed")
     arguments: dict[str, Any] = {"ended": "completed", "versions": {"planfly": "0"}, "command": "planfly run small"}
-    page = write_report(folder, setup, track, verdict, **arguments)[-1]
+    with pytest.MonkeyPatch.context() as patch:
+        if not SOAK:
+            patch.setattr(figures, "draw_pictures", scene_alone)
+        page = write_report(folder, setup, track, verdict, **arguments)[-1]
     browser.open(page)
     return page
+
+
+def scene_alone(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
+    """Blank pictures, but for the one that stands for the view: the others are drawn in tests of their own."""
+    blank = drawing.png_bytes(drawing.new_figure(1.0))
+    return {f"{name}.png": blank for name in views} | draw_pictures({"scene": views["scene"]}, svg=svg)
 
 
 def middle(browser: Browser, element: str) -> tuple[float, float, float, float]:
@@ -278,3 +291,23 @@ def test_the_comparison_has_charts_for_both_and_nothing_grave(
     legend = browser.value("document.querySelector('[data-chart=map] .legend').textContent")
     assert "a.mcap" in legend
     assert "<b>.mcap" in legend
+
+
+def test_an_identification_is_shown_wide_and_narrow(browser: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "identify.html"
+    file.write_text(identification_page(facts()), encoding="utf-8")
+    browser.problems.clear()
+    browser.requests.clear()
+    for width in (1280, 390):
+        prefer(browser, "light", width)
+        if SOAK or width == 1280:
+            browser.open(file)
+        browser.settle()
+        assert browser.value("document.querySelectorAll('.chart').length") == 4
+        browser.value("document.querySelector('.chart').scrollIntoView()")
+        # The library is unpacked first.
+        until(browser, "document.querySelector('.chart').dataset.drawn")
+        # No part of the page is wider than the screen.
+        until(browser, f"document.documentElement.scrollWidth <= {width}")
+        assert browser.problems == []
+        assert browser.requests == []
