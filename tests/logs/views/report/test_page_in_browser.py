@@ -161,7 +161,7 @@ def test_no_legend_covers_a_chart(browser: Browser) -> None:
 
 @pytest.mark.usefixtures("page")
 def test_the_slider_moves_the_aircraft_and_its_read_out(browser: Browser, track: Track) -> None:
-    prefer(browser, "light", 1400)
+    prefer(browser, "light", 1400, 600)
     slider = "document.querySelector('.player input')"
     browser.value("document.querySelector('#view3d').scrollIntoView()")
     browser.value(f"{slider}.value = 0; {slider}.dispatchEvent(new Event('input'))")
@@ -190,7 +190,7 @@ def test_the_slider_moves_the_aircraft_and_its_read_out(browser: Browser, track:
 
 @pytest.mark.usefixtures("page")
 def test_names_stay_while_the_view_is_turned(browser: Browser) -> None:
-    prefer(browser, "light", 1400)
+    prefer(browser, "light", 1400, 600)
     browser.value("document.querySelector('[data-do=home]').click()")
     browser.settle()
     names = set(browser.value("document.querySelector('#view3d').dataset.labels").split("|"))
