@@ -46,7 +46,10 @@ def _rows(text: str, title: str) -> list[list[str]]:
     return [line.split() for line in block.splitlines()[1:] if line.split()[0].replace(".", "").isdigit()]
 
 
-def test_the_aerosonde_is_printed_and_drawn_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.usefixtures("undrawn")
+def test_the_aerosonde_is_printed_as_it_is_and_has_its_pictures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["aircraft", "aerosonde", "--out", "shown"]) == 0
     text = capsys.readouterr().out
     assert sorted(path.name for path in Path("shown").iterdir()) == PICTURES

@@ -33,9 +33,9 @@ def mission(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def short_flight(mission: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Half the way, and little run-in: each of the fakes' flights takes as long as its seconds."""
+    """A third of the way, and little run-in: each of the fakes' flights takes as long as its seconds."""
     if not SOAK:
-        mission.write_text(MISSION.replace("46.006", "46.003").replace("46.012", "46.006"), encoding="utf-8")
+        mission.write_text(MISSION.replace("46.006", "46.002").replace("46.012", "46.004"), encoding="utf-8")
         shorten_run_in(monkeypatch)
 
 

@@ -35,10 +35,10 @@ UNJUDGED_ENDS = {
     "qgc_amsl.plan": "; landing not judged",
 }
 ABOVE_TERRAIN = {"mavproxy_terrain.txt"}
-# Flown without terrain those that end and begin in ways of their own, and in make soak all that can be.
-WITHOUT = sorted(set(LEGS) - ABOVE_TERRAIN if SOAK else {"mission_planner_land.waypoints", "qgc_amsl.plan"})
-# And over terrain one of each format: the others' items are flown in tests of missions, and judged below.
-OVER = sorted(LEGS if SOAK else {"mavproxy_terrain.txt", "by_hand.waypoints"})
+# One is flown without terrain, one over it, and in make soak all that can be: their items are flown in tests of
+# missions, too, and all are judged below.
+WITHOUT = sorted(set(LEGS) - ABOVE_TERRAIN if SOAK else {"qgc_amsl.plan"})
+OVER = sorted(LEGS if SOAK else {"mavproxy_terrain.txt"})
 
 
 def test_every_sample_is_listed() -> None:

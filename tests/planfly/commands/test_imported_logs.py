@@ -180,11 +180,11 @@ COUNTED = {"a.BIN": (dataflash, 14), "a.tlog": (telemetry, 14), "a.ulg": (px4, 1
 
 @pytest.mark.parametrize("name", COUNTED)
 def test_a_mission_that_is_in_the_log_in_part_is_judged_in_part(tmp_path: Path, capsys: Output, name: str) -> None:
-    """From the last item alone to all 13 waypoints: each that the log does not hold is named."""
+    """The last item alone, more, or all 13 waypoints: each that the log does not hold is named."""
     write, total = COUNTED[name]
     assert main(["check", str(write(tmp_path / name, with_13_items()))]) == 0
     capsys.readouterr()
-    for lost in range(1, 14):
+    for lost in range(1, 14) if SOAK else (1, 7, 11, 12, 13):
         log = write(tmp_path / name, with_13_items(), without_items=range(14 - lost, 14))
         missing = "item 13" if lost == 1 else f"items {14 - lost} to 13"
         named = f"{missing} of {total} {'is' if lost == 1 else 'are'} not in the log or left out"

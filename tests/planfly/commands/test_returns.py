@@ -1,6 +1,8 @@
 """``planfly returns``: a mission flown, and its log; what it prints, answers and ends with; bad input."""
 
 import json
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -19,7 +21,21 @@ def hill(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The log of the mission over the hill, flown once."""
+    folder = tmp_path_factory.mktemp("flown")
+    (folder / "hill.toml").write_text(SCENARIO, encoding="utf-8")
+    (folder / "hill.waypoints").write_text(mission_text(), encoding="utf-8")
+    flown = ["fly", str(folder / "hill.waypoints"), "--scenario", str(folder / "hill.toml")]
+    with redirect_stdout(StringIO()) as out:
+        assert main([*flown, "--log", str(folder / "hill.mcap")]) == 0
+    assert "returns   of " in out.getvalue()
+    return (folder / "hill.mcap").read_bytes()
+
+
+def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    (hill / "hill.mcap").write_bytes(log)
     asked = ["returns", "hill.waypoints", "--scenario", "hill.toml", "--every", "20", "--json", "mission.json"]
     assert main(asked) == 4
     out = capsys.readouterr().out
@@ -43,8 +59,6 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFi
     assert (glides["ranges"][0]["reach"], glides["ranges"][-1]["reach"]) == ("home", "flat")
     assert glides["ranges"][0]["own"] == "arrives"
     assert (answer["no_return"], answer["no_return_s"]) == ("never", None)
-    assert main(["fly", "hill.waypoints", "--scenario", "hill.toml", "--log", "hill.mcap"]) == 0
-    assert "returns   of " in capsys.readouterr().out
     assert main(["returns", "hill.mcap", "--every", "20", "--json", "log.json", "--quiet"]) == 4
     of_log = json.loads((hill / "log.json").read_text(encoding="utf-8"))
     assert of_log["headline"] == answer["headline"]
@@ -54,8 +68,8 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, capsys: pytest.CaptureFi
 
 
 @pytest.mark.usefixtures("blank_pictures")
-def test_pictures_map_and_log_go_into_a_folder(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["fly", "hill.waypoints", "--scenario", "hill.toml", "--log", "hill.mcap"]) == 0
+def test_pictures_map_and_log_go_into_a_folder(hill: Path, log: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    (hill / "hill.mcap").write_bytes(log)
     asked = ["returns", "hill.mcap", "--every", "20", "--out", "drawn"]
     assert main([*asked, "--json", "answer.json"]) == 4
     capsys.readouterr()

@@ -10,7 +10,7 @@ import pytest
 import planfly
 from logs.verdict.returns.judge_returns import badness, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
-from planfly import program_returns
+from planfly import program_returns, return_flights
 from planfly.cli import main
 from planfly.program_returns import ProgramReturn, ProgramReturns, worst_apart
 from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
@@ -31,6 +31,7 @@ def mound(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     if not SOAK:
         shorten_run_in(monkeypatch)
+        monkeypatch.setattr(return_flights, "LEAD", 200.0)
     return tmp_path
 
 

@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -56,9 +57,15 @@ if __name__ == "__main__":
 """
 
 
+_WORDS = re.compile(rf"\b({'|'.join(sorted({re.split('[. ]', name)[1] for name in LINUX_ALONE}))})\b")
+
+
 def names_in(file: Path) -> set[str]:
-    """Dotted names that a file uses, and its imports."""
-    nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+    """Dotted names that a file uses, and its imports; none of a file without a word of those that are looked for."""
+    text = file.read_text(encoding="utf-8")
+    if not _WORDS.search(text):
+        return set()
+    nodes = list(ast.walk(ast.parse(text)))
     imports = {f"import {alias.name}" for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     return imports | {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)}
 
