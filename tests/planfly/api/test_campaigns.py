@@ -21,6 +21,7 @@ from planfly.campaigns.worker_pool import FlyOne, Workers
 from planfly.stages import Advance
 from tests.planfly.campaigns.made_campaigns import all_fly, short_base, table, write_short
 from tests.planfly.campaigns.statistics.made_directions import no_numbers
+from tests.planfly.conftest import FIELD
 from tests.soak import SOAK
 
 FLIGHTS = tuple((number, speed, speed < 8.0) for number in range(4) for speed in (2.0, 6.0, 7.5, 8.5, 10.0, 14.0))
@@ -143,7 +144,8 @@ def without_pool(monkeypatch: pytest.MonkeyPatch, fly: FlyOne) -> None:
 
 def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same mission, draws and flights; the line that repeats it names the plan in the campaign's folder."""
-    plan = planfly.plan("paper-07", seed=1, out=tmp_path / "plan.json")
+    (tmp_path / "field.toml").write_text(f"{FIELD}[planner]\npopulation = 20\ngenerations = 5\n", encoding="utf-8")
+    plan = planfly.plan(tmp_path / "field.toml", seed=1, out=tmp_path / "plan.json")
     bases = [
         campaigns._asked(target, None, None, (), 3, wind=(4.0, 90.0)).open(
             default_dispersions(), OutputDirectory(tmp_path / name, DATABASE, resume=False, overwrite=False)
