@@ -202,7 +202,9 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
         search.record()
         return
     if algorithm.seeded:
-        search_other_sides(search)
+        # Without a safe path the first attempt has tried them with the margins of the later ones, too.
+        if number == 0 or search.has_safe():
+            search_other_sides(search)
         if number == 0 and not search.has_safe() and is_closed(search.problem.certified):
             search.is_closed = True
             if not len(search.archive.scores):

@@ -17,7 +17,7 @@ from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, SEARCH_KILL_MARGIN, Problem
+from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
@@ -77,6 +77,8 @@ ARCHIVE_SIZE = 24
 EXTRA_MARGINS = (0.1, 2.0)
 # The same for further attempts from the first path, with corners as flown, where legs have to hold their turns.
 CORNER_MARGINS = (2.0, 5.0)
+# A path that is still this deep inside a missile's sphere once it is shortened is not tried with other margins, m.
+HOPELESS = 15.0
 # What a search keeps from missiles in gaps that are too narrow for its usual margin, beside the certificate's, m.
 NARROW_RESERVE = 1.0
 # Evaluations that `tighten` may take: with less budget left it is skipped.
@@ -89,9 +91,9 @@ CERTIFICATES_AT_ONCE = 4
 
 def with_narrow_margins(problem: Problem) -> Problem:
     """A problem whose search passes missiles more closely, but with the certificate's margin and a little more."""
-    usual = SEARCH_KILL_MARGIN - CERTIFIED_KILL_MARGIN
     data = problem.search
-    return replace(problem, search=data._replace(kill_margin=data.kill_margin - (usual - NARROW_RESERVE)))
+    margin = data.tracking.across + CERTIFIED_KILL_MARGIN + NARROW_RESERVE
+    return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
 
 
 class SearchEnded(Exception):
@@ -268,6 +270,8 @@ class Search:
                 if self.improved is not None:
                     self.improved(path)
                 return True
+            if certificate.kill_distance < -HOPELESS:
+                return False
         return False
 
     def must_end(self) -> bool:

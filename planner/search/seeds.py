@@ -7,6 +7,7 @@ A path in the straight frame cannot turn back. If it contains no safe path, or o
 route that may turn back or circle to climb; paths in a frame along this route are fitted and improved in the same way.
 """
 
+import itertools
 import math
 from contextlib import suppress
 
@@ -23,10 +24,10 @@ from planner.evaluation.encoding import (
     sample_route,
 )
 from planner.plan import Certificate
-from planner.search.search_state import Search, SearchEnded, best_first, safe
+from planner.search.search_state import Search, SearchEnded, best_first, safe, with_narrow_margins
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
-from planner.seeding.lattice import lattice_route, turning_step
+from planner.seeding.lattice import ceiling_route, lattice_route, turning_step
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
@@ -132,9 +133,17 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
 
 # --- Other sides of the obstacles ---
 
-# Stages of the grids; shares of a step for the area of highest ground, the spacing across, and the reduction of
-# spheres.
-STAGES, SPREAD, RATIO, SHRINKS = 50, 0.2, 1.0 / 3.0, (0.2, 0.5)
+# Share of a step for the area of highest ground; stages of the grids, reduction of spheres and spacing across, as
+# shares of a step. A route runs at up to 63 degrees to the direct line on the first: less closes ways near the ends.
+SPREAD, GRIDS = 0.2, ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
+# Finer grids, with steeper and with more courses, where no path is safe or the best is longer than the straight line by
+# more than this share: then there is much to gain.
+FINER_GRIDS, LONG_WAY = ((80, 0.3, 0.5), (80, 0.7, 1.0)), 0.06
+# Steps of routes at the height of the ceiling, m, and how far they may enter missiles' spheres, m: these are tried
+# where the finer grids are, for they may turn back.
+CEILING_STEPS, CEILING_CLOSER = (250.0, 150.0, 100.0), (15.0, 40.0)
+# A path is not tried again if another one is this near to it on average, m.
+SAME_PATH = 20.0
 # Maximum number of routes per grid; and maximum cost relative to the best path, or, if none is safe, to the straight
 # line. With few courses, grid routes are some percent too long.
 MAX_ROUTES, SLACK, MAX_DETOUR = 8, 1.08, 1.8
@@ -148,20 +157,60 @@ def search_other_sides(search: Search) -> None:
     """Shorten the best path, and routes on other sides of the obstacles."""
     if search.shortens and search.has_safe():
         shorten_best(search)
-    encoding, space, data = search.encoding, search.problem.space, search.problem.search
-    frame = rotated_frame(space.start, space.destination)
-    straight, found_one = math.dist(space.start, space.destination), search.has_safe()
-    length = search.length_ratio() if found_one else MAX_DETOUR
-    if is_limited(data.airspace) or length < 1.0 + MIN_DETOUR:
+    length = search.length_ratio() if search.has_safe() else MAX_DETOUR
+    if is_limited(search.problem.search.airspace) or length < 1.0 + MIN_DETOUR:
         return
+    tried = _try_grids(search, GRIDS)
+    if not search.has_safe() or search.length_ratio() > 1.0 + LONG_WAY:
+        tried += _try_grids(search, FINER_GRIDS) + _try_ceiling(search)
+    if not search.has_safe():
+        _try_closely(search, tried)
+
+
+def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
+    """Shorten routes on other sides that these grids propose; returns the routes as paths (w, 3)."""
+    encoding, space, data = search.encoding, search.problem.space, search.problem.search
+    frame, straight = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
-    for shrink in SHRINKS:
-        grid = optimistic_grid(data, frame, span, STAGES, shrink=shrink, spread=SPREAD, ratio=RATIO)
+    tried: list[Floats] = []
+    for stages, shrink, ratio in grids:
+        grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=SPREAD, ratio=ratio)
         bound = straight * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
         for route in side_routes(data, frame, grid, bound, MAX_ROUTES):
             if search.must_end():
-                return
-            search.shorten(resample(frame.restore(route.points), encoding.waypoints))
+                return tried
+            tried.append(resample(frame.restore(route.points), encoding.waypoints))
+            search.shorten(tried[-1])
+    return tried
+
+
+def _try_ceiling(search: Search) -> list[Floats]:
+    """Shorten routes at the height of the ceiling, one for each step and depth; returns them as paths (w, 3)."""
+    data, space = search.problem.search, search.problem.space
+    frame = rotated_frame(space.start, space.destination)
+    tried: list[Floats] = []
+    for step, closer in itertools.product(CEILING_STEPS, CEILING_CLOSER):
+        if search.must_end():
+            break
+        route = ceiling_route(data, frame, step, closer)
+        if not len(route):
+            continue
+        path = resample(route, search.encoding.waypoints)
+        if all(np.sqrt(((path - other) ** 2).sum(axis=1)).mean() > SAME_PATH for other in tried):
+            tried.append(path)
+            search.shorten(path)
+    return tried
+
+
+def _try_closely(search: Search, paths: list[Floats]) -> None:
+    """Shorten paths (w, 3), none of which is safe with the usual margins, with narrow ones."""
+    usual = search.problem
+    search.problem = with_narrow_margins(usual)
+    for path in paths:
+        if search.must_end():
+            break
+        search.shorten(path)
+    search.problem = usual
 
 
 def shorten_best(search: Search) -> None:

@@ -366,3 +366,17 @@ def lattice_route(
     points = frame.restore(np.column_stack([places, up]))
     points[0], points[-1] = data.start, data.destination
     return np.asarray(simplify_route(data, np.ascontiguousarray(points)))
+
+
+def ceiling_route(data: ProblemArrays, frame: RotatedFrame, step: float, closer: float) -> Floats:
+    """World points (k, 3) of a route at the height of the ceiling, where spheres on the ground are smallest.
+
+    It climbs to the ceiling at its start and leaves it at its destination, however steeply: a lattice of a single layer
+    is searched in milliseconds. step: m. closer: how far it may enter missiles' spheres, m. (0, 3) for none.
+    """
+    start, destination = (np.array([*end[:2], data.ceiling]) for end in (data.start, data.destination))
+    for end in (start, destination):
+        # As those of a scenario: to compiled code, arrays that are not locked are of another type.
+        end.setflags(write=False)
+    level = data._replace(start=start, destination=destination, floor=data.ceiling, kill_margin=-closer)
+    return lattice_route(level, frame, step)
