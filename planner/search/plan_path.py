@@ -37,7 +37,6 @@ from planner.search.seeds import (
     shorten_best,
     starting_vectors,
     straight_line,
-    straight_vectors,
 )
 from world.errors import ScenarioError
 from world.random_streams import PLANNER, stream
@@ -207,9 +206,6 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
             search_other_sides(search)
         if number == 0 and not search.has_safe() and is_closed(search.problem.certified):
             search.is_closed = True
-            if not len(search.archive.scores):
-                # A result is needed all the same.
-                search.evaluate(straight_vectors(search))
             search.record()
             search.report(0)
             return

@@ -155,6 +155,9 @@ MAX_REPEATS, MIN_GAIN = 3, 2e-5
 
 def search_other_sides(search: Search) -> None:
     """Shorten the best path, and routes on other sides of the obstacles."""
+    if not len(search.archive.scores):
+        # A search needs a result, even where the grids show no way.
+        search.evaluate(straight_vectors(search))
     if search.shortens and search.has_safe():
         shorten_best(search)
     length = search.length_ratio() if search.has_safe() else MAX_DETOUR

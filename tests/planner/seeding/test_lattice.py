@@ -16,6 +16,7 @@ from planner.seeding.lattice import (
     MAX_LATTICE_STATES,
     MIN_STEP,
     Lattice,
+    ceiling_route,
     cheapest_lattice_route,
     lattice_route,
     make_lattice,
@@ -218,3 +219,20 @@ def test_what_a_pause_raises_ends_the_search(pocket: Problem) -> None:
     data = pocket.search
     with pytest.raises(KeyboardInterrupt):
         lattice_route(data, rotated_frame(data.start, data.destination), 500.0, end)
+
+
+def test_a_route_at_the_ceiling_passes_a_gap_that_spheres_close_by_less_than_they_may_be_entered(
+    make_data: MakeData,
+) -> None:
+    """A row of spheres across the map, 500 m apart, with radii of 580 m on the ground and of 300 m at the ceiling."""
+    row = [{"east_m": 3000, "north_m": north, "kill_radius_m": 580} for north in range(-3000, 3001, 500)]
+    data = make_data([{**threat, "kill_scale_m": 300} for threat in row])
+    frame = rotated_frame(data.start, data.destination)
+    # Half the width of a gap at the ceiling: negative where neighbours overlap.
+    gap = 250.0 - math.sqrt(580.0**2 - data.ceiling**2)
+    assert -60.0 < gap < -40.0
+    assert not len(ceiling_route(data, frame, 250.0, 0.0))
+    route = ceiling_route(data, frame, 250.0, 80.0)
+    assert len(route) > 0
+    assert np.all(route[:, 2] == data.ceiling)
+    np.testing.assert_array_equal(route[[0, -1], :2], [data.start[:2], data.destination[:2]])
