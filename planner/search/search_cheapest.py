@@ -1,12 +1,10 @@
-"""What follows a search that has found a path: the path that takes least time or energy, and what its margins leave.
+"""The path that takes least time or energy, where a scenario asks for that instead of the shortest.
 
-Where a scenario asks for time or energy, all waypoints move at once from the shortest path, from the straight line and
-from routes on other sides of the obstacles, so that the path costs less under the same constraints
-(`planner.seeding.shortening` with `planner.evaluation.travel_cost`): to heights where the wind helps or hinders less,
-and to courses on which it does. In any case the last path is shortened once more with hardly more distance from
-missiles than its certificate requires: the search keeps more, which covers what lies between its samples. A result
-replaces the path before if its certificate is as good and it costs less, so that a plan never costs more than the
-shortest path does.
+The search for the shortest path comes first, with its certificate. From that path, from the straight line and from
+routes on other sides of the obstacles, all waypoints then move at once so that the path costs less under the same
+constraints (`planner.seeding.shortening` with `planner.evaluation.travel_cost`): to heights where the wind helps or
+hinders less, and to courses on which it does. A result replaces the shortest path if its certificate is as good and it
+costs less, so that a plan never costs more than the shortest path does.
 """
 
 import math
@@ -22,7 +20,7 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, ProblemArrays
 from planner.evaluation.travel_cost import TravelCost, make_travel_cost, path_cost
 from planner.plan import Certificate
-from planner.search.search_state import Search, SearchEnded, with_narrow_margins
+from planner.search.search_state import Search, SearchEnded
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from world.errors import ScenarioError
@@ -56,27 +54,16 @@ def wanted_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelC
 
 
 def search_cheapest(search: Search, found: _Found, cost: TravelCost) -> _Found:
-    """The path that costs least and its certificate; what was found where no other that is as safe costs less."""
-    if not search.finished(found[1]):
-        return found
+    """The path that costs least and its certificate; the shortest path where no other that is as safe costs less."""
     by_length = cost.time == 0.0 and cost.energy == 0.0
-    data, cheapest = search.problem.search._replace(travel=cost), found
-    for start in [] if by_length else _starts(search, found[0]):
+    if by_length or not search.finished(found[1]):
+        return found
+    data = search.problem.search._replace(travel=cost)
+    cheapest = found
+    for start in _starts(search, found[0]):
         if search.must_end():
             return cheapest
         cheapest = _cheaper(search, data, start, cheapest)
-    if not by_length:
-        cheapest = _repeated(search, data, cheapest)
-    # The straight line cannot be shortened, and a first safe path is wanted at once.
-    straight = math.dist(found[0][0], found[0][-1])
-    if not search.shortens or search.first_safe or path_length(cheapest[0]) <= (1.0 + MIN_GAIN) * straight:
-        return cheapest
-    narrow = with_narrow_margins(search.problem).search
-    return _repeated(search, narrow._replace(travel=cost), cheapest)
-
-
-def _repeated(search: Search, data: ProblemArrays, cheapest: _Found) -> _Found:
-    """A path that was made cheaper again and again, from equal legs and from its own, while that gains."""
     for _ in range(MAX_REPEATS):
         before = _cost(data, cheapest[0])
         for start in (resample(cheapest[0], len(cheapest[0])), cheapest[0]):

@@ -82,15 +82,3 @@ def test_energy_is_refused_where_the_power_of_the_aircraft_is_not_known(monkeypa
     monkeypatch.setattr("planner.search.search_cheapest.make_travel_cost", lambda *_: None)
     with pytest.raises(ScenarioError, match="power of this aircraft is not known"):
         plan_path(scenario, load_airframe(scenario).limits, seed=1)
-
-
-def test_the_last_shortening_leaves_hardly_more_than_missiles_require() -> None:
-    """A certificate requires 10 m and the search keeps 15; a first safe path is not shortened again."""
-    sphere = {"east_m": 200.0, "north_m": 6000.0, "kill_radius_m": 900.0, "kill_scale_m": 400.0}
-    scenario = plain("length", 180.0, threats=[sphere])
-    limits = load_airframe(scenario).limits
-    first, last = (plan_path(scenario, limits, seed=1, first_safe=wanted) for wanted in (True, False))
-    assert first.safe
-    assert last.safe
-    assert first.certificate.kill_distance > 13.0
-    assert 10.0 <= last.certificate.kill_distance < 12.0
