@@ -88,7 +88,7 @@ def inner(kernel: _Kernel) -> _Kernel:
     """Compile a function that other kernels call, without the wrapper that Python would call it by.
 
     The wrapper is a seventh of what it takes to compile a kernel.  Tests may still call the function: a wrapper is then
-    compiled, and not kept.
+    compiled, and kept apart.
 
     >>> from world.airspace.zone_kernels import box_distance
     >>> callable(box_distance)
@@ -128,7 +128,11 @@ class _InnerKernel:
     @functools.cached_property
     def _around(self) -> Any:
         kernel = self
-        return numba.njit(error_model="numpy")(lambda *given: kernel(*given))
+        return _compiled(lambda *given: kernel(*given))
+
+    def __reduce__(self) -> str:
+        """By its name, which tells the functions around others apart in the cache."""
+        return str(vars(self)["__qualname__"])
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python, which would end the process without a wrapper."""

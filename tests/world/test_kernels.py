@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -44,10 +44,24 @@ def _twice(a: float) -> float:  # pragma: no cover - compiled
     return 2.0 * a
 
 
+@inner
+def _thrice(a: float) -> float:  # pragma: no cover - compiled
+    return 3.0 * a
+
+
 @compiled
 def _add_twice(values: np.ndarray, out: np.ndarray) -> None:  # pragma: no cover - compiled
     for k in range(values.size):
         out[k] += _twice(values[k])
+
+
+def test_what_python_calls_inner_functions_by_is_kept_of_each() -> None:
+    for kernel, product in ((_twice, 10.0), (_thrice, 15.0)):
+        assert kernel(5.0) == product
+        del vars(kernel)["_around"]
+        assert kernel(5.0) == product
+        around: Any = vars(kernel)["_around"]
+        assert sum(around.stats.cache_hits.values()) == 1
 
 
 def test_compiled_code_reads_and_sets_the_fields_that_python_sees() -> None:
