@@ -2,10 +2,12 @@
 
 A place is open if some height between floor and ceiling clears the ground there.  Turns, slopes and what an autopilot
 strays are left out, so that the length is one that no flight reaches; a climb adds what it takes by plain sums.
-``python -m benchmarks.traps.fine_grid`` prints the table of the embedded ``trap-*`` scenarios.
+``python -m benchmarks.traps.fine_grid`` prints the table of the embedded ``trap-*`` scenarios, planned as the grid
+has them, for an autopilot that strays nowhere, and for ArduPlane, whose corners and climbs take room.
 """
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -125,13 +127,17 @@ def climbing_length(scenario: Scenario, way: Floats, climb: float) -> float:
     return map_length(way) + max(0.0, float((need - at).max()))
 
 
-def measure(seed: int = 1) -> dict[str, float]:
-    """Lengths of default plans of the ``trap-*`` scenarios over those that the grid finds; prints them."""
+def measure(autopilot: str, seed: int = 1) -> dict[str, float]:
+    """Lengths of default plans of the ``trap-*`` scenarios over those that the grid finds; prints them.
+
+    autopilot: that they are planned for, as a scenario's ``[flight] autopilot`` names it.
+    """
     ratios = {}
     for name in embedded_names():
         if not name.startswith("trap-"):
             continue
         scenario = load_scenario(name)
+        scenario = replace(scenario, flight=scenario.flight.model_copy(update={"autopilot": autopilot}))
         limits = load_airframe(scenario).limits
         plan = plan_path(scenario, limits, seed=seed)
         way = shortest_on_map(scenario)
@@ -140,11 +146,12 @@ def measure(seed: int = 1) -> dict[str, float]:
         reference = climbing_length(scenario, way, math.tan(climb))
         ratios[name] = map_length(plan.waypoints) / reference
         print(
-            f"  {name:<13}{'safe' if plan.safe else 'NOT SAFE':<9}{map_length(plan.waypoints):8.0f} m"
+            f"  {autopilot:<11}{name:<13}{'safe' if plan.safe else 'NOT SAFE':<9}{map_length(plan.waypoints):8.0f} m"
             f"{reference:8.0f} m  {ratios[name]:.3f}"
         )
     return ratios
 
 
 if __name__ == "__main__":
-    measure()
+    for planned_for in ("ideal", "ardupilot"):
+        measure(planned_for)
