@@ -83,3 +83,14 @@ def test_a_zone_counts_at_any_height_of_a_spiral() -> None:
     assert found(500.0, 590.0, zones=[zone]) == []
     assert found(500.0, 700.0, zones=[zone]) == ["exclusion zone z is not kept"]
     assert found(500.0, 620.0, zones=[zone]) == ["exclusion zone z is not kept"]
+
+
+@pytest.mark.parametrize("side", [(0, 0), (0, 1), (1, 0), (1, 1)])
+def test_the_area_may_end_on_any_side(side: tuple[int, int]) -> None:
+    """West, east, south, north of home; on the other three it ends 9 km away."""
+    setup = loiter(TIME, {})
+    for beyond, said in ((1.0, []), (-1.0, ["the area ends"])):
+        bounds = np.array(setup.scenario.bounds)
+        bounds[side] = (REACH + beyond) * (1.0 if side[1] else -1.0)
+        scenario = replace(setup.scenario, bounds=bounds)
+        assert found(500.0, 500.0, route_requirements(replace(setup, scenario=scenario))) == said
