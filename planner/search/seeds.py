@@ -209,11 +209,14 @@ def _try_closely(search: Search, paths: list[Floats]) -> None:
     """Shorten paths (w, 3), none of which is safe with the usual margins, with narrow ones."""
     usual = search.problem
     search.problem = with_narrow_margins(usual)
-    for path in paths:
-        if search.must_end():
-            break
-        search.shorten(path)
-    search.problem = usual
+    try:
+        for path in paths:
+            if search.must_end():
+                break
+            search.shorten(path)
+    finally:
+        # A search that is asked to end leaves by an exception.
+        search.problem = usual
 
 
 def shorten_best(search: Search) -> None:
