@@ -51,7 +51,7 @@ demo: setup
 test: $(TESTED) clients
 	@$(BIN)/python -m tests.kernels >/dev/null; \
 	echo "tested with the versions of constraints.txt:"; \
-	$(BIN)/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"; \
+	{ $(BIN)/uv pip list --python $(BIN)/python || $(BIN)/python -m pip list; } 2>/dev/null | grep -i -E "$(DIRECT)"; \
 	$(IN_MEMORY); $(BIN)/python -m pytest $(SPREAD)
 
 # What is seen without running anything: style, types, and the pages of docs/.

@@ -1,6 +1,7 @@
 """Settings that hold for all tests."""
 
 import os
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -98,6 +99,15 @@ def _what_a_file_takes(request: pytest.FixtureRequest) -> Iterator[None]:
 def pytest_testnodedown(node: Any) -> None:
     """Remove what the processes of a run have shared, once one of them has ended: all end together."""
     remove_made(node.workerinput["testrunuid"])
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """End one of a run's processes at once: the run would wait 10 s for the threads that clients have left in it."""
+    if hasattr(config, "workerinput"):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

@@ -44,7 +44,10 @@ class Stopwatch:
 
     def _look(self) -> None:
         now = self._waits()
-        self._waited += max((waited - self._before.get(thread, 0.0) for thread, waited in now.items()), default=0.0)
+        more = {thread: waited - self._before.get(thread, 0.0) for thread, waited in now.items()}
+        # While a process goes on, nobody is kept by a wait of the thread that waits for it.
+        others = [waited for thread, waited in more.items() if thread != self._own.parent.name]
+        self._waited += max(others or more.values(), default=0.0)
         self._before = now
 
     def _waits(self) -> dict[str, float]:

@@ -32,6 +32,21 @@ def test_what_a_process_takes_counts_beside_others(code: str) -> None:
             other.kill()
 
 
+def test_a_process_sleeps_in_full_while_the_thread_that_waits_for_it_has_no_core() -> None:
+    usual, core = os.sched_getaffinity(0), {max(os.sched_getaffinity(0))}
+    os.sched_setaffinity(0, core)
+    try:
+        with subprocess.Popen([sys.executable, "-S", "-c", ON_ONE_CORE + "while True: pass"]) as other:
+            process = subprocess.Popen(["sleep", "0.4"], start_new_session=True)
+            with Stopwatch(process.pid) as watch:
+                while process.poll() is None:
+                    pass
+            other.kill()
+    finally:
+        os.sched_setaffinity(0, usual)
+    assert watch.seconds > 0.3
+
+
 def test_the_thread_that_enters_it_counts_and_no_other() -> None:
     over = threading.Event()
     other = threading.Thread(target=lambda: [None for _ in iter(over.is_set, True)])

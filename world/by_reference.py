@@ -84,6 +84,9 @@ def _held(kind: Any) -> Any:
     """A type whose named tuples stand in it by their values, as in memory."""
     if isinstance(kind, Reference):
         return kind.held
+    if isinstance(kind, types.Array):
+        # Whether Python may write them, which another process's copies may be, makes no kernel another one.
+        return kind.copy(readonly=True)
     if _is_named(kind):
         return types.BaseTuple.from_types([_held(member) for member in kind.types], kind.instance_class)
     return kind

@@ -18,7 +18,7 @@ from numba.core.registry import cpu_target
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from world.by_reference import _layout, by_reference
 from world.kernel_cache import PACKAGES, kernel_sources, sources_digest
-from world.kernels import Record, compiled, field_names, inlined, inner, record_dtype
+from world.kernels import Record, compiled, field_names, inlined, inner, read_only, record_dtype
 
 ROOT = Path(__file__).parents[2]
 INNER = record_dtype("east", "north")
@@ -233,6 +233,13 @@ def test_what_stands_behind_a_pointer_lies_as_compiled_code_has_it() -> None:
     reference = numba.typeof(_sites())
     laid_out = context.get_abi_sizeof(context.get_data_type(reference.held))
     assert ctypes.sizeof(_layout(_sites()).memory) == laid_out
+
+
+def test_arrays_that_can_be_written_make_no_other_kernel_behind_a_pointer() -> None:
+    """As a scenario's are once another process has sent it."""
+    place, frozen = Place(0.25, np.zeros(2)), Place(0.25, read_only(np.zeros(2)))
+    site = Site(place, 3, True, np.zeros(1, OUTER)[0], np.zeros((2, 3)))
+    assert numba.typeof(site) == numba.typeof(site._replace(place=frozen, table=read_only(site.table)))
 
 
 def test_no_reference_to_what_stands_behind_a_pointer_is_lost_or_kept() -> None:
