@@ -46,7 +46,8 @@ def test_a_modules_own_tests_come_first_and_its_limits_are_found_where_they_are_
     mutant = replacing("rules", "logs/verdict/rules/bounds_rule.py", "planned >= -ROUNDING", "planned >= -9.0")
     own = "tests/logs/verdict/rules/test_bounds_rule.py", "tests/logs/verdict/rules/limits/test_bounds_rule_limits.py"
     assert set(own) == set(covering_tests(mutant)[0])
-    assert covering_tests(mutant)[1:] == [["tests/logs/verdict"]]
+    # The pages state what rules rank by.
+    assert covering_tests(mutant)[1:] == [["tests/logs/verdict", "tests/docs/test_pages_hold.py"]]
     reserve = replacing("limits", "logs/verdict/tolerances.py", "RESERVE = 0.2", "RESERVE = 0.1")
     assert "tests/logs/verdict/rules/limits/test_energy_rule_limits.py" in covering_tests(reserve)[0]
     stages = [stage for one in some(chosen_mutants(200), 66) for stage in covering_tests(one)]
@@ -59,6 +60,10 @@ def test_compiled_code_that_rests_on_what_changes_is_known() -> None:
     far = replacing("limits", "logs/verdict/tolerances.py", "FAR = 30.0", "FAR = 3.0")
     assert "logs/verdict/measures/path_sweeps.py" in kernels_on(far)
     assert "planner/evaluation/certify_kernels.py" not in kernels_on(far)
+    # With those, what Python calls inner kernels by; without any, nothing.
+    assert "world/kernels.py" in kernels_on(far)
+    title = replacing("rules", "logs/verdict/rules/registry.py", "RULES: ", "RULES : ")
+    assert kernels_on(title) == []
 
 
 def test_a_text_that_stands_twice_or_nowhere_is_refused() -> None:

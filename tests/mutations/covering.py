@@ -9,10 +9,12 @@ from pathlib import Path
 from tests.mutations.mutant import ROOT, Mutant
 from world.kernel_cache import DECORATORS
 
+# Where the functions stand by which Python calls inner kernels: numba keeps them, kernel and all, by this file.
+_WRAPPERS = "world/kernels.py"
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 # Beside the tests of its own name: where what a part's modules do shows.
 PART_TESTS: dict[str, tuple[str, ...]] = {
-    "rules": ("tests/logs/verdict",),
+    "rules": ("tests/logs/verdict", "tests/docs/test_pages_hold.py"),
     "measures": ("tests/logs/verdict",),
     "physics": ("tests/flight/simulation/test_tick.py", "tests/flight/dynamics/test_fdm.py"),
 }
@@ -47,7 +49,8 @@ def kernels_on(mutant: Mutant) -> list[str]:
             if user not in seen:
                 seen.add(user)
                 ahead.append(user)
-    return sorted(user for user in seen - {file} if _has_kernels(user))
+    found = {user for user in seen if _has_kernels(user)}
+    return sorted((found | {_WRAPPERS} if found else found) - {file})
 
 
 def _own_tests(file: str) -> list[str]:
