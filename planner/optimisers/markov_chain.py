@@ -10,7 +10,7 @@ import numpy as np
 from planner.optimisers.box_search import Floats
 from planner.optimisers.linear_algebra import cholesky, covariance
 from planner.optimisers.umda import Umda
-from world.kernels import compiled
+from world.kernels import compiled, copy_into
 
 # Regularisation added to each variance of a group, as a share of their mean.
 RIDGE = 1e-6
@@ -49,7 +49,7 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  
     """For each group (g, size, size): regression on the previous group, and Cholesky factor of the residuals."""
     groups = rows.shape[1] // size
     slope, spread = np.zeros((groups, size, size)), np.zeros((groups, size, size))
-    spread[0] = cholesky(covariance(rows, 0, 0, size), ridge)
+    copy_into(spread[0].ravel(), cholesky(covariance(rows, 0, 0, size), ridge).ravel())
     for g in range(1, groups):
         before, here = (g - 1) * size, g * size
         factor = cholesky(covariance(rows, before, before, size), ridge)
@@ -64,13 +64,13 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  
                 for k in range(j + 1, size):
                     cross[i, j] -= factor[k, j] * cross[i, k]
                 cross[i, j] /= factor[j, j]
-        slope[g] = cross
+        copy_into(slope[g].ravel(), cross.ravel())
         rest = rows[:, here : here + size].copy()
         for n in range(rows.shape[0]):
             for i in range(size):
                 for k in range(size):
                     rest[n, i] -= cross[i, k] * rows[n, before + k]
-        spread[g] = cholesky(covariance(rest, 0, 0, size), ridge)
+        copy_into(spread[g].ravel(), cholesky(covariance(rest, 0, 0, size), ridge).ravel())
     return slope, spread
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import compiled, inner
+from world.kernels import compiled, copy_into, inner
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -116,13 +116,13 @@ def _select(
     groups, _, size = rows.shape
     selected, numbers = np.zeros((groups, number, size)), np.ones(groups, dtype=np.int64)
     for g in range(groups):
-        selected[g, 0] = elite[g]
+        copy_into(selected[g, 0], elite[g])
         for k in np.argsort(costs[g], kind="mergesort"):
             many = numbers[g]
             if many == number or costs[g, k] == np.inf or (costs[g, k] > max_cost and many >= MIN_SELECTED):
                 break
             if _is_distinct(rows[g, k], selected[g, :many], clearing_radius):
-                selected[g, many] = rows[g, k]
+                copy_into(selected[g, many], rows[g, k])
                 numbers[g] += 1
     return selected, numbers
 

@@ -92,7 +92,9 @@ def corners_near_ground(
             if _run(point, path[i]) < MIN_DEPARTURE:
                 continue
             change = abs((path[i, 2] - path[i - 1, 2]) / before - (path[i + 1, 2] - path[i, 2]) / after)
-            lowered[i, :] += 0.25 * change * change * half_blend_length(data.aircraft, path[i, 2])
+            lower = 0.25 * change * change * half_blend_length(data.aircraft, path[i, 2])
+            lowered[i, 0] += lower
+            lowered[i, 1] += lower
         for k in range(SAMPLES):
             corner_point(data, path[i - 1], path[i], path[i + 1], radius, k, point)
             if height_above_required(data, limits, point) < lowered[i, leg_of(k)] + NEAR_GROUND:
