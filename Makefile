@@ -48,7 +48,8 @@ demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
 
 # Kernels are compiled once, before the tests: each of pytest's processes would compile for itself.
-test: $(TESTED) clients
+test:
+	@$(MAKE) --no-print-directory --jobs=2 $(TESTED) clients
 	@$(BIN)/python -m tests.kernels >/dev/null; \
 	echo "tested with the versions of constraints.txt:"; \
 	{ $(BIN)/uv pip list --python $(BIN)/python || $(BIN)/python -m pip list; } 2>/dev/null | grep -i -E "$(DIRECT)"; \
