@@ -64,6 +64,7 @@ def test_compiled_code_that_rests_on_what_changes_is_known() -> None:
     assert "world/kernels.py" in kernels_on(far)
     title = replacing("rules", "logs/verdict/rules/registry.py", "RULES: ", "RULES : ")
     assert kernels_on(title) == []
+    assert all(isinstance(kernels_on(mutant), list) for mutant in listed_mutants())
 
 
 def test_a_text_that_stands_twice_or_nowhere_is_refused() -> None:

@@ -94,4 +94,5 @@ def _importers() -> dict[str, set[str]]:
 
 
 def _has_kernels(file: str) -> bool:
-    return re.search(rf"^@({'|'.join(DECORATORS)})$", _sources()[file], re.MULTILINE) is not None
+    # An aircraft's model is no source of kernels.
+    return re.search(rf"^@({'|'.join(DECORATORS)})$", _sources().get(file, ""), re.MULTILINE) is not None
