@@ -7,11 +7,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
@@ -20,6 +18,7 @@ from logs.verdict.conditions import flown_lines
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text
 from logs.views.drawing import page_svg, png_bytes
+from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import BY_NAME
 from planfly.campaigns.find_winds import ACCURACY, FEWEST, WindsFound
@@ -97,12 +96,7 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 
 
 def _render(template: str, **values: object) -> str:
-    folder = resources.files("planfly.campaigns") / "templates"
-    environment = Environment(
-        loader=FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8")),
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    return environment.get_template(template).render(colours=Markup(css_variables()), **values)
+    return page_template(template, "planfly.campaigns").render(colours=Markup(css_variables()), **values)
 
 
 def winds_page(name: str, figure: Figure, lines: list[str], rows: Sequence[tuple[str, ...]], command: str) -> bytes:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
 
@@ -24,7 +23,15 @@ from logs.views.compare import ROLES, NamedFlight, both_along, both_on_map
 from logs.views.failures import Failures
 from logs.views.figures import View, draw, view_json
 from logs.views.moments import flight_moments
-from logs.views.report.page import CHART_SCRIPTS, page_library, picture_address, script_digest, script_text, style_text
+from logs.views.report.page import (
+    CHART_SCRIPTS,
+    page_library,
+    page_template,
+    picture_address,
+    script_digest,
+    script_text,
+    style_text,
+)
 from logs.views.report.text import NOTHING, badge_of, number
 from logs.views.scene import SceneView, script_json
 from world.files import write_whole
@@ -338,14 +345,7 @@ def _page(
         (name, badge_of(verdict), verdict.headline)
         for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
     ]
-    environment = Environment(
-        loader=PackageLoader("logs.views.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("compare.html").render(
+    return page_template("compare.html").render(
         names=comparison.names,
         verdicts=verdicts,
         rows=difference_rows(comparison),

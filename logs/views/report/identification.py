@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
 
@@ -14,7 +13,15 @@ from aircraft.identification.parameters import PARAMETERS
 from logs.views.charts import Chart
 from logs.views.figures import draw_pictures, view_json
 from logs.views.identification import equation_chart, replay_chart
-from logs.views.report.page import CHART_SCRIPTS, page_library, picture_address, script_digest, script_text, style_text
+from logs.views.report.page import (
+    CHART_SCRIPTS,
+    page_library,
+    page_template,
+    picture_address,
+    script_digest,
+    script_text,
+    style_text,
+)
 from logs.views.scene import script_json
 
 Floats = NDArray[np.float64]
@@ -108,14 +115,7 @@ def identification_page(facts: IdentificationFacts) -> str:
         charts["replay"] = replay_chart(names, units, facts.replay.logged, facts.replay.replayed, facts.replay.hertz)
     pictures = draw_pictures(charts)
     script = script_text(CHART_SCRIPTS)
-    environment = Environment(
-        loader=PackageLoader("logs.views.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("identification.html").render(
+    return page_template("identification.html").render(
         facts=facts,
         minutes=f"{facts.estimate.seconds / 60.0:.1f}",
         fits=_fits(facts.estimate, charts, pictures),

@@ -16,7 +16,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from flight.simulation.setup import FlightSetup
@@ -119,6 +119,25 @@ class PageLibrary:
     packed: str
     digest: str
     version: str
+
+
+@cache
+def _templates(package: str) -> Environment:
+    return Environment(
+        loader=PackageLoader(package),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+def page_template(name: str, package: str = "logs.views.report") -> Template:
+    """A template of a package's folder ``templates``, compiled once in a process.
+
+    What it is rendered with is escaped, and a name in it that is not given is an error.
+    """
+    return _templates(package).get_template(name)
 
 
 def script_text(names: tuple[str, ...]) -> str:
@@ -224,14 +243,7 @@ def _page(
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings, verdict.deciding)
     shown = report_pictures(subject, pictures)
-    environment = Environment(
-        loader=PackageLoader("logs.views.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("report.html").render(
+    return page_template("report.html").render(
         name=setup.scenario.name,
         badge=badge_of(verdict),
         summary=verdict.lines or [""],
