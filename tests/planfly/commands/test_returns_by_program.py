@@ -62,6 +62,7 @@ def test_a_return_that_a_program_flies_as_the_law_does_agrees(
     assert planfly.read_log(mound / one["log"]).ended == "completed"
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_harm_that_a_program_does_counts_where_the_law_does_none(
     mound: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
