@@ -76,15 +76,18 @@ def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: A
     way = np.array([[0.0, 0.0, 150.0], [2000.0 * along, 0.0, 150.0 + 2000.0 * up], [6000.0, 0.0, 250.0]])
     plan = plan_of(airframe_of_x8, way)
     climb, sink = limits.rates(250.0)
-    chance = airframe_of_x8.autopilot.off_height_chance(climb - 0.05 * limits.airspeed, sink, "moderate")
-    assert expected_circles(plan, airframe_of_x8.autopilot, limits) == pytest.approx(chance)
+    climbing = airframe_of_x8.autopilot.off_height_chance(climb - 0.05 * limits.airspeed, sink, "moderate")
+    assert expected_circles(plan, airframe_of_x8.autopilot, limits) == pytest.approx(climbing)
+    down = plan_of(airframe_of_x8, way * [1.0, 1.0, -1.0] + [0.0, 0.0, 500.0])
+    sinking = airframe_of_x8.autopilot.off_height_chance(climb, sink - 0.05 * limits.airspeed, "moderate")
+    assert expected_circles(down, airframe_of_x8.autopilot, limits) == pytest.approx(sinking)
     both = plan_of(airframe_of_x8, np.concatenate([way, [[8000.0, 0.0, 250.0]]]))
     level = airframe_of_x8.autopilot.off_height_chance(climb, sink, "moderate")
-    assert expected_circles(both, airframe_of_x8.autopilot, limits) == pytest.approx(chance + level)
+    assert expected_circles(both, airframe_of_x8.autopilot, limits) == pytest.approx(climbing + level)
 
 
 def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -> None:
-    """Each bend but the first and last keeps away from a zone: nothing can be left out, and no search helps."""
+    """With a NAV_FW_ALT_RAD of 5 m nothing leads past a zone; 5 m less than the value that it names do not help."""
     scenario = scenario_of("moderate")
     found = plan_path(scenario, airframe_of_x8.limits.surely(), seed=SEED)
     tight = Px4(airframe_of_x8.autopilot.with_parameters(NAV_FW_ALT_RAD=5.0).parameters)  # type: ignore[arg-type]
@@ -97,6 +100,18 @@ def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -
     enough, less = (tight.with_parameters(NAV_FW_ALT_RAD=asked) for asked in (value, value - 5.0))
     assert expected_circles(plan, enough, airframe.limits) <= MOST_CIRCLES
     assert expected_circles(plan, less, airframe.limits) > MOST_CIRCLES
+
+
+@pytest.mark.parametrize(("aside", "taken"), [(300.0, True), (2000.0, False)])
+def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: bool, airframe_of_x8: Airframe) -> None:
+    """Of 30 m, less 8 m for gusts: atan(300 / 4000) twice turns by 9 degrees, atan(2000 / 4000) twice by 53."""
+    wide = {"name": "city", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 1600.0}
+    scenario = scenario_of("moderate", zones=[wide])
+    found = plan_path(scenario, airframe_of_x8.limits.surely(), seed=SEED)
+    assert found.safe
+    corner = replace(found, waypoints=np.array([scenario.start, [4000.0, aside, 150.0], scenario.destination]))
+    assert expected_circles(corner, airframe_of_x8.autopilot, airframe_of_x8.limits) <= MOST_CIRCLES
+    assert settle_in_gusts(found, airframe_of_x8, lambda _: corner).feasible is taken
 
 
 def plan_of(airframe: Airframe, waypoints: np.ndarray) -> Plan:
