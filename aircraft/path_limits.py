@@ -98,6 +98,13 @@ class Limits:
         """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed in the turn."""
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
+    def rates(self, amsl: float) -> tuple[float, float]:
+        """Fastest steady climb and sink in still air at an altitude (m), at the airspeed of the limits, m/s."""
+        table = self.performance()
+        speed = float(true_airspeed(table, amsl))
+        climb, sink = (speed * math.sin(np.interp(amsl, table.amsl, angles)) for angles in (table.climb, table.descent))
+        return climb, sink
+
     def performance(self, airspeed: float | None = None) -> PerformanceTable:
         """Performance at a true airspeed (m/s), for compiled functions.
 

@@ -80,6 +80,10 @@ class TrackingError:
         """Distance before a corner of this turn (rad) at which to turn at a ground speed (m/s), m."""
         return float(_between(np.ascontiguousarray(self.acceptance), self.airspeed, turn, ground_speed))
 
+    def corner_excursion(self, turn: float, ground_speed: float) -> float:
+        """Largest distance from the legs at a corner of this turn (rad) at a ground speed (m/s), m."""
+        return float(_between(np.ascontiguousarray(self.excursion), self.airspeed, turn, ground_speed))
+
 
 def no_tracking() -> Record:
     """The record of an autopilot that follows its path exactly.

@@ -32,6 +32,7 @@ from logs.verdict.places import ReferenceFlights
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, laid_from_the_ground, load_airframe
 from planfly.crash_safe_log import CrashSafeLog, FlightLimits
+from planfly.gust_circles import settle_in_gusts
 from planfly.reference_flights import judge_with_reference_flights
 from planfly.returns_beside import ReturnsBeside, returns_beside
 from planner.plan import Plan
@@ -138,10 +139,14 @@ def make_plan(
 ) -> Plan:
     """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
 
-    Where the autopilot circles at the mission's end, the certificate names what that may come too near to.
+    Where the autopilot circles at the mission's end, the certificate names what that may come too near to; where gusts
+    make it circle before that, the plan has as few waypoints as it can do with (`planfly.gust_circles`).
     """
-    made = plan_path(scenario, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
-    plan = laid_from_the_ground(made, airframe)
+
+    def search(world: Scenario) -> Plan:
+        return plan_path(world, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
+
+    plan = laid_from_the_ground(settle_in_gusts(search(scenario), airframe, search), airframe)
     if not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)

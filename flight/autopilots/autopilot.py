@@ -203,6 +203,7 @@ class Autopilot(ABC):
         for any that is not positive, and reads gates.
     flies_ground: whether it flies take-offs and landings, see `from_ground`.
     flies_both_ends: whether it does so only in a mission that has both.
+    height_parameter: says how far off a waypoint's height it circles there; "" for one that flies on.
     height_candidates, side_candidates: parameters that may decide a flight which fails by its height or its track.
     """
 
@@ -216,6 +217,7 @@ class Autopilot(ABC):
     reads_as_px4: ClassVar[bool] = False
     flies_ground: ClassVar[bool] = False
     flies_both_ends: ClassVar[bool] = False
+    height_parameter: ClassVar[str] = ""
     height_candidates: ClassVar[tuple[Candidate, ...]] = ()
     side_candidates: ClassVar[tuple[Candidate, ...]] = ()
     parameters: Parameters | None = None
@@ -436,6 +438,13 @@ class Autopilot(ABC):
         before it turns.  turbulence: of the wind.
         """
         return None
+
+    def off_height_chance(self, climb: float, sink: float, turbulence: Turbulence) -> float:
+        """Chance (0..1) that gusts have it so far off a waypoint's height that it circles there; 0 if it flies on.
+
+        climb, sink: what the aircraft has in hand against gusts, m/s.
+        """
+        return 0.0
 
     def with_parameters(self, **values: float) -> "Autopilot":
         """The same law with other values of parameters, by its own names and in its own units."""

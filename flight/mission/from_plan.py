@@ -150,9 +150,20 @@ def _offsets(turns: Floats, radius: float) -> Floats:
 
 def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
     """(w,) m, whole: for each corner at the highest ground speed on the way from one course to the other."""
-    turns, courses = turning_angles(points), leg_courses(points)
     radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
-    for i, turn in enumerate(turns, 1):
+    speeds = corner_speeds(scenario, points, airspeed)
+    for i, (turn, fastest) in enumerate(zip(turning_angles(points), speeds, strict=True), 1):
+        radii[i] = tracking.corner_acceptance(float(turn), fastest)
+    return np.round(radii)
+
+
+def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[float]:
+    """Highest ground speed (m/s) at each corner of a path (w, 3), from one course to the other, w - 2 of them.
+
+    airspeed: equivalent, m/s; where a course cannot be held, the true one counts.
+    """
+    courses, speeds = leg_courses(points), []
+    for i in range(1, len(points) - 1):
         up = float(points[i, 2])
         east, north = scenario.wind.at(up)
         speed = airspeed * air_density_factor(up)
@@ -162,9 +173,8 @@ def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, trackin
             for c in between.tolist()
         ]
         # NaN, where a course cannot be held, is no speed.
-        fastest = max((v for v in over_ground if v > 0.0), default=speed)
-        radii[i] = tracking.corner_acceptance(float(turn), fastest)
-    return np.round(radii)
+        speeds.append(max((v for v in over_ground if v > 0.0), default=speed))
+    return speeds
 
 
 def _milli(value: float) -> float:

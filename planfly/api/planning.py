@@ -11,6 +11,7 @@ from logs.verdict.conditions import Conditions, conditions_of
 from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, laid_from_the_ground, load_airframe
 from planfly.arguments import check_arguments, is_wind
 from planfly.first_start import with_warm_up
+from planfly.gust_circles import settle_in_gusts
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.stages import stage
 from planfly.targets import file_target
@@ -287,8 +288,12 @@ def _planned(
     airframe, ends = load_airframe(world), stop_condition(seconds, stop)
     limits = airframe.limits.surely()
     with stage(f"planning {world.name}", "planning") as advance:
+
+        def search(asked: Scenario) -> Plan:
+            return plan_path(asked, limits, seed=number, algorithm=algorithm, progress=advance, stop=ends)
+
         if flown is None:
-            made = plan_path(world, limits, seed=number, algorithm=algorithm, progress=advance, stop=ends)
+            made = settle_in_gusts(search(world), airframe, search)
         else:
             old, leg = flown
             made = replan_path(world, limits, old, leg, seed=number, algorithm=algorithm, progress=advance, stop=ends)

@@ -18,6 +18,7 @@ from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.views.failures import track_distance
 from planfly.airframe import Airframe, laid_from_the_ground
+from planfly.gust_circles import settle_in_gusts
 from planfly.pipeline import fly_and_judge
 from planfly.studio.changes import flight_figures
 from planfly.studio.desk import Desk
@@ -102,8 +103,11 @@ def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
     if asked.ways > 1:
         front = plan_front(scenario, limits, asked.ways, seed=asked.seed, progress=advance, stop=stop, finish=finish)
         return list(front.plans) or [front.default]
-    made = plan_path(scenario, limits, seed=asked.seed, algorithm=asked.algorithm, progress=advance, stop=stop)
-    made = finish(made)
+
+    def search(asked_for: Scenario) -> Plan:
+        return plan_path(asked_for, limits, seed=asked.seed, algorithm=asked.algorithm, progress=advance, stop=stop)
+
+    made = finish(settle_in_gusts(search(scenario), asked.airframe, search))
     # Beside no other nothing is to compare: what takes longer to work out is not known.
     length = float(np.linalg.norm(np.diff(made.waypoints, axis=0), axis=1).sum())
     clearance = float(made.certificate.clearance) + scenario.limits.min_clearance_m

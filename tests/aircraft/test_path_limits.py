@@ -58,6 +58,11 @@ def test_still_air_is_the_envelope() -> None:
     assert _limits().slopes(0.0, 500.0, airspeed=27.5) == pytest.approx((UP - 0.025, DOWN))
 
 
+def test_rates_are_those_of_still_air_in_any_wind() -> None:
+    climb = 25.0 * math.sin(UP + math.radians(0.5))
+    assert _limits(_from(30.0)).rates(250.0) == pytest.approx((climb, 25.0 * math.sin(DOWN)))
+
+
 @pytest.mark.parametrize(
     ("course", "up_deg", "down_deg"),
     [

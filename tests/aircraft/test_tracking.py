@@ -31,6 +31,7 @@ def test_what_is_linear_is_found_between_the_knots(turn_deg: float, speed: float
     deviation = corner_deviation(error_of().record, turn, speed)
     assert deviation == pytest.approx((10.0 * turn + speed - 15.0, 3.0 * turn, 7.0 * turn))
     assert error_of().corner_acceptance(turn, speed) == pytest.approx(40.0 * turn)
+    assert error_of().corner_excursion(turn, speed) == pytest.approx(10.0 * turn + speed - 15.0)
 
 
 def test_outside_the_tables_their_edges_count() -> None:

@@ -27,7 +27,7 @@ from flight.autopilots.px4.parameters import (
     load_parameters,
     stored_parameters,
 )
-from flight.autopilots.px4.tracking_error import tracking_error
+from flight.autopilots.px4.tracking_error import off_height_chance, tracking_error
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
@@ -62,6 +62,7 @@ class Px4(Autopilot):
     equivalent_airspeeds: ClassVar = True
     refuses: ClassVar = True
     reads_as_px4: ClassVar = True
+    height_parameter: ClassVar = "NAV_FW_ALT_RAD"
     height_candidates: ClassVar = HEIGHT_CANDIDATES
     side_candidates: ClassVar = SIDE_CANDIDATES
     parameters: Px4Parameters = field()
@@ -231,6 +232,10 @@ class Px4(Autopilot):
     ) -> TrackingError | None:
         """How far its law strays with these parameters; it flies no waypoint over."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
+
+    def off_height_chance(self, climb: float, sink: float, turbulence: Turbulence) -> float:
+        """More than NAV_FW_ALT_RAD, in moderate turbulence."""
+        return off_height_chance(self.parameters["NAV_FW_ALT_RAD"], climb, sink, turbulence)
 
     def as_asked(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0

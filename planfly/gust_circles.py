@@ -1,0 +1,103 @@
+"""Waypoints at which gusts make an autopilot circle: as few of them as a plan can do with, or a plan that is not safe.
+
+PX4 flies on at a waypoint only within NAV_FW_ALT_RAD of its height.  Moderate turbulence throws light aircraft further
+than that now and then, and a circle leads away from all that a plan keeps clear of.  So a plan has as many waypoints
+as leave less than `MOST_CIRCLES` circles to a flight, and says so where it needs more.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from aircraft.path_limits import Limits
+from aircraft.tracking import corridor_half_width
+from flight.autopilots.autopilot import Autopilot
+from flight.mission.from_plan import corner_speeds
+from planfly.airframe import Airframe
+from planner.plan import Plan
+from planner.search.fewer_waypoints import drop_waypoints
+from world.geometry import leg_slopes, turning_angles
+from world.scenario import Scenario
+
+# Circles that a flight may expect; about every second one leaves the corridor (of 186 flights, with 58 waypoints passed
+# too high or too low, 30 failed).
+MOST_CIRCLES = 0.03
+# What gusts make of a corner's excursion, m: of 28 m they made 36 at the most in 8 flights.
+GUSTS_ASIDE = 8.0
+# Values of the autopilot's parameter that are looked at for what would help, m.
+_HELPFUL = range(5, 105, 5)
+
+
+def settle_in_gusts(plan: Plan, airframe: Airframe, search: Callable[[Scenario], Plan] | None = None) -> Plan:
+    """A safe plan with few enough waypoints for its turbulence; as it is where it has, or with what is wrong.
+
+    search: plans a scenario as the plan was planned; None not to look for another path.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from planner.search.plan_path import plan_path
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> airframe = load_airframe(scenario)
+    >>> plan = plan_path(scenario, airframe.limits, seed=1)
+    >>> settle_in_gusts(plan, airframe) is plan
+    True
+    """
+    autopilot, limits = airframe.autopilot, airframe.limits
+    if not plan.safe or expected_circles(plan, autopilot, limits) <= MOST_CIRCLES:
+        return plan
+    fewer = drop_waypoints(plan, limits.surely())
+    if _is_settled(fewer, airframe):
+        return fewer
+    circles, count = expected_circles(fewer, autopilot, limits), len(fewer.waypoints) - 2
+    if search is not None:
+        # By the chance at a waypoint of this path: on another it may be less.
+        allowed, scenario = max(1, int(MOST_CIRCLES * count / circles)), plan.scenario
+        table = scenario.planner.model_copy(update={"waypoints": allowed + 2})
+        other = replace(search(replace(scenario, planner=table)), scenario=scenario)
+        if other.safe and _is_settled(other, airframe):
+            return other
+    certificate = plan.certificate
+    problems = (*certificate.problems, _what_is_wrong(plan, autopilot, limits))
+    return replace(plan, certificate=replace(certificate, problems=problems))
+
+
+def _is_settled(plan: Plan, airframe: Airframe) -> bool:
+    """Whether a plan expects few enough circles, and its corners, sharper than those of more waypoints, no corridor."""
+    scenario, limits, autopilot = plan.scenario, airframe.limits, airframe.autopilot
+    if expected_circles(plan, autopilot, limits) > MOST_CIRCLES:
+        return False
+    tracking = limits.tracking
+    if tracking is None:
+        return True
+    corridor = corridor_half_width(scenario.limits.corridor_m, autopilot.acceptance_radius) - GUSTS_ASIDE
+    turns, speeds = turning_angles(plan.waypoints), corner_speeds(scenario, plan.waypoints, limits.airspeed)
+    return all(tracking.corner_excursion(float(one), v) <= corridor for one, v in zip(turns, speeds, strict=True))
+
+
+def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
+    """Circles at waypoints between its ends that a flight of a plan may expect.
+
+    A leg that climbs or sinks leaves less of what the aircraft can; what is left counts against the gusts.
+    """
+    turbulence, expected = plan.scenario.wind.turbulence, 0.0
+    for slope, waypoint in zip(leg_slopes(plan.waypoints), plan.waypoints[1:-1], strict=False):
+        climb, sink = limits.rates(float(waypoint[2]))
+        rate = limits.airspeed * math.sin(slope)
+        expected += autopilot.off_height_chance(climb - max(0.0, rate), sink - max(0.0, -rate), turbulence)
+    return expected
+
+
+def _what_is_wrong(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
+    """Why a plan is not safe in its turbulence, and what would help, in one line."""
+    count, name = len(plan.waypoints) - 2, autopilot.height_parameter
+    circles = expected_circles(plan, autopilot, limits)
+    helps = "Less turbulence"
+    for value in _HELPFUL:
+        if expected_circles(plan, autopilot.with_parameters(**{name: float(value)}), limits) <= MOST_CIRCLES:
+            helps = f"{name} of {value} m"
+            break
+    return (
+        f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles where gusts have it off a waypoint's"
+        f" height, at one of {count} in {min(circles, 1.0):.0%} of flights; up to {MOST_CIRCLES:.0%} are taken for"
+        f" safe. {helps} would help"
+    )

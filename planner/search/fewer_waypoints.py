@@ -1,0 +1,59 @@
+"""A plan without the waypoints that it does not need: for an autopilot that may not fly on at each of them."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from planner.evaluation.certify import certify
+from planner.evaluation.paper_scores import paper_scores
+from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem, make_problem
+from planner.plan import Certificate, Plan
+from planner.search.algorithms import find_algorithm, limits_for
+
+Floats = NDArray[np.float64]
+
+
+def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
+    """A safe plan without the waypoints that it stays safe without, the smallest detours first; it gets no longer.
+
+    Distances to missiles stay at what plans keep, or at the plan's own where that is less.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from planner.search.plan_path import plan_path
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> limits = load_airframe(scenario).limits
+    >>> plan = plan_path(scenario, limits, seed=1)
+    >>> fewer = drop_waypoints(plan, limits)
+    >>> fewer.safe, len(fewer.waypoints) < len(plan.waypoints)
+    (True, True)
+    """
+    scenario = plan.scenario
+    problem = make_problem(scenario, limits_for(find_algorithm(plan.algorithm, scenario.name), limits))
+    nearest = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN)
+    while (certified := _without_one(problem, plan.waypoints, nearest)) is not None:
+        waypoints, certificate = certified
+        counts, objectives = paper_scores(problem.certified, waypoints[None])
+        plan = replace(
+            plan, waypoints=waypoints, certificate=certificate, violations=counts[0], objectives=objectives[0]
+        )
+    return plan
+
+
+def _without_one(problem: Problem, waypoints: Floats, nearest: float) -> tuple[Floats, Certificate] | None:
+    """Waypoints (w - 1, 3) of a path (w, 3) that is certified, and no nearer to a missile than this (m); None if none.
+
+    The waypoint that makes the smallest detour is tried first.
+    """
+    legs, chords = np.diff(waypoints, axis=0), waypoints[2:] - waypoints[:-2]
+    runs = np.linalg.norm(legs, axis=1)
+    detours = runs[:-1] + runs[1:] - np.linalg.norm(chords, axis=1)
+    for i in 1 + np.argsort(detours, kind="stable"):
+        fewer = np.delete(waypoints, i, axis=0)
+        certificate = certify(problem, fewer)
+        samples, _ = paper_scores(problem.certified, fewer[None])
+        if certificate.ok and certificate.kill_distance >= nearest and not samples.any():
+            return fewer, certificate
+    return None
