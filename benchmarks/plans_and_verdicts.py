@@ -1,8 +1,9 @@
 """Whether what the planner calls safe is flyable: on fresh scenarios, by the geometry of the plan and by its flight.
 
-``python -m benchmarks.plans_and_verdicts [--plans N] [--from NUMBER] [--json FILE]`` plans random scenarios over ground
-from 0 to 4,000 m, in wind, among zones and missiles, for each shipped fixed wing and each autopilot
-(`tests.fresh_plans`), judges each plan without a flight, flies it, judges the flight, and counts where they differ.
+``python -m benchmarks.plans_and_verdicts [--plans N] [--from NUMBER] [--plan-only] [--json FILE]`` plans random
+scenarios over ground from 0 to 4,000 m, in wind, among zones and missiles, for each shipped fixed wing and each
+autopilot (`tests.fresh_plans`), judges each plan without a flight, flies it, judges the flight, and counts where they
+differ. With ``--plan-only`` it plans, and says what planning takes, of those without a plan, too.
 """
 
 import argparse
@@ -11,13 +12,18 @@ import time
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from statistics import median
 
 from flight.mission.from_plan import plan_mission
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import load_airframe
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from planner.plan import Objective
 from tests.fresh_plans import fresh_scenario
 from world.errors import PlanflyError
+
+# A plan that takes more CPU than this is slow, s.
+SLOW = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +31,8 @@ class Answer:
     """What became of one scenario.
 
     plan: "safe", or why there is none.  drawn, flown: the verdicts without and with a flight, "" where there is none.
-    wrong: what failed of either.  seconds: of a core for the plan, and for its flight and verdicts.
+    wrong: what failed of either.  seconds: of a core for the plan, and for its flight and verdicts.  ratio: of the
+    plan's length to the straight line.  evaluations: of its search.
     """
 
     name: str
@@ -35,10 +42,15 @@ class Answer:
     flown: str = ""
     wrong: str = ""
     seconds: tuple[float, float] = (0.0, 0.0)
+    ratio: float = 0.0
+    evaluations: int = 0
 
 
-def answer(number: int, *, flown: bool = True) -> Answer:
-    """Plan the scenario of this number and judge the plan; where it is to be flown, fly it and judge the flight."""
+def answer(number: int, *, judged: bool = True, flown: bool = True) -> Answer:
+    """Plan the scenario of this number; where it is to be judged, judge the plan, and where it is to be flown, fly it.
+
+    A flight is judged, too.
+    """
     scenario = fresh_scenario(number)
     whose = scenario.name, scenario.wind.turbulence
     began = time.process_time()
@@ -48,9 +60,11 @@ def answer(number: int, *, flown: bool = True) -> Answer:
     except PlanflyError as error:
         return Answer(*whose, f"refused: {error}")
     planned = time.process_time()
-    if not plan.safe:
+    found = float(plan.objectives[Objective.LENGTH_RATIO]), plan.evaluations
+    if not (plan.safe and judged):
         why = "; ".join(plan.certificate.problems[:2])
-        return Answer(*whose, f"no plan: {why}", seconds=(planned - began, 0.0))
+        said = "safe" if plan.safe else f"no plan: {why}"
+        return Answer(*whose, said, "", "", "", (planned - began, 0.0), *found)
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
     verdicts = {"drawn": judge_geometry(setup)}
@@ -63,8 +77,8 @@ def answer(number: int, *, flown: bool = True) -> Answer:
         if one.ok is False
     ]
     spent = (planned - began, time.process_time() - planned)
-    said = {level: verdict.answer for level, verdict in verdicts.items()}
-    return Answer(*whose, "safe", said["drawn"], said.get("flown", ""), "; ".join(wrong[:3]), spent)
+    answers = {level: verdict.answer for level, verdict in verdicts.items()}
+    return Answer(*whose, "safe", answers["drawn"], answers.get("flown", ""), "; ".join(wrong[:3]), spent, *found)
 
 
 def main() -> None:
@@ -72,21 +86,36 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.plans_and_verdicts")
     parser.add_argument("--plans", type=int, default=300)
     parser.add_argument("--from", dest="first", type=int, default=0, help="number of the first scenario")
+    parser.add_argument("--plan-only", action="store_true", help="neither judge nor fly the plans")
     parser.add_argument("--json", type=Path, help="file for the answers")
     args = parser.parse_args()
+    # The first plan loads kernels.
+    answer(args.first, judged=False)
     answers = []
     for number in range(args.first, args.first + args.plans):
-        answers.append(answer(number))
+        answers.append(answer(number, judged=not args.plan_only))
         one = answers[-1]
         told = f"{one.plan[:60]:10s} {one.drawn} {one.flown}  {one.wrong}"
         print(f"{one.name:28s} {one.seconds[0]:5.1f} s {told}", flush=True)
     safe = [one for one in answers if one.plan == "safe"]
-    print(f"{len(safe)} of {len(answers)} planned safely; without a flight {dict(Counter(one.drawn for one in safe))}")
+    spent, slowest = [one.seconds[0] for one in answers], max(answers, key=lambda one: one.seconds[0])
+    print(
+        f"CPU of a plan: median {median(spent):.2f} s, most {max(spent):.2f} s ({slowest.name});"
+        f" {sum(seconds > SLOW for seconds in spent)} take more than {SLOW:g} s"
+    )
+    print(f"{len(safe)} of {len(answers)} planned safely")
+    if not args.plan_only:
+        _print_verdicts(safe)
+    if args.json:
+        args.json.write_text(json.dumps([asdict(one) for one in answers], indent=1) + "\n", encoding="utf-8")
+
+
+def _print_verdicts(safe: list[Answer]) -> None:
+    """What the verdicts of safe plans are, without a flight and with one."""
+    print(f"without a flight {dict(Counter(one.drawn for one in safe))}")
     for turbulence in ("none", "light", "moderate"):
         flown = Counter(one.flown for one in safe if one.turbulence == turbulence)
         print(f"flown in {turbulence:8s} turbulence: {dict(flown)}")
-    if args.json:
-        args.json.write_text(json.dumps([asdict(one) for one in answers], indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -170,22 +170,22 @@ def add_airspace_violations(
                 violations.bounds += _zone_excess(data, a, b, across + width, below, above)
             if topped:
                 more = max(0.0, -lag_at(lags[i], share), -lag_at(lags[i], abs(share - part)))
-                violations.terrain += _excess_height_around(data, required, a, b, across + width, more)
+                violations.terrain += _excess_height_around(data, required, a, b, across + width, more, math.inf)
 
 
 @inner
 def airspace_excess(
-    data: ProblemArrays, a: Floats, b: Floats, below: float, above: float
+    data: ProblemArrays, a: Floats, b: Floats, below: float, above: float, enough: float
 ) -> float:  # pragma: no cover - compiled
     """Zone penetration and excess height above ground of a single leg, integrated along it: m x km.
 
-    below, above: vertical tracking error, m.
+    below, above: vertical tracking error, m. enough: what exceeds it is not integrated further.
     """
     total, across = 0.0, float(data.tracking.across)
     if data.airspace.zones.required.shape[0] > 0:
         total += _zone_excess(data, a, b, across, below, above)
     if data.airspace.max_height < math.inf:
-        total += _excess_height_around(data, required_headroom(data), a, b, across, above)
+        total += _excess_height_around(data, required_headroom(data), a, b, across, above, enough - total)
     return total
 
 
@@ -203,7 +203,7 @@ def _excess_height(
 ) -> float:  # pragma: no cover - compiled
     """Excess over the maximum height above ground along a leg, with its height lag: m x km."""
     if not data.tracking.has_error:
-        return _excess_height_around(data, required, a, b, 0.0, 0.0)
+        return _excess_height_around(data, required, a, b, 0.0, 0.0, math.inf)
     total, one, two = 0.0, np.empty(3), np.empty(3)
     for k in range(len(_LAG_CUTS)):
         share = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
@@ -211,15 +211,18 @@ def _excess_height(
         if until > share:
             _cut(a, b, share, until, one, two)
             above = max(0.0, -lag_at(lag, share), -lag_at(lag, until))
-            total += _excess_height_around(data, required, one, two, across, above)
+            total += _excess_height_around(data, required, one, two, across, above, math.inf)
     return total
 
 
 @inner
 def _excess_height_around(
-    data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float
+    data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, lateral: float, above: float, enough: float
 ) -> float:  # pragma: no cover - compiled
-    """Largest excess over the maximum height above ground of a line and the lines offset to both sides: m x km."""
+    """Largest excess over the maximum height above ground of a line and the lines offset to both sides: m x km.
+
+    A lower bound on it where it exceeds `enough`.
+    """
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     east, north = lateral * (b[1] - a[1]) / run, -lateral * (b[0] - a[0]) / run
     largest = 0.0
@@ -229,7 +232,10 @@ def _excess_height_around(
         x, y, x2, y2 = a[0] + side * east, a[1] + side * north, b[0] + side * east, b[1] + side * north
         ends = segment_pixels(data.to_pixel, x, y, x2, y2)
         depths, bounds = data.airspace.depths, data.slope_bounds
-        largest = max(largest, terrain_excess(depths, bounds, required, above, ends, x, y, -a[2], x2, y2, -b[2]))
+        excess = terrain_excess(depths, bounds, required, above, ends, x, y, -a[2], x2, y2, -b[2], enough)
+        largest = max(largest, excess)
+        if largest > enough:
+            break
     return largest
 
 
@@ -273,6 +279,6 @@ def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:  # pragma: no cov
                     step = paths[k, i + 1, axis] - paths[k, i, axis]
                     a[axis] = paths[k, i, axis] + step * piece / POINTS
                     b[axis] = paths[k, i, axis] + step * (piece + 1) / POINTS
-                if airspace_excess(data, a, b, 0.0, 0.0) > 0.0:
+                if airspace_excess(data, a, b, 0.0, 0.0, math.inf) > 0.0:
                     counts[k] += 1
     return counts

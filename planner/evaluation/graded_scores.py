@@ -266,7 +266,7 @@ def _corner_depth(
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
         x2, y2, z2 = vertices[k + 1, 0], vertices[k + 1, 1], vertices[k + 1, 2]
         ends = segment_pixels(to_pixel, x, y, x2, y2)
-        total += terrain_excess(heights, slope_bounds, required, more, ends, x, y, z, x2, y2, z2)
+        total += terrain_excess(heights, slope_bounds, required, more, ends, x, y, z, x2, y2, z2, math.inf)
     return total
 
 

@@ -167,8 +167,9 @@ def terrain_excess(
     bx: float,
     by: float,
     bz: float,
+    enough: float,
 ) -> float:  # pragma: no cover - compiled
-    """Depth below the required clearance along a-b, summed over samples (m x km).
+    """Depth below the required clearance along a-b, summed over samples (m x km); up to where it exceeds `enough`.
 
     more: additional height required here, m. ends: columns and rows of a and b.
     """
@@ -179,14 +180,15 @@ def terrain_excess(
     pitch = 1.0 / max(1.0, math.ceil(run / required.sample_pitch))
     tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
     need = required.clearance + required.buffer + more
-    depth, f = 0.0, 0.0
+    scale = max(run, 1.0) * pitch / 1000.0
+    depth, f, deepest = 0.0, 0.0, enough / scale
     while True:
         if not required.same_everywhere:
             need = clearance_at(required, ax + f * (bx - ax), ay + f * (by - ay)) + more
         x, y, up = column + f * column_step, row + f * row_step, az + f * rise
         gap, ahead = _sample(heights, tiles, tile_side, growth, x, y, up, need, 0.0, run, rise, pitch)
         depth -= gap if gap < 0.0 else 0.0
-        if f >= 1.0:
+        if f >= 1.0 or depth > deepest:
             break
         f = min(1.0, f + ahead)
     return float(depth * max(run, 1.0) * pitch / 1000.0)

@@ -1,9 +1,12 @@
 """Proof that no path exists, whatever its waypoints: ground, ceiling and missiles close every way on the map.
 
+In thin air an aircraft can be too slow to hold its height at its cruise speed; no leg may begin or end there, so that
+the height at which this begins closes like a ceiling.
+
 The map is cut into square columns. A height is closed in a column if the whole square is inside one kill sphere there,
 or below the lowest ground of the square plus the clearance; everything else counts as open, and a path may go from a
 column to the next one, or to the one after, at any height that is open in both. So no safe path exists if the
-destination is not reached then. Slopes, turns, zones and margins are ignored: they only close more.
+destination is not reached then. Other slopes, turns, zones and margins are ignored: they only close more.
 """
 
 import math
@@ -11,9 +14,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.path_limits import true_airspeed
 from planner.evaluation.problem import ProblemArrays
 from world.frames import polymap
 from world.kernels import compiled, inner
+from world.wind import mean_wind_speed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -22,6 +27,8 @@ Flags = NDArray[np.bool_]
 # Columns along the map's longer side; their smallest side, m; and closed stretches of height that a column may have:
 # what is above counts as open.
 COLUMNS, MIN_SIDE, STRETCHES = 500, 10.0, 6
+# Added to the height of the highest level flight, m: more than its interpolation can be off by.
+ROUNDING = 1e-6
 
 
 def column_side(data: ProblemArrays) -> float:
@@ -43,8 +50,38 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
     >>> [is_closed(make_problem(one, load_airframe(one).limits).certified) for one in (scenario, guarded)]
     [False, True]
     """
-    used = np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles
-    return bool(_is_closed(data, used, column_side(data), margin))
+    used, top = np.ones(len(data.threats), dtype=np.bool_) if missiles is None else missiles, highest_level_flight(data)
+    if max(data.start[2], data.destination[2]) > top:
+        return True
+    return bool(_is_closed(data._replace(ceiling=min(data.ceiling, top)), used, column_side(data), margin))
+
+
+def highest_level_flight(data: ProblemArrays) -> float:
+    """Height that no waypoint may exceed, m: above it the aircraft sinks, and no leg may lead; inf where there is none.
+
+    As in `planner.evaluation.leg_constraints`, where both slopes are the aircraft's. Nothing is said of winds in which
+    a course cannot be held.
+    """
+    table = data.aircraft
+    if not (math.isnan(data.max_climb) and math.isnan(data.max_dive) and table.equivalent > 0.0):
+        return math.inf
+    # The entries on which slopes below the ceiling depend.
+    count = int(np.searchsorted(table.amsl, data.ceiling)) + 1
+    climb, amsl = table.climb[:count], table.amsl[:count]
+    level = np.flatnonzero(climb >= 0.0)
+    last = int(level[-1]) if level.size else -1
+    if last == climb.size - 1:
+        return math.inf
+    top = -math.inf
+    if last >= 0:
+        share = climb[last] / (climb[last] - climb[last + 1])
+        top = float(amsl[last] + share * (amsl[last + 1] - amsl[last])) + ROUNDING
+    steepest = np.abs(np.concatenate([climb, table.descent[:count]])).max()
+    slowest = true_airspeed(table, max(top, data.floor)) * math.cos(steepest)
+    wind = table.wind_speed, table.wind_gradient, table.wind_reference_amsl
+    strongest = max(mean_wind_speed(*wind, data.floor), mean_wind_speed(*wind, data.ceiling))
+    # False where a slope is not known.
+    return top if strongest < slowest else math.inf
 
 
 def closing_missiles(data: ProblemArrays) -> list[int] | None:

@@ -19,7 +19,7 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import BUFFER_GROWTH, Problem, make_problem
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS, limits_for
-from planner.search.closed_ways import closing_missiles
+from planner.search.closed_ways import closing_missiles, highest_level_flight
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.kernels import compiled
 from world.scenario import Scenario
@@ -230,7 +230,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     if closed is not None:
         names = ", ".join(closed.zones[:MAX_NAMES]) + (" and more" if len(closed.zones) > MAX_NAMES else "")
         lines.append(f"zones block every route (gaps narrower than {closed.pitch:.0f} m count as closed): {names}")
-    entered = violated_zones(scenario, plan.waypoints)
+    is_open, entered = not lines, violated_zones(scenario, plan.waypoints)
     if entered:
         lines.append(f"the best path violates: {', '.join(entered[:MAX_NAMES])}")
     elif not lines:
@@ -239,6 +239,8 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
             lines.append(f"no obstacle blocks every route; the best path fails by: {', '.join(violated)}")
     if chosen is not None and chosen.encoding == "rotated" and chosen.seeded:
         lines.append("routes that turn back or circle to climb were searched too, on a coarse lattice")
+        if is_open and chosen.optimiser == "waypoints" and scenario.planner.budget is None:
+            lines.append("it is not proven that no path exists; --budget 1000000 searches for longer")
     elif chosen is not None and chosen.encoding == "rotated":
         lines.append(
             "paths in the rotated frame always advance along the line to the destination; "
@@ -320,16 +322,22 @@ def _outside_missiles(scenario: Scenario, points: np.ndarray, lowest: np.ndarray
 
 
 def _closing(problem: Problem) -> list[str]:
-    """A line that names the missiles which leave no path at all, if that can be proven."""
-    found = closing_missiles(problem.certified)
+    """A line that names the missiles, or the height, which leave no path at all, if that can be proven."""
+    data, ceiling = problem.certified, "the ceiling"
+    found, top = closing_missiles(data), highest_level_flight(data)
     if found is None:
         return []
+    if top < data.ceiling:
+        ceiling = f"{max(top, 0.0):.0f} m, above which the aircraft cannot fly level at {data.aircraft.airspeed:g} m/s"
+        for name, end in (("start", data.start), ("destination", data.destination)):
+            if end[2] > top:
+                return [f"no path exists: the {name} is at {end[2]:.0f} m, higher than {ceiling}"]
     if not found:
-        return ["no path exists: the ground closes every way below the ceiling"]
+        return [f"no path exists: the ground closes every way below {ceiling}"]
     named = [problem.scenario.threats.names[k] for k in found[:MAX_CLOSING]]
     more = f" and {len(found) - MAX_CLOSING} more" if len(found) > MAX_CLOSING else ""
     return [
-        f"no path exists: {', '.join(named)}{more} close every way between ground, ceiling and the edges of the map;"
+        f"no path exists: {', '.join(named)}{more} close every way between ground, {ceiling} and the edges of the map;"
         " without any one of them there may be one"
     ]
 

@@ -27,7 +27,7 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.search.search_state import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, Search, best_first
 from planner.seeding.first_samples import bridge_basis, first_samples
-from planner.seeding.waypoint_chains import WaypointChains, free_points, waypoint_chains
+from planner.seeding.waypoint_chains import ALL_LEGS, WaypointChains, free_points, waypoint_chains
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -120,6 +120,10 @@ MAX_GENERATIONS, SEEDED_GENERATIONS, SEEDED_SHARE = 10, 6, 0.4
 LATER_SHARE, MIN_POPULATION = 0.2, 24
 # Maximum number of legs between the candidates of one generation: limits memory.
 MAX_LEGS = 6_000_000
+# Legs that all attempts of a search together evaluate at most, over those between all candidates of the first attempt,
+# where the scenario states no budget; what has to be left of them for another attempt, over the same; and the share of
+# what is left that one generation may take where it has no short path, so that hardly a leg is spared.
+MAX_LEGS_SHARE, RETRY_SHARE, OPEN_SHARE = 2.0, 0.75, 0.5
 # Initial sampling deviations around a selected waypoint: along and across as shares of the interval, up in m; and their
 # reduction per generation.
 FIRST_ALONG, FIRST_ACROSS, FIRST_UP, SHRINK = 0.4, 0.5, 60.0, 0.5
@@ -148,27 +152,28 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
     data = search.problem.search
     sampling = NicheSampling(lower, upper, lambda rows, _: free_points(data, frame.restore(rows)), search.rng)
-    seeded, max_rows = search.algorithm.seeded, int(math.sqrt(MAX_LEGS / (inner + 1)))
-    first = max(2, min(int(population * (SEEDED_SHARE if seeded else 1.0)), max_rows))
-    later = min(first, max(MIN_POPULATION, int(LATER_SHARE * first)))
+    seeded, first = search.algorithm.seeded, _first_candidates(search, population)
+    later = _later_candidates(first)
     interval = frame.length / inner
     deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
     rows = sampling.first(first, np.array([0.0, 0.0, ABOVE_CEILING]))
     if not len(search.archive.vectors):
         # The archive must hold a path whenever the search is stopped.
         search.evaluate(_as_vectors(rows[:, :1]))
-    steps = min(generations, SEEDED_GENERATIONS if seeded else MAX_GENERATIONS)
+    steps = _generations(search, generations)
     slack_at_first = SEEDED_SLACK if seeded else FIRST_SLACK
     for step in range(steps):
         rows[:, 0] = search.archive.vectors[0].reshape(inner, 3)
         slack = slack_at_first * (LAST_SLACK / slack_at_first) ** (step / max(1, steps - 1))
         chains = _join(search, encoding.decode(_as_vectors(rows)), slack)
+        rows = rows[:, : chains.cost.shape[1]]
+        search.legs += chains.legs
         search.evaluations += math.ceil(chains.legs / (inner + 1))
         _evaluate_best(search, rows, chains)
         search.record()
         search.done += 1
         search.report(steps - step - 1)
-        if search.must_end() or search.first_safe_found():
+        if search.must_end() or search.first_safe_found() or legs_left(search) <= 0:
             break
         if step < steps - 1:
             cost = chains.cost[1:-1]
@@ -177,24 +182,67 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
             deviation = SHRINK * deviation
 
 
+def _first_candidates(search: Search, population: int) -> int:
+    """Candidates per interval in the first generation of this population."""
+    most = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
+    return max(2, min(int(population * (SEEDED_SHARE if search.algorithm.seeded else 1.0)), most))
+
+
+def _later_candidates(first: int) -> int:
+    """Candidates per interval in later generations."""
+    return min(first, max(MIN_POPULATION, int(LATER_SHARE * first)))
+
+
+def _generations(search: Search, generations: int) -> int:
+    """Number of generations of waypoints where so many are asked for."""
+    return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
+
+
+def legs_left(search: Search) -> int:
+    """Legs that the search may still evaluate."""
+    table = search.problem.scenario.planner
+    if table.budget is not None:
+        return ALL_LEGS
+    return int(MAX_LEGS_SHARE * _legs_of_attempt(search)) - search.legs
+
+
+def may_try_again(search: Search) -> bool:
+    """Whether enough legs are left for another attempt."""
+    return legs_left(search) >= RETRY_SHARE * _legs_of_attempt(search)
+
+
+def _legs_of_attempt(search: Search) -> int:
+    """Legs between all candidates of all generations of the first attempt."""
+    table = search.problem.scenario.planner
+    first = _first_candidates(search, table.population)
+    squares = first**2 + max(0, _generations(search, table.generations) - 1) * _later_candidates(first) ** 2
+    return (search.encoding.waypoints - 1) * squares
+
+
 def _as_vectors(rows: Floats) -> Floats:
     """Candidates (i, k, 3) of intervals as vectors (k, 3 i): the k-th of each."""
     return rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
 
 
 def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Best paths through the candidates of paths (k, w, 3), bounded relative to the best path if there is one."""
+    """Best paths through the candidates of paths (k, w, 3), bounded relative to the best path if there is one.
+
+    Without a bound almost every leg is evaluated: where few are left, between the first candidates only.
+    """
     data, space = search.problem.search, search.problem.space
     straight = math.dist(space.start, space.destination)
     candidates = np.ascontiguousarray(paths.transpose(1, 0, 2))
     bounds: tuple[float, ...] = FIRST_BOUNDS
     if len(search.archive.scores) and search.best_is_safe():
         bounds = (float(search.archive.scores[0, LENGTH]) * (1.0 + slack), *FIRST_BOUNDS)
-    legs = 0
+    legs, left = 0, legs_left(search)
     for bound in bounds:
-        chains = waypoint_chains(data, candidates, bound * straight, search.pause)
+        if math.isinf(bound):
+            count = max(1, math.isqrt(int(OPEN_SHARE * max(0, left - legs)) // (len(candidates) - 1)))
+            candidates = np.ascontiguousarray(candidates[:, :count])
+        chains = waypoint_chains(data, candidates, bound * straight, search.pause, max(1, left - legs))
         legs += chains.legs
-        if chains.cost[1:-1].min() <= bound * straight < math.inf:
+        if chains.cost[1:-1].min() <= bound * straight < math.inf or legs >= left:
             break
     return chains._replace(legs=legs)
 

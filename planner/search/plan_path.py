@@ -18,7 +18,7 @@ from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.closed_ways import is_closed
-from planner.search.generations import path_generations, waypoint_generations
+from planner.search.generations import may_try_again, path_generations, waypoint_generations
 from planner.search.search_cheapest import search_cheapest, wanted_cost
 from planner.search.search_state import (
     Archive,
@@ -133,7 +133,7 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
             best = found
         if number == 0 and not search.is_closed and may_turn_back(search, best[1]):
             best = search_turning_back(search, best)
-        if search.finished(best[1]) or search.is_closed or search.must_end():
+        if search.finished(best[1]) or search.is_closed or search.must_end() or not may_try_again(search):
             break
     if best is None:  # pragma: no cover - the loop always runs
         raise ScenarioError(

@@ -145,6 +145,7 @@ class Search:
     improved: called with each path (w, 3) that is the best so far of those that meet the constraints.
     archive: the best paths.
     evaluations: paths evaluated, or equivalent work.
+    legs: evaluated between candidates for single waypoints.
     done: generations done.
     ended: why the search ended.
     history: per generation, length ratio, kill exposure and violations of the best path so far.
@@ -166,6 +167,7 @@ class Search:
     improved: Improved | None = None
     archive: Archive = field(init=False)
     evaluations: int = 0
+    legs: int = 0
     done: int = 0
     ended: str = "completed"
     history: list[tuple[float, float, float]] = field(default_factory=list)

@@ -195,7 +195,7 @@ def _try_ceiling(search: Search) -> list[Floats]:
     for step, closer in itertools.product(CEILING_STEPS, CEILING_CLOSER):
         if search.must_end():
             break
-        route = ceiling_route(data, frame, step, closer)
+        route = ceiling_route(data, frame, step, closer, search.pause)
         if not len(route):
             continue
         path = resample(route, search.encoding.waypoints)

@@ -142,7 +142,7 @@ def _expand_state(
             # The feasibility of a step does not depend on the course before it.
             number = (cell * 8 + to) * width + next_layer - layer + sinks
             if table.steps[number] == _UNKNOWN:
-                free = _inside(data, b) and leg_cost(data, limits, a, b) <= CLOSED * length
+                free = _inside(data, b) and leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length
                 table.steps[number] = _FREE if free else _SHUT
             if table.steps[number] == _FREE:
                 table.cost[code], table.parents[code] = total, state
@@ -266,7 +266,7 @@ def simplify_route(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no
         for k in range(last, here + 1, -1):
             a, b = points[here], points[k]
             length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-            if leg_cost(data, limits, a, b) <= CLOSED * length:
+            if leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length:
                 to = k
                 break
         here = to
@@ -368,15 +368,18 @@ def lattice_route(
     return np.asarray(simplify_route(data, np.ascontiguousarray(points)))
 
 
-def ceiling_route(data: ProblemArrays, frame: RotatedFrame, step: float, closer: float) -> Floats:
+def ceiling_route(
+    data: ProblemArrays, frame: RotatedFrame, step: float, closer: float, pause: Callable[[], None] = lambda: None
+) -> Floats:
     """World points (k, 3) of a route at the height of the ceiling, where spheres on the ground are smallest.
 
     It climbs to the ceiling at its start and leaves it at its destination, however steeply: a lattice of a single layer
-    is searched in milliseconds. step: m. closer: how far it may enter missiles' spheres, m. (0, 3) for none.
+    is searched in milliseconds. step: m. closer: how far it may enter missiles' spheres, m. pause: as in
+    `lattice_route`. (0, 3) for none.
     """
     start, destination = (np.array([*end[:2], data.ceiling]) for end in (data.start, data.destination))
     for end in (start, destination):
         # As those of a scenario: to compiled code, arrays that are not locked are of another type.
         end.setflags(write=False)
     level = data._replace(start=start, destination=destination, floor=data.ceiling, kill_margin=-closer)
-    return lattice_route(level, frame, step)
+    return lattice_route(level, frame, step, pause)

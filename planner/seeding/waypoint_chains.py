@@ -17,7 +17,7 @@ from planner.evaluation.corners import CORNER, measure_corner
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at, required_clearance
 from planner.evaluation.threat_index import kill_density
-from planner.seeding.waypoint_fitting import leg_cost
+from planner.seeding.waypoint_fitting import ROUNDING, leg_cost
 from world.frames import polymap
 from world.kernels import Records, compiled, inlined, inner
 from world.terrain import pixel_height
@@ -30,10 +30,10 @@ Flags = NDArray[np.bool_]
 TURN_COST = 2e4
 # Share of a leg that each of its two turns may take.
 TURN_SHARE = 0.475
-# Cost of a leg that is not evaluated yet.
-UNKNOWN = -1.0
 # Legs evaluated between two calls of `pause`: at most some 20 ms on a slow processor.
 LEGS_AT_ONCE = 2_500
+# More legs than there can be.
+ALL_LEGS = 2**62
 # Progress: direction, next waypoint and candidate, and number of legs evaluated.
 _CURSOR = np.dtype([(name, np.int64) for name in ("step", "waypoint", "candidate", "legs")])
 
@@ -72,22 +72,30 @@ class WaypointChains(NamedTuple):
 
 
 def waypoint_chains(
-    data: ProblemArrays, candidates: Floats, bound: float, pause: Callable[[], None] = lambda: None
+    data: ProblemArrays,
+    candidates: Floats,
+    bound: float,
+    pause: Callable[[], None] = lambda: None,
+    max_legs: int = ALL_LEGS,
 ) -> WaypointChains:
     """Best paths through candidates (w, k, 3) world m; of the ends only the first candidate is used.
 
     bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_AT_ONCE`
-    legs; an exception raised there stops the work.
+    legs; an exception raised there stops the work. max_legs: there are no paths where more have to be evaluated.
     """
     count, wide, _ = candidates.shape
-    legs = np.full((count - 1, wide, wide), UNKNOWN)
+    legs = np.zeros((count - 1, wide, wide))
     forward, backward = np.full((count, wide), np.inf), np.full((count, wide), np.inf)
     forward[0, 0], backward[-1, 0] = 0.0, 0.0
     before, after = np.zeros((count, wide), dtype=np.int64), np.zeros((count, wide), dtype=np.int64)
     sweeps, cursor = _Sweeps(forward, before, backward, after), np.zeros(1, dtype=_CURSOR)
     cursor["step"], cursor["waypoint"] = 1, 1
-    while not _advance(data, candidates, legs, bound, sweeps, cursor, LEGS_AT_ONCE):
+    done = 0
+    while not _advance(data, candidates, legs, bound, sweeps, cursor, min(LEGS_AT_ONCE, max_legs - done)):
         pause()
+        done = int(cursor["legs"][0])
+        if done >= max_legs:
+            return WaypointChains(np.full((count, wide), np.inf), before, after, done)
     return WaypointChains(_through(data, candidates, bound, sweeps), before, after, int(cursor["legs"][0]))
 
 
@@ -97,7 +105,7 @@ def _advance(
 ) -> bool:  # pragma: no cover - compiled
     """Continue from the cursor until `max_legs` legs have been evaluated; returns whether all is done.
 
-    legs: (w - 1, k, k) costs, filled on demand. cursor: a `_CURSOR` record (1,).
+    legs: (w - 1, k, k) costs, filled on demand; a lower bound is negative. cursor: a `_CURSOR` record (1,).
     """
     count, wide, _ = candidates.shape
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
@@ -184,10 +192,13 @@ def _extend(
             continue
         first, second = (j, k) if step > 0 else (k, j)
         leg = legs[min(i, last), first, second]
-        if leg == UNKNOWN:
-            leg = leg_cost(data, limits, candidates[min(i, last), first], candidates[max(i, last), second])
-            legs[min(i, last), first, second] = leg
-            evaluated += 1
+        if leg <= 0.0:
+            evaluated += 1 if leg == 0.0 else 0
+            if not cost[last, j] - leg + turn < min(cost[i, k], max_cost):
+                continue
+            enough = min(cost[i, k], max_cost) - cost[last, j] - turn + ROUNDING
+            leg = leg_cost(data, limits, candidates[min(i, last), first], candidates[max(i, last), second], enough)
+            legs[min(i, last), first, second] = leg if leg <= enough else -leg
         total = cost[last, j] + leg + turn
         if total < min(cost[i, k], max_cost):
             cost[i, k], link[i, k] = total, j

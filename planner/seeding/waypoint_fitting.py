@@ -27,24 +27,44 @@ Ints = NDArray[np.int64]
 # Cost of depth (per m x km) and of slope excess (per unit), in m of path.
 DEPTH_COST = 2e4
 SLOPE_COST = 1e6
+# Added to what is enough of a leg's cost, m: more than a difference of costs can be off by.
+ROUNDING = 1e-3
 
 
 @inner
 def leg_cost(
-    data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats
+    data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, enough: float
 ) -> float:  # pragma: no cover - compiled
-    """Cost of one leg, in m of path: its length and its violations."""
+    """Cost of one leg, in m of path: its length and its violations; a lower bound on it where that exceeds `enough`.
+
+    The rest is not evaluated then.
+    """
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     length = math.sqrt(dx * dx + dy * dy + (b[2] - a[2]) ** 2)
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
     steep = slope_excess(data, limits, ux, uy, run, a[2], b[2])
+    total = length + SLOPE_COST * steep
+    if total > enough:
+        return total
     ends = segment_pixels(data.to_pixel, a[0], a[1], b[0], b[1])
     below = _below(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.has_error else 0.0
-    depth = terrain_excess(
-        data.heights, data.slope_bounds, limits.required, max(0.0, below), ends, a[0], a[1], a[2], b[0], b[1], b[2]
+    total += DEPTH_COST * terrain_excess(
+        data.heights,
+        data.slope_bounds,
+        limits.required,
+        max(0.0, below),
+        ends,
+        a[0],
+        a[1],
+        a[2],
+        b[0],
+        b[1],
+        b[2],
+        (enough - total + ROUNDING) / DEPTH_COST,
     )
-    total = length + SLOPE_COST * steep + DEPTH_COST * depth
+    if total > enough:
+        return total
     kill, _, _ = kill_density(
         data.missiles,
         data.kill_margin,
@@ -62,8 +82,11 @@ def leg_cost(
     )
     if kill > 0.0:
         total += KILL_COST * length * min(1.0, 0.1 + kill)
+    if total > enough:
+        return total
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
-        total += DEPTH_COST * airspace_excess(data, a, b, max(0.0, below), max(0.0, -below))
+        deepest = (enough - total + ROUNDING) / DEPTH_COST
+        total += DEPTH_COST * airspace_excess(data, a, b, max(0.0, below), max(0.0, -below), deepest)
     return total
 
 
@@ -103,7 +126,8 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pra
                     break
                 lower_bounds[j] = np.inf
                 evaluated += 1
-                total = cost[j] + leg_cost(data, limits, candidates[i - 1, j], b)
+                enough = after[k] - cost[j] + ROUNDING
+                total = cost[j] + leg_cost(data, limits, candidates[i - 1, j], b, enough)
                 if total < after[k]:
                     after[k] = total
                     parents[i, k] = j

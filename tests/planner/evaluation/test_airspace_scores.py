@@ -1,5 +1,6 @@
 """What the certificate finds of zones and of a greatest height, just inside and just outside."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -214,7 +215,7 @@ def test_the_ground_beside_the_way_counts_too(make_arrays: MakeArrays) -> None:
     wide = make_arrays({"across": 60.0}, terrain=hill, limits=most, threats=[])
     for arrays, worse in ((data, False), (wide, True)):
         a, b = np.array([1400.0, 150.0, 325.0]), np.array([1600.0, 150.0, 325.0])
-        assert (float(airspace_excess(arrays, a, b, 0.0, 0.0)) > 0.0) == worse
+        assert (float(airspace_excess(arrays, a, b, 0.0, 0.0, math.inf)) > 0.0) == worse
 
 
 def test_an_inclusion_near_the_start_leaves_room_to_leave(make_arrays: MakeArrays) -> None:

@@ -87,12 +87,11 @@ def test_steps_over_the_ground_leave_nothing_out(scenario: Scenario, limits: Lim
         for off in (0.5, -step):
             height = wanted + off
             line = a[0], a[1], height, b[0], b[1], height + rise
-            depth = terrain_excess(data.heights, data.slope_bounds, required, 0.0, tuple(ends), *line)
+            depth = terrain_excess(data.heights, data.slope_bounds, required, 0.0, tuple(ends), *line, math.inf)
             assert (depth > 0.0) == (off < 0.0)
             # With more wanted by what it is clear, or less by what it is deep and a step between samples.
-            more = terrain_excess(
-                data.heights, data.slope_bounds, required, step if off > 0.0 else -step - 0.5, tuple(ends), *line
-            )
+            need = step if off > 0.0 else -step - 0.5
+            more = terrain_excess(data.heights, data.slope_bounds, required, need, tuple(ends), *line, math.inf)
             assert (more > 0.0) == (off > 0.0)
             both[int(depth > 0.0)] += 1
     assert both.min() > 100

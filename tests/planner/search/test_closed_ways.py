@@ -1,5 +1,6 @@
 """Walls of missiles across the map: closed, with a gap, with a way under them; and the search that ends at them."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -8,10 +9,12 @@ import pytest
 
 import planner.search.plan_path as plan_path_module
 from aircraft.path_limits import Limits
+from planfly.airframe import load_airframe
 from planner.evaluation.problem import ProblemArrays, make_problem
-from planner.search.closed_ways import closing_missiles, is_closed
+from planner.search.closed_ways import closing_missiles, highest_level_flight, is_closed
 from planner.search.explain_failure import explain_failure
 from planner.search.plan_path import plan_path
+from tests.fresh_plans import fresh_scenario
 from world.scenario import Scenario
 
 Small = Callable[..., Scenario]
@@ -97,3 +100,83 @@ def test_the_search_ends_at_a_wall_and_says_what_closes_it(
     assert all(f"w{k}" in line for k in range(11))
     assert "beside" not in line
     np.testing.assert_array_equal(plan.waypoints[[0, -1]], [scenario.start, scenario.destination])
+
+
+# ----------------------------------------------------------------------
+# Above some height an aircraft is too slow to fly level: that closes like a ceiling.
+
+
+def in_thin_air(data: ProblemArrays, *climb: float, **more: float) -> ProblemArrays:
+    """The arrays with these climbs (rad) at 0 m, 100 m and so on, at an equivalent airspeed of 25 m/s."""
+    table = data.aircraft._replace(
+        airspeed=25.0,
+        equivalent=1.0,
+        amsl=100.0 * np.arange(len(climb)),
+        climb=np.array(climb),
+        descent=np.full(len(climb), 0.2),
+    )
+    return data._replace(aircraft=table._replace(**more), max_climb=math.nan, max_dive=math.nan)
+
+
+def test_level_flight_ends_where_the_climb_does(small: Small, make_limits: MakeLimits) -> None:
+    data = arrays(small, make_limits, [])
+    # From 0.1 rad at 200 m to -0.3 rad at 300 m: none at a quarter of the way.
+    falling = (0.2, 0.2, 0.1, -0.3, -0.3, -0.3)
+    assert highest_level_flight(in_thin_air(data, *falling)) == pytest.approx(225.0, abs=1e-3)
+    assert highest_level_flight(in_thin_air(data, -0.1, -0.1, -0.1, -0.1, -0.1, -0.1)) == -math.inf
+    # It need not be known above the ceiling of 450 m, and is no limit if level flight is possible up to there.
+    assert highest_level_flight(in_thin_air(data, *falling, math.nan)) == pytest.approx(225.0, abs=1e-3)
+    for climb in ((0.2, 0.2, 0.2, 0.2, 0.2, 0.0, -0.1), (0.2, 0.1, -0.3, math.nan, math.nan, math.nan)):
+        assert highest_level_flight(in_thin_air(data, *climb)) == math.inf
+
+
+def test_level_flight_is_no_limit_where_legs_may_lead_without_it(small: Small, make_limits: MakeLimits) -> None:
+    data, falling = arrays(small, make_limits, []), (0.2, 0.2, 0.1, -0.3, -0.3, -0.3)
+    # At a true airspeed it sinks, but a leg may sink; with slopes stated, these count; a gale blows legs anywhere.
+    assert highest_level_flight(in_thin_air(data, *falling, equivalent=0.0)) == math.inf
+    assert highest_level_flight(in_thin_air(data, *falling)._replace(max_dive=0.2)) == math.inf
+    assert highest_level_flight(in_thin_air(data, *falling)._replace(max_climb=0.2)) == math.inf
+    # The slowest airspeed over ground in still air is 25 m/s, a percent more at 225 m, along a slope of 0.3 rad.
+    slowest = 25.0 * 1.0110 * math.cos(0.3)
+    assert highest_level_flight(in_thin_air(data, *falling, wind_speed=slowest - 0.1)) < math.inf
+    assert highest_level_flight(in_thin_air(data, *falling, wind_speed=slowest + 0.1)) == math.inf
+
+
+@pytest.mark.parametrize(("climb", "closed"), [(0.049, True), (0.051, False)])
+def test_an_end_above_level_flight_is_closed(climb: float, closed: bool, small: Small, make_limits: MakeLimits) -> None:
+    """Both ends are at 150 m; level flight ends at 149 and at 151 m."""
+    data = in_thin_air(arrays(small, make_limits, []), 0.2, climb, climb - 0.1, -0.3, -0.3, -0.3)
+    assert is_closed(data) is closed
+
+
+@pytest.mark.parametrize(("more", "closed"), [(-5.0, True), (15.0, False)])
+def test_ground_is_not_passed_above_level_flight(
+    more: float, closed: bool, small: Small, make_limits: MakeLimits
+) -> None:
+    """A ridge across the whole map; level flight ends so many m above what its lowest place and the clearance take."""
+    ridge = [{"east_m": 3000, "north_m": 300 * k, "height_m": 120, "sigma_m": 300} for k in range(-14, 15)]
+    scenario = small(terrain={"kind": "peaks", "peak": ridge}, threats=[])
+    data = make_problem(scenario, make_limits(scenario)).certified
+    assert scenario.terrain is not None
+    top = float(scenario.terrain.height(3000.0, np.arange(-3000.0, 3001.0, 10.0)).min()) + data.clearance + more
+    hundred, share = int(top // 100.0), top % 100.0 / 100.0
+    climb = [0.2] * hundred + [0.2 * share, 0.2 * share - 0.2] + [-0.3] * (4 - hundred)
+    assert 200.0 < top < 400.0
+    assert is_closed(in_thin_air(data, *climb)) is closed
+
+
+def test_the_search_ends_where_an_end_is_above_level_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise AssertionError("a path was searched for that is proven not to exist")
+
+    monkeypatch.setattr(plan_path_module, "waypoint_generations", refused)
+    monkeypatch.setattr(plan_path_module, "search_turning_back", refused)
+    # A Zagi at 3,348 m, where it climbs 4.5 degrees at sea level.
+    scenario = fresh_scenario(1226)
+    limits = load_airframe(scenario).limits.surely()
+    plan = plan_path(scenario, limits, seed=1)
+    assert not plan.safe
+    line = next(line for line in explain_failure(plan, limits) if line.startswith("no path exists"))
+    assert line.startswith(f"no path exists: the start is at {scenario.start[2]:.0f} m, higher than 3")
+    assert "cannot fly level at 15 m/s" in line
+    assert not any("--budget" in line for line in explain_failure(plan, limits))

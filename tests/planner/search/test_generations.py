@@ -5,18 +5,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import ENCODINGS
-from planner.evaluation.problem import make_problem
+from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.plan import Objective, Plan
+from planner.search import generations
 from planner.search.algorithms import ALGORITHMS
+from planner.search.closed_ways import is_closed
+from planner.search.explain_failure import explain_failure
 from planner.search.generations import MAX_GENERATIONS, path_generations, waypoint_generations
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search, best_first
+from planner.seeding.waypoint_chains import WaypointChains, waypoint_chains
 from tests.soak import some
 from world.random_streams import PLANNER, stream
-from world.scenario import Scenario, load_scenario
+from world.scenario import Scenario, load_scenario, with_planner
+
+Floats = NDArray[np.float64]
 
 
 def search_of(scenario: Scenario, limits: Limits, algorithm: str) -> Search:
@@ -97,6 +104,54 @@ def test_a_stop_ends_after_the_generation_under_way(scenario: Scenario, limits: 
     search.stop = lambda: "interrupted" if search.done >= 2 else ""
     waypoint_generations(search, 40, 8)
     assert (search.done, search.ended) == (2, "interrupted")
+
+
+def counted_legs(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
+    """Candidates and legs of each join from here on."""
+    joins: list[tuple[int, int]] = []
+
+    def counted(data: ProblemArrays, candidates: Floats, *more: object) -> WaypointChains:
+        chains = waypoint_chains(data, candidates, *more)
+        joins.append((candidates.shape[1], chains.legs))
+        return chains
+
+    monkeypatch.setattr(generations, "waypoint_chains", counted)
+    return joins
+
+
+@pytest.mark.parametrize("population", [60, 120])
+def test_a_search_that_finds_no_way_evaluates_so_many_legs(
+    population: int,
+    small: Callable[..., Scenario],
+    make_limits: Callable[[Scenario], Limits],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two rows of missiles, whose gaps of a few metres no proof closes and no path passes."""
+    units = [
+        {"east_m": east, "north_m": north, "kill_radius_m": 600, "kill_scale_m": 200}
+        for north in range(-3000, 3001, 799)
+        for east in (3000, 4400)
+    ]
+    planner = {"waypoints": 8, "population": population, "generations": 25}
+    scenario = small(terrain={"kind": "flat", "amsl_m": 0}, threats=units, planner=planner)
+    assert not is_closed(make_problem(scenario, make_limits(scenario)).certified)
+    joins = counted_legs(monkeypatch)
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert not plan.safe
+    assert plan.ended == "completed"
+    # 0.4 of the population in the first generation, 24 in five more, and seven legs from end to end; twice as many legs
+    # as there are between all of them, and no more to the last candidate than there are candidates.
+    first = int(0.4 * population)
+    most = 2 * 7 * (first**2 + 5 * 24**2)
+    assert 0.5 * most < sum(legs for _, legs in joins) <= most + 2 * first
+    # The second attempt has twice the candidates, which are too many to be joined without a bound; there is no third.
+    assert max(candidates for candidates, _ in joins) == 2 * first
+    assert "--budget 1000000 searches for longer" in explain_failure(plan, make_limits(scenario))[-1]
+    # A budget asks for more.
+    joins.clear()
+    plan_path(with_planner(scenario, "--budget", budget=10**9), make_limits(scenario), seed=1)
+    assert sum(legs for _, legs in joins) > 1.5 * most
+    assert max(candidates for candidates, _ in joins) == 3 * first
 
 
 def test_no_generation_finds_nothing_but_still_a_plan(

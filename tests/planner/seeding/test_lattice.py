@@ -219,6 +219,8 @@ def test_what_a_pause_raises_ends_the_search(pocket: Problem) -> None:
     data = pocket.search
     with pytest.raises(KeyboardInterrupt):
         lattice_route(data, rotated_frame(data.start, data.destination), 500.0, end)
+    with pytest.raises(KeyboardInterrupt):
+        ceiling_route(data, rotated_frame(data.start, data.destination), 500.0, 15.0, end)
 
 
 def test_a_route_at_the_ceiling_passes_a_gap_that_spheres_close_by_less_than_they_may_be_entered(

@@ -9,8 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
+from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding.waypoint_chains import free_points, waypoint_chains
+from planner.seeding.waypoint_fitting import leg_cost
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -32,6 +34,10 @@ def near_the_line(data: ProblemArrays, spread: float, seed: int) -> Floats:
     moves = np.random.default_rng(seed).normal(size=(INNER, EACH, 3)) * [spread, spread, 0.05 * spread]
     out[1:-1] += moves
     return out
+
+
+def leg_cost_of(data: ProblemArrays, a: Floats, b: Floats, enough: float) -> float:
+    return float(leg_cost(data, precompute_limits(data), np.array(a), np.array(b), enough))
 
 
 def length(path: Floats) -> float:
@@ -109,3 +115,38 @@ def test_free_points_are_on_the_map_above_the_ground_and_outside_spheres(problem
     need = float(terrain.height(east, north)) + data.clearance + data.buffer
     places = np.array([[east, north, need - 0.1], [east, north, need + 0.1], [data.west - 1.0, north, need + 50.0]])
     assert free_points(data, places).tolist() == [False, True, False]
+
+
+def test_more_legs_than_are_allowed_give_no_path(open_air: ProblemArrays) -> None:
+    candidates = near_the_line(open_air, 60.0, 1)
+    whole = waypoint_chains(open_air, candidates, math.inf)
+    same = waypoint_chains(open_air, candidates, math.inf, max_legs=whole.legs + 1)
+    np.testing.assert_array_equal(same.cost, whole.cost)
+    few = waypoint_chains(open_air, candidates, math.inf, max_legs=whole.legs // 2)
+    assert np.isinf(few.cost).all()
+    # The legs to one candidate are evaluated together.
+    assert whole.legs // 2 <= few.legs < whole.legs // 2 + EACH
+
+
+def test_a_leg_is_evaluated_as_far_as_its_cost_matters(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    """Through the hill and the missile, too steep, and above the greatest height: each alone, and exactly up to it."""
+    scenario = small(limits={"max_height_m": 200.0, "min_clearance_m": 50.0, "max_climb_deg": 10, "max_dive_deg": 10})
+    data = make_problem(scenario, make_limits(scenario)).search
+    legs = {
+        "hill": (np.array([1000.0, 200.0, 150.0]), np.array([3000.0, 200.0, 150.0])),
+        "missile": (np.array([4200.0, -1500.0, 150.0]), np.array([4200.0, 1500.0, 150.0])),
+        "slope": (np.array([0.0, 0.0, 150.0]), np.array([100.0, 0.0, 210.0])),
+        "height": (np.array([5500.0, -2500.0, 400.0]), np.array([6000.0, 2500.0, 400.0])),
+    }
+    for name, (a, b) in legs.items():
+        cost = leg_cost_of(data, a, b, math.inf)
+        length = math.dist(a, b)
+        assert cost > length + 100.0, name
+        assert leg_cost_of(data, a, b, cost + 1.0) == cost, name
+        for share in (0.1, 0.9):
+            enough = length + share * (cost - length)
+            assert enough < leg_cost_of(data, a, b, enough) <= cost, name
+        # Most of what is not needed is left out.
+        assert leg_cost_of(data, a, b, length + 1.0) < cost or name in ("slope", "missile"), name
