@@ -44,8 +44,9 @@ CLEARANCE_SHARES, RADAR_SHARES = (0.0, 0.25, 0.5, 0.75, 0.95), (0.0, 0.35, 0.5, 
 # Routes past the obstacles that are tried for each preference beside the default plan's: grids as of
 # `planner.search.seeds`.
 STAGES, SPREAD, RATIO, SHRINK, MAX_ROUTES, SLACK = 50, 0.2, 1.0 / 3.0, 0.3, 3, 1.25
-# Solutions that the search keeps, samples of a generation, and generations.
-ARCHIVE, POPULATION, GENERATIONS = 160, 120, 200
+# Solutions that the search keeps, at least, and for each plan that is asked for; samples of a generation, and
+# generations.
+ARCHIVE, KEPT, POPULATION, GENERATIONS = 100, 2, 120, 400
 # Largest deviations of the noise: a whole path's along, across and up, as shares of an interval, of the straight line
 # and of the height range.
 ALONG, ACROSS, UP = 0.3, 0.1, 0.3
@@ -122,9 +123,9 @@ def plan_front(
     reference = reference_point(task, first)
     if not default.safe:
         return Front((), task.fourth, first, reference, 0)
-    search, evaluations = _search(
-        task, default.waypoints, reference, stream(seed, PLANNER), progress, stop, generations
-    )
+    size = max(ARCHIVE, KEPT * count)
+    search = make_sampling(task, len(default.waypoints), reference, size, stream(seed, PLANNER))
+    evaluations = _search(task, search, default.waypoints, progress, stop, generations)
     plans = _certified(task, search, count - 1, replace(default, evaluations=evaluations), finish)
     ordered = sorted(_undominated([first, *plans], task.fourth), key=lambda one: one.length)
     return Front(tuple(ordered), task.fourth, first, reference, evaluations)
@@ -154,10 +155,15 @@ class FrontTask(NamedTuple):
         return front_values(self.problem.search, self.energy, paths)
 
     def scores(self, paths: Floats) -> tuple[Floats, Floats]:
-        """Objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles."""
+        """Objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles.
+
+        Objectives are infinite where a constraint is not met: they take most of the time, and nothing asks for them.
+        """
         violations, graded = graded_scores(self.scored, paths)
-        kill = graded[:, Objective.KILL_EXPOSURE, None]
-        return self.objectives(self.values(paths)), np.concatenate([violations, kill], axis=1)
+        every = np.concatenate([violations, graded[:, Objective.KILL_EXPOSURE, None]], axis=1)
+        out, met = np.full((len(paths), 4), np.inf), (every <= 0.0).all(axis=1)
+        out[met] = self.objectives(self.values(paths[met]))
+        return out, every
 
     def objectives(self, values: Floats) -> Floats:
         """Objectives (n, 4) of values (n, 5): length, exposure, clearance negated, and time or energy."""
@@ -265,15 +271,13 @@ def _preferences(task: FrontTask) -> Iterator[ProblemArrays]:
 
 def _search(
     task: FrontTask,
+    search: FrontSampling,
     default: Floats,
-    reference: Floats,
-    rng: np.random.Generator,
     progress: SearchProgress | None,
     stop: StopCondition | None,
     generations: int,
-) -> tuple[FrontSampling, int]:
-    """Sample from the seeds on; the search, and the number of paths evaluated."""
-    search = make_sampling(task, len(default), reference, rng)
+) -> int:
+    """Sample from the seeds on; the number of paths evaluated."""
     seeds = np.array(list(seed_paths(task, np.array(default))))
     search.tell(task.vectors(seeds), *task.scores(seeds))
     evaluations = len(seeds)
@@ -285,11 +289,13 @@ def _search(
         evaluations += len(vectors)
         if progress is not None:
             progress(generation + 1, generations, f"{len(search.vectors)} paths that no other dominates")
-    return search, evaluations
+    return evaluations
 
 
-def make_sampling(task: FrontTask, waypoints: int, reference: Floats, rng: np.random.Generator) -> FrontSampling:
-    """The estimation of distribution for paths of so many waypoints."""
+def make_sampling(
+    task: FrontTask, waypoints: int, reference: Floats, size: int, rng: np.random.Generator
+) -> FrontSampling:
+    """The estimation of distribution for paths of so many waypoints, which keeps so many solutions."""
     data, frame, inner = task.problem.search, task.frame, waypoints - 2
     corners = np.array([[x, y, 0.0] for x in (data.west, data.east) for y in (data.south, data.north)])
     rotated = frame.rotate(corners)
@@ -297,7 +303,7 @@ def make_sampling(task: FrontTask, waypoints: int, reference: Floats, rng: np.ra
     high = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
     scales = np.array([ALONG * frame.length / (inner + 1), ACROSS * frame.length, UP * (high[2] - low[2])])
     return FrontSampling(
-        np.tile(low, inner), np.tile(high, inner), directions(inner, scales), reference, ARCHIVE, POPULATION, rng
+        np.tile(low, inner), np.tile(high, inner), directions(inner, scales), reference, 3, size, POPULATION, rng
     )
 
 
@@ -327,7 +333,7 @@ def _certified(
     found: list[FrontPlan] = []
     left = np.arange(len(search.vectors))
     while left.size and len(found) < count:
-        order = covering_order(search.objectives[left], search._reference, count - len(found))
+        order = covering_order(search.objectives[left], search.reference, count - len(found))
         if not order.size:
             break
         for row in left[order]:

@@ -10,7 +10,7 @@ Floats = np.ndarray
 
 def search(seed: int = 1, size: int = 40) -> FrontSampling:
     start = np.array([[0.5, 0.1, 0.1, 0.1, 0.1, 0.1]])
-    made = FrontSampling(np.zeros(6), np.ones(6), np.eye(6), np.full(2, 2.0), size, 60, np.random.default_rng(seed))
+    made = FrontSampling(np.zeros(6), np.ones(6), np.eye(6), np.full(2, 2.0), 1, size, 60, np.random.default_rng(seed))
     made.tell(start, two_goals(start), np.zeros((1, 1)))
     return made
 
