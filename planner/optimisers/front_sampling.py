@@ -35,8 +35,8 @@ NEIGHBOURS, REACH = 6, 0.7
 # which is also that of the coordinates of its points that it takes.
 FURTHEST, EVEN = 1.2, 0.5
 # Scale of noise at first, as a share of each direction's length, its bounds, and its factors for a generation in which
-# more or less than a tenth of the samples succeed.
-FIRST_SCALE, MIN_SCALE, MAX_SCALE, GROW, SHRINK, SUCCESS = 0.1, 1e-4, 0.5, 1.15, 0.9, 0.1
+# more or less than this share of the samples succeed.
+FIRST_SCALE, MIN_SCALE, MAX_SCALE, GROW, SHRINK, SUCCESS = 0.1, 1e-4, 0.5, 1.15, 0.9, 0.02
 # Directions that a sample's noise uses, at most; its scale is the common one times 2^low to 2^high.
 USED_DIRECTIONS, LOW, HIGH = 4, -3, 2
 

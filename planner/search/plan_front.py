@@ -126,9 +126,10 @@ def plan_front(
     size = max(ARCHIVE, KEPT * count)
     search = make_sampling(task, len(default.waypoints), reference, size, stream(seed, PLANNER))
     evaluations = _search(task, search, default.waypoints, progress, stop, generations)
-    plans = _certified(task, search, count - 1, replace(default, evaluations=evaluations), finish)
-    ordered = sorted(_undominated([first, *plans], task.fourth), key=lambda one: one.length)
-    return Front(tuple(ordered), task.fourth, first, reference, evaluations)
+    plans = _certified(task, search, count, replace(default, evaluations=evaluations), finish)
+    # The default plan is among those that the search began from: it is wanted once, where nothing is better.
+    kept = _undominated([*plans, first], task.fourth)[:count]
+    return Front(tuple(sorted(kept, key=lambda one: one.length)), task.fourth, first, reference, evaluations)
 
 
 # --- The problem ---
@@ -329,20 +330,19 @@ def directions(inner: int, scales: Floats) -> Floats:
 def _certified(
     task: FrontTask, search: FrontSampling, count: int, template: Plan, finish: Callable[[Plan], Plan]
 ) -> list[FrontPlan]:
-    """Plans of the solutions that cover most, each certified and completed; one that is not safe is passed over."""
-    found: list[FrontPlan] = []
+    """Plans of the solutions that cover most of those that are safe, each certified and completed."""
+    found: dict[int, FrontPlan] = {}
     left = np.arange(len(search.vectors))
-    while left.size and len(found) < count:
-        order = covering_order(search.objectives[left], search.reference, count - len(found))
-        if not order.size:
-            break
-        for row in left[order]:
-            path = task.paths(search.vectors[row][None])[0]
-            plan = finish(_plan(task, path, template))
-            if plan.safe:
-                found.append(_valued(task, plan))
-        left = np.setdiff1d(left, left[order])
-    return found
+    while True:
+        order = left[covering_order(search.objectives[left], search.reference, count)].tolist()
+        for row in order:
+            if row not in found:
+                path = task.paths(search.vectors[row][None])[0]
+                found[row] = _valued(task, finish(_plan(task, path, template)))
+        unsafe = [row for row in order if not found[row].plan.safe]
+        if not unsafe:
+            return [found[row] for row in order]
+        left = np.setdiff1d(left, unsafe)
 
 
 def _undominated(found: list[FrontPlan], fourth: str) -> list[FrontPlan]:

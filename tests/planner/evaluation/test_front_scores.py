@@ -43,3 +43,18 @@ def test_without_power_energy_is_not_known_and_off_the_terrain_there_is_no_clear
     values = front_values(data, None, path[None])[0]
     assert np.isnan(values[Value.ENERGY])
     assert values[Value.CLEARANCE] == -np.inf
+
+
+def test_the_least_height_is_that_of_every_sample_though_most_are_passed_over(problem: Problem) -> None:
+    data, terrain = problem.search, problem.scenario.terrain
+    assert terrain is not None
+    rng = np.random.default_rng(7)
+    low, high = [data.west, data.south, 0.0], [data.east, data.north, 900.0]
+    paths = np.ascontiguousarray(rng.uniform(low, high, (200, 5, 3)))
+    for path, value in zip(paths, front_values(data, None, paths), strict=True):
+        heights = []
+        for a, b in itertools.pairwise(path):
+            count = 1 + int(np.hypot(*(b - a)[:2]) / data.sample_pitch)
+            points = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
+            heights.append(points[:, 2] - terrain.height(points[:, 0], points[:, 1]))
+        assert value[Value.CLEARANCE] == pytest.approx(np.concatenate(heights).min(), abs=1e-6)
