@@ -27,13 +27,12 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 # Solutions nearest to the mean that its covariance is taken of, and the share of their differences that it has.
 NEIGHBOURS, REACH = 6, 0.7
-# How far a block goes to the other solution's: all the way, or evenly up to this share of it; and the share of either,
-# which is also that of the coordinates of its points that it takes.
-FURTHEST, EVEN = 1.2, 0.5
+# How far a block goes to the other solution's: all the way in half of the samples, and up to this share of it in the
+# others; it takes half of its points' coordinates.
+FURTHEST, HALF = 1.2, 0.5
 # Scale of noise at first, as a share of each direction's length, its bounds, and its factors for a generation in which
 # more or less than this share of the samples succeed.
 FIRST_SCALE, MIN_SCALE, MAX_SCALE, GROW, SHRINK, SUCCESS = 0.1, 1e-4, 0.5, 1.15, 0.9, 0.02
@@ -100,11 +99,11 @@ class FrontSampling:
         return np.clip(samples, self._lower, self._upper)
 
     def _near(self, means: Ints) -> Floats:
-        """Departures (n, d) from the means by the covariance of their neighbours, all with a scale of 1 / spread."""
+        """Departures (n, d) from means, with the covariance of those that are nearest to each in shares of the box."""
         number = min(NEIGHBOURS, len(self.vectors) - 1)
         out = np.zeros((len(means), self._lower.size))
         scaled = (self.vectors / (self._upper - self._lower).clip(1e-12)).T
-        # Summed over the first axis, one after another on every machine.
+        # Summed over the first axis: one after another, on every machine.
         away = ((scaled[:, means, None] - scaled[:, None, :]) ** 2).sum(axis=0)
         near = np.argsort(away, axis=1, kind="stable")[:, 1 : number + 1]
         weights = REACH * self._rng.standard_normal((len(means), number)) / np.sqrt(max(1, number))
@@ -120,20 +119,20 @@ class FrontSampling:
         # Blocks may begin before the first point and end behind the last, so that all points are equally often in one.
         begins, places = rng.integers(1 - lengths, points), np.arange(points)
         within = (places >= begins[:, None]) & (places < (begins + lengths)[:, None])
-        taken = rng.random((count, 1, self._axes)) < EVEN
+        taken = rng.random((count, 1, self._axes)) < HALF
         taken |= ~taken.any(axis=2, keepdims=True)
-        shares = np.where(rng.random((count, 1)) < EVEN, 1.0, rng.uniform(0.0, FURTHEST, (count, 1)))
+        shares = np.where(rng.random((count, 1)) < HALF, 1.0, rng.uniform(0.0, FURTHEST, (count, 1)))
         moved = (within[:, :, None] & taken).reshape(count, -1)
         return np.asarray(shares * moved * (self.vectors[others] - self.vectors[means]))
 
     def _noise(self, scales: Floats) -> Floats:
-        """Noise (n, d) at scales (n, 1) along a few directions each, at a factor that varies from sample to sample."""
+        """Noise (n, d) along a few directions each, at scales (n, 1) times a factor of each sample's own."""
         rng, count, total = self._rng, len(scales), len(self._directions)
         used = min(USED_DIRECTIONS, total)
         picked = rng.integers(total, size=(count, used))
         factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(LOW, HIGH, (count, 1)))
         sizes = scales * factors * rng.standard_normal((count, used))
-        sizes[:, 1:] *= rng.random((count, used - 1)) < EVEN
+        sizes[:, 1:] *= rng.random((count, used - 1)) < HALF
         out = np.zeros((count, self._lower.size))
         for k in range(used):
             out += sizes[:, k, None] * self._directions[picked[:, k]]

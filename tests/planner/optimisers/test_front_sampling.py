@@ -38,7 +38,7 @@ def test_what_breaks_a_constraint_or_lies_beyond_the_reference_is_not_kept() -> 
     made = search()
     before = made.vectors.copy()
     better = np.zeros((2, 6))
-    better[:, 0] = 1.0
+    better[:, 0] = 1.0, 0.9
     made.tell(better, two_goals(better), np.array([[0.0], [1e-9]]))
     assert len(made.vectors) == 2
     made.tell(0.9 * better, np.array([[-9.0, 2.5], [-9.0, -9.0]]), np.array([[0.0], [1.0]]))
