@@ -32,7 +32,7 @@ from planfly.airframe import load_airframe
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding
 from planner.optimisers.hypervolume import covering_order, hypervolume
-from planner.search.plan_front import Front, FrontTask, front_task, plan_front, seed_paths
+from planner.search.plan_front import Front, FrontTask, fitted_task, front_task, plan_front, seed_paths
 from world.scenario import Scenario, load_scenario
 
 Floats = NDArray[np.float64]
@@ -98,8 +98,9 @@ def _scenario(name: str) -> Scenario:
 
 def make_contest(scenario: Scenario, front: Front) -> Contest:
     """The contest of a problem, in the box about its default plan."""
-    task = front_task(scenario, load_airframe(scenario).limits.surely())
-    space, default = task.problem.space, front.default
+    default = front.default
+    task = fitted_task(front_task(scenario, load_airframe(scenario).limits.surely()), default.plan.waypoints)
+    space = task.problem.space
     straight = float(np.sqrt(((space.destination - space.start) ** 2).sum()))
     ends = np.stack([[end, end] for end in (space.start, space.destination)])
     highest = float(task.values(ends)[:, 2].min())

@@ -44,6 +44,8 @@ CLEARANCE_SHARES, RADAR_SHARES = (0.0, 0.25, 0.5, 0.75, 0.95), (0.0, 0.35, 0.5, 
 # Routes past the obstacles that are tried for each preference beside the default plan's: grids as of
 # `planner.search.seeds`.
 STAGES, SPREAD, RATIO, SHRINK, MAX_ROUTES, SLACK = 50, 0.2, 1.0 / 3.0, 0.3, 3, 1.25
+# Shares of what a search's margins are beyond the certificate's, the first of which is tried first.
+MARGINS = (0.5, 0.1, 0.0)
 # Solutions that the search keeps, at least, and for each plan that is asked for; samples of a generation, and
 # generations.
 ARCHIVE, KEPT, POPULATION, GENERATIONS = 100, 2, 120, 400
@@ -119,6 +121,7 @@ def plan_front(
     """
     task = front_task(scenario, limits)
     default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
+    task = fitted_task(task, default.waypoints)
     first = _valued(task, default)
     reference = reference_point(task, first)
     if not default.safe:
@@ -194,14 +197,25 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
     by_energy = energy is not None and scenario.planner.objective != "time"
     travel = energy if energy is not None and by_energy else time_cost(table)
     frame = rotated_frame(problem.space.start, problem.space.destination)
-    search, certified = problem.search, problem.certified
-    scored = search._replace(
-        buffer=0.5 * (search.buffer + certified.buffer),
-        start_buffer=0.5 * (search.start_buffer + certified.start_buffer),
-        destination_buffer=0.5 * (search.destination_buffer + certified.destination_buffer),
-        kill_margin=0.5 * (search.kill_margin + certified.kill_margin),
-    )
+    scored = _scored(problem, MARGINS[0])
     return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)
+
+
+def _scored(problem: Problem, share: float) -> ProblemArrays:
+    """The problem with the margins of the certificate and a share of what a search keeps beyond them."""
+    search, certified = problem.search, problem.certified
+    names = ("buffer", "start_buffer", "destination_buffer", "kill_margin")
+    least = {name: getattr(certified, name) for name in names}
+    return search._replace(**{name: low + share * (getattr(search, name) - low) for name, low in least.items()})
+
+
+def fitted_task(task: FrontTask, default: Floats) -> FrontTask:
+    """The task with margins that the default plan's path (w, 3) keeps: others may pass gaps as narrow as it does."""
+    for share in MARGINS:
+        task = task._replace(scored=_scored(task.problem, share))
+        if (task.scores(default[None])[1] <= 0.0).all():
+            break
+    return task
 
 
 def reference_point(task: FrontTask, default: FrontPlan) -> Floats:

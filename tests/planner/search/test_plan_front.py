@@ -8,7 +8,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.plan import Plan, plan_json
 from planner.search import plan_front as fronts
-from planner.search.plan_front import Front, front_task, plan_front
+from planner.search.plan_front import Front, fitted_task, front_task, plan_front
 from world.scenario import Scenario
 
 GENERATIONS = 4
@@ -94,3 +94,18 @@ def test_the_search_keeps_more_solutions_than_plans_are_asked_for(
 ) -> None:
     monkeypatch.setattr(fronts, "ARCHIVE", 1)
     assert len(plan_front(scenario, limits, 6, seed=3, generations=2).plans) > 2
+
+
+def test_margins_are_halved_and_given_up_where_the_default_plan_does_not_keep_them(
+    scenario: Scenario, limits: Limits, front: Front
+) -> None:
+    task, path = front_task(scenario, limits), front.default.plan.waypoints
+    search, certified = task.problem.search, task.problem.certified
+    assert search.kill_margin > certified.kill_margin
+    under = np.array(path)
+    under[1:-1, 2] = 0.0
+    for given, share in ((path, 0.5), (under, 0.0)):
+        scored = fitted_task(task, given).scored
+        for name in ("kill_margin", "buffer", "start_buffer", "destination_buffer"):
+            low, high = getattr(certified, name), getattr(search, name)
+            assert getattr(scored, name) == pytest.approx((1.0 - share) * low + share * high)
