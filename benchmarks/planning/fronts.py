@@ -5,8 +5,12 @@ front of 20 (`planner.search.plan_front`) and lets pymoo's algorithms search the
 clearance and energy, under the same graded constraints, with as many evaluations as ours took, and again with as much
 CPU, the default plan, the seeds and the certificates of ours included. NSGA-II takes constraints as it ships them;
 MOEA/D knows none, so violations are added to its objectives. Both search the box of the rotated encoding from random
-samples. A third row gives NSGA-II the paths that ours starts from, which it would not have alone. Of what each returns,
-the 20 certified paths that cover most count; a front without any has hypervolume 0.
+samples; and once more from the paths that ours starts from, which they would not have alone: as many of them as a
+population holds, those that cover most. Of what each returns, the 20 certified paths that cover most count; a front
+without any has hypervolume 0.
+
+A problem is the name of a scenario, ``random-7101`` or ``wild-7101``: an instance of 60 threats of that number as of
+`benchmarks.planning.fresh_instances`. ``--fresh`` measures twelve of these with the first seed, from our paths alone.
 
 The reference point is that of `reference_point`: 1.5 times the length, exposure and energy of the default plan (1 s of
 exposure at least), and the required clearance. Hypervolumes are shares of the box between it and the straight line's
@@ -23,16 +27,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.planning.fresh_instances import random_task
 from planfly.airframe import load_airframe
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding
 from planner.optimisers.hypervolume import covering_order, hypervolume
-from planner.search.plan_front import Front, FrontTask, front_task, plan_front, seed_paths
-from world.scenario import load_scenario
+from planner.search.plan_front import Front, FrontTask, fitted_task, front_task, plan_front, seed_paths
+from world.scenario import Scenario, load_scenario
 
 Floats = NDArray[np.float64]
 
 PROBLEMS, COUNT, FIRST_SEED = ("hard-30", "hard-60", "jacksboro"), 20, 100
+FRESH = tuple(f"{family}-{number}" for family in ("random", "wild") for number in range(7101, 7107))
 # Populations of pymoo's algorithms, and the neighbours of MOEA/D: its reference directions are those of 7 partitions.
 POPULATION, PARTITIONS, NEIGHBOURS = 120, 7, 15
 # Weight of violations in MOEA/D's objectives, which are shares of the reference box.
@@ -83,11 +89,18 @@ class Contest:
         return made.ok and made.kill_distance > 0.0
 
 
-def make_contest(name: str, front: Front) -> Contest:
+def _scenario(name: str) -> Scenario:
+    """The scenario of a problem."""
+    kind, _, number = name.partition("-")
+    families = {"random": "passable", "wild": "wild"}
+    return random_task(int(number), family=families[kind]).scenario if kind in families else load_scenario(name)
+
+
+def make_contest(scenario: Scenario, front: Front) -> Contest:
     """The contest of a problem, in the box about its default plan."""
-    scenario = load_scenario(name)
-    task = front_task(scenario, load_airframe(scenario).limits.surely())
-    space, default = task.problem.space, front.default
+    default = front.default
+    task = fitted_task(front_task(scenario, load_airframe(scenario).limits.surely()), default.plan.waypoints)
+    space = task.problem.space
     straight = float(np.sqrt(((space.destination - space.start) ** 2).sum()))
     ends = np.stack([[end, end] for end in (space.start, space.destination)])
     highest = float(task.values(ends)[:, 2].min())
@@ -99,12 +112,12 @@ def make_contest(name: str, front: Front) -> Contest:
 
 def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
     """Our front of a problem, its contest and its row."""
-    scenario = load_scenario(name)
+    scenario = _scenario(name)
     limits = load_airframe(scenario).limits.surely()
     began = time.process_time()
     front = plan_front(scenario, limits, COUNT, seed=seed)
     seconds = time.process_time() - began
-    contest = make_contest(name, front)
+    contest = make_contest(scenario, front)
     paths = np.array([one.plan.waypoints for one in front.plans])
     evaluations = front.evaluations + front.default.plan.evaluations
     return front, contest, Row(contest.share(paths), len(paths), evaluations, seconds)
@@ -138,6 +151,9 @@ def theirs(
             nonlocal spent
             spent += len(x)
             objectives, violations = task.scores(task.paths(x))
+            if penalised:
+                # It compares what breaks a constraint, too.
+                objectives = task.objectives(task.values(task.paths(x)))
             scaled = (objectives - contest.ideal) / (contest.reference - contest.ideal)
             scaled = np.nan_to_num(scaled, nan=1e6, posinf=1e6, neginf=-1.0)
             met = (violations <= 0.0).all(axis=1)
@@ -179,19 +195,20 @@ def _engine(algorithm: str, seeds: Floats, low: Floats, high: Floats, seed: int)
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.util.ref_dirs import get_reference_directions
 
-    if algorithm == "MOEA/D":
-        return MOEAD(get_reference_directions("uniform", 4, n_partitions=PARTITIONS), n_neighbors=NEIGHBOURS)
     first = np.random.default_rng(seed).uniform(low, high, (POPULATION, low.size))
     first[: min(POPULATION, len(seeds))] = seeds[:POPULATION]
+    if algorithm == "MOEA/D":
+        towards = get_reference_directions("uniform", 4, n_partitions=PARTITIONS)
+        return MOEAD(towards, n_neighbors=NEIGHBOURS, sampling=first)
     return NSGA2(pop_size=POPULATION, sampling=first)
 
 
-def measure(name: str, seeds: range, *, whole: bool) -> dict[str, Any]:
-    """All algorithms on a problem; prints a line a seed and the medians."""
+def measure(name: str, seeds: range, *, whole: bool, alone: bool = True) -> dict[str, Any]:
+    """All algorithms on a problem; prints a line a seed and the medians. alone: theirs without our paths, too."""
     print(f"\n{name}: hypervolume as a share of the box; CPU s")
     record: dict[str, list[dict[str, Any]]] = {}
     for seed in seeds:
-        rows, front = _rows(name, seed, whole=whole)
+        rows, front = _rows(name, seed, whole=whole, alone=alone)
         mine = rows["planfly"]
         for key, row in rows.items():
             record.setdefault(key, []).append(asdict(row))
@@ -202,18 +219,30 @@ def measure(name: str, seeds: range, *, whole: bool) -> dict[str, Any]:
     return record
 
 
-def _rows(name: str, seed: int, *, whole: bool) -> tuple[dict[str, Row], Front]:
+def _rows(name: str, seed: int, *, whole: bool, alone: bool) -> tuple[dict[str, Row], Front]:
     """What each algorithm came to on a problem with one seed, and our front."""
     front, contest, mine = ours(name, seed)
+    if not front.plans:
+        return {"planfly": mine}, front
     own = contest.task.vectors(np.array(list(seed_paths(contest.task, np.array(front.default.plan.waypoints)))))
     start = contest.certified(contest.task.paths(own))
     rows = {"planfly": mine, "our seeds alone": Row(contest.share(start), len(start), len(own), 0.0)}
+    none = own[:0]
     for algorithm in ("NSGA-II", "MOEA/D"):
-        rows[f"{algorithm}, equal CPU"] = theirs(contest, algorithm, seed, None, mine.seconds, own[:0])
-        if algorithm == "NSGA-II" or whole:
-            rows[f"{algorithm}, equal evaluations"] = theirs(contest, algorithm, seed, mine.evaluations, None, own[:0])
-    rows["NSGA-II from our seeds, equal CPU"] = theirs(contest, "NSGA-II", seed, None, mine.seconds, own)
+        for suffix, given in [("", none)] * alone + [(" from our seeds", _covering_first(contest, own))]:
+            rows[f"{algorithm}{suffix}, equal CPU"] = theirs(contest, algorithm, seed, None, mine.seconds, given)
+            if algorithm == "NSGA-II" or whole:
+                key = f"{algorithm}{suffix}, equal evaluations"
+                rows[key] = theirs(contest, algorithm, seed, mine.evaluations, None, given)
     return rows, front
+
+
+def _covering_first(contest: Contest, vectors: Floats) -> Floats:
+    """Vectors (n, d) in the order of what they cover, those last that break a constraint."""
+    objectives, violations = contest.task.scores(contest.task.paths(vectors))
+    met = np.flatnonzero((violations <= 0.0).all(axis=1))
+    first = met[covering_order(objectives[met], contest.reference, len(met))]
+    return np.concatenate([vectors[first], np.delete(vectors, first, axis=0)])
 
 
 def _sum_up(record: dict[str, list[dict[str, Any]]]) -> None:
@@ -238,10 +267,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--from", dest="first", type=int, default=FIRST_SEED)
     parser.add_argument("--whole", action="store_true", help="MOEA/D at equal evaluations, too: half a minute a seed")
+    parser.add_argument("--fresh", action="store_true", help="twelve random instances, too")
     parser.add_argument("--json", type=Path, help="file for the rows")
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.seeds)
     record = {name: measure(name, seeds, whole=args.whole) for name in args.problems.split(",")}
+    if args.fresh:
+        record |= {name: measure(name, seeds[:1], whole=args.whole, alone=False) for name in FRESH}
     if args.json:
         args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 

@@ -15,7 +15,7 @@ from planner.evaluation.travel_cost import LENGTH, TravelCost, leg_cost
 from world.frames import polymap
 from world.geometry import window_exposure
 from world.kernels import Record, compiled, inner
-from world.terrain import pixel_height
+from world.terrain import TILE, pixel_height
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def _fill(
             seconds = leg_cost(of_time, data.aircraft, a, b)
             out[n, _LENGTH] += math.sqrt(dx * dx + dy * dy + dz * dz)
             out[n, _EXPOSURE] += seconds * _detection(data, a, dx, dy, dz)
-            lowest = min(lowest, _lowest(data, a, dx, dy, dz))
+            lowest = _lowest(data, a, dx, dy, dz, lowest)
             out[n, _TIME] += seconds
             out[n, _ENERGY] += leg_cost(joules, data.aircraft, a, b)
         out[n, _CLEARANCE] = lowest
@@ -90,14 +90,25 @@ def _detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) 
 
 
 @inner
-def _lowest(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:  # pragma: no cover - compiled
-    """Least height above ground at samples of the leg d from a, m; -inf off the terrain."""
-    count = 1 + int(math.sqrt(dx * dx + dy * dy) / data.sample_pitch)
-    lowest = math.inf
-    for k in range(count + 1):
+def _lowest(
+    data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, lowest: float
+) -> float:  # pragma: no cover - compiled
+    """Least height above ground at samples of the leg d from a and of legs before it, m; -inf off the terrain.
+
+    lowest: of the legs before. Samples are passed over that the ground's steepest slope hereabouts keeps above it.
+    """
+    run = math.sqrt(dx * dx + dy * dy)
+    count = 1 + int(run / data.sample_pitch)
+    tiles, k = data.slope_bounds.tiles, 0
+    while True:
         share = k / count
         column, row = polymap(data.to_pixel, a[0] + share * dx, a[1] + share * dy)
         height = a[2] + share * dz - pixel_height(data.heights, column, row)
         if not height >= lowest:
             lowest = -math.inf if math.isnan(height) else height
-    return lowest
+        if k == count or lowest == -math.inf:
+            return lowest
+        i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
+        ahead = (height - lowest) / (tiles[i, j] * run + abs(dz) + 1e-9)
+        ahead = min(ahead, data.slope_bounds.tile_side / (run + 1e-9))
+        k = min(count, k + max(1, int(ahead * count)))

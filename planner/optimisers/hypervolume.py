@@ -9,11 +9,14 @@ and Fisher, Mathematical Programming 14, 1978).
 import numpy as np
 from numpy.typing import NDArray
 
+from world.kernels import compiled, inner
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Marks = NDArray[np.uint8]
 
-# Random points at which coverage is counted, and their seed: the same points give the same choice.
-PROBES, SEED = 2048, 20
+# Random points at which coverage is counted, and their seed where none is given: the same points, the same choice.
+PROBES, SEED = 4096, 20
 
 
 def hypervolume(points: Floats, reference: Floats) -> float:
@@ -45,11 +48,13 @@ def _lowest(points: Floats) -> Floats:
     return np.asarray(points[below.sum(axis=0) == 1])
 
 
-def covering_order(points: Floats, reference: Floats, count: int) -> Ints:
+def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
     """Up to `count` rows of points (n, m) below a reference (m,): first the best of each objective, then greedily.
 
     Each further point is the one that adds most to the volume that is covered, counted at random probes between the
     points' best values and the reference. Points that add nothing come last, in their order.
+
+    rng: draws the probes; None for the same ones in every call.
 
     >>> front = np.array([[0.0, 9.0], [9.0, 0.0], [4.0, 4.0], [4.1, 4.1]])
     >>> covering_order(front, np.array([10.0, 10.0]), 3).tolist()
@@ -58,22 +63,51 @@ def covering_order(points: Floats, reference: Floats, count: int) -> Ints:
     inside = np.flatnonzero((points < reference).all(axis=1))
     if not inside.size:
         return np.zeros(0, dtype=np.int64)
-    kept = points[inside]
-    best = kept.min(axis=0)
-    probes = best + np.random.default_rng(SEED).random((PROBES, len(best))) * (reference - best)
-    covered_by = np.ones((PROBES, len(kept)), dtype=bool)
-    for k in range(kept.shape[1]):
-        covered_by &= kept[:, k] <= probes[:, k, None]
-    chosen: list[int] = []
-    open_probes = np.ones(PROBES, dtype=bool)
-    gains = covered_by.sum(axis=0)
-    firsts = list(dict.fromkeys(np.lexsort((kept.sum(axis=1), kept[:, k]))[0] for k in range(kept.shape[1])))
-    left = np.ones(len(kept), dtype=bool)
-    for number in range(min(count, len(kept))):
-        row = int(firsts[number]) if number < len(firsts) else int(np.argmax(np.where(left, gains, -1)))
-        chosen.append(row)
-        left[row] = False
-        newly = open_probes & covered_by[:, row]
-        gains -= covered_by[newly].sum(axis=0)
-        open_probes &= ~newly
+    kept = np.ascontiguousarray(points[inside])
+    best, random = kept.min(axis=0), np.random.default_rng(SEED) if rng is None else rng
+    probes = best + random.random((PROBES, len(best))) * (reference - best)
+    firsts = dict.fromkeys(int(np.lexsort((kept.sum(axis=1), column))[0]) for column in kept.T)
+    chosen = _greedy(_covered(kept, np.ascontiguousarray(probes.T)), np.array(list(firsts)), min(count, len(kept)))
     return np.asarray(inside[chosen], dtype=np.int64)
+
+
+@compiled
+def _covered(points: Floats, probes: Floats) -> Marks:  # pragma: no cover - compiled
+    """Marks (n, p), 1 where points (n, m) lie at or below probes (m, p)."""
+    out = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
+    for n in range(points.shape[0]):
+        for k in range(points.shape[1]):
+            for p in range(probes.shape[1]):
+                out[n, p] &= np.uint8(points[n, k] <= probes[k, p])
+    return out
+
+
+@compiled
+def _greedy(covered: Marks, firsts: Ints, count: int) -> Ints:  # pragma: no cover - compiled
+    """Rows (count,) of marks (n, p): `firsts`, then whichever covers most that is open; of equal ones the first.
+
+    What a row adds only falls as others are chosen, so that its last count bounds it, and few are counted anew
+    (Minoux, Optimization Techniques, Lecture Notes in Control and Information Sciences 7, 1978).
+    """
+    size, width = covered.shape
+    left, counted, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)
+    chosen = np.empty(count, dtype=np.int64)
+    for number in range(count):
+        row = firsts[number] if number < firsts.size else np.argmax(gains)
+        while number >= firsts.size and counted[row] < number:
+            gains[row], counted[row] = _overlap(covered[row], left), number
+            row = np.argmax(gains)
+        chosen[number] = row
+        gains[row] = -1
+        for p in range(width):
+            left[p] &= 1 - covered[row, p]
+    return chosen
+
+
+@inner
+def _overlap(some: Marks, others: Marks) -> int:  # pragma: no cover - compiled
+    """Number of places (p,) at which both have a mark."""
+    total = 0
+    for p in range(some.size):
+        total += some[p] & others[p]
+    return total

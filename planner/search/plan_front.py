@@ -44,8 +44,11 @@ CLEARANCE_SHARES, RADAR_SHARES = (0.0, 0.25, 0.5, 0.75, 0.95), (0.0, 0.35, 0.5, 
 # Routes past the obstacles that are tried for each preference beside the default plan's: grids as of
 # `planner.search.seeds`.
 STAGES, SPREAD, RATIO, SHRINK, MAX_ROUTES, SLACK = 50, 0.2, 1.0 / 3.0, 0.3, 3, 1.25
-# Solutions that the search keeps, samples of a generation, and generations.
-ARCHIVE, POPULATION, GENERATIONS = 160, 120, 200
+# Shares of what a search's margins are beyond the certificate's, the first of which is tried first.
+MARGINS = (0.5, 0.1, 0.0)
+# Solutions that the search keeps, at least, and for each plan that is asked for; samples of a generation, and
+# generations.
+ARCHIVE, KEPT, POPULATION, GENERATIONS = 100, 2, 120, 400
 # Largest deviations of the noise: a whole path's along, across and up, as shares of an interval, of the straight line
 # and of the height range.
 ALONG, ACROSS, UP = 0.3, 0.1, 0.3
@@ -118,16 +121,18 @@ def plan_front(
     """
     task = front_task(scenario, limits)
     default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
+    task = fitted_task(task, default.waypoints)
     first = _valued(task, default)
     reference = reference_point(task, first)
     if not default.safe:
         return Front((), task.fourth, first, reference, 0)
-    search, evaluations = _search(
-        task, default.waypoints, reference, stream(seed, PLANNER), progress, stop, generations
-    )
-    plans = _certified(task, search, count - 1, replace(default, evaluations=evaluations), finish)
-    ordered = sorted(_undominated([first, *plans], task.fourth), key=lambda one: one.length)
-    return Front(tuple(ordered), task.fourth, first, reference, evaluations)
+    size = max(ARCHIVE, KEPT * count)
+    search = make_sampling(task, len(default.waypoints), reference, size, stream(seed, PLANNER))
+    evaluations = _search(task, search, default.waypoints, progress, stop, generations)
+    plans = _certified(task, search, count, replace(default, evaluations=evaluations), finish)
+    # The default plan is among those that the search began from: it is wanted once, where nothing is better.
+    kept = _undominated([*plans, first], task.fourth)[:count]
+    return Front(tuple(sorted(kept, key=lambda one: one.length)), task.fourth, first, reference, evaluations)
 
 
 # --- The problem ---
@@ -154,10 +159,15 @@ class FrontTask(NamedTuple):
         return front_values(self.problem.search, self.energy, paths)
 
     def scores(self, paths: Floats) -> tuple[Floats, Floats]:
-        """Objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles."""
+        """Objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles.
+
+        Objectives are infinite where a constraint is not met: they take most of the time, and nothing asks for them.
+        """
         violations, graded = graded_scores(self.scored, paths)
-        kill = graded[:, Objective.KILL_EXPOSURE, None]
-        return self.objectives(self.values(paths)), np.concatenate([violations, kill], axis=1)
+        every = np.concatenate([violations, graded[:, Objective.KILL_EXPOSURE, None]], axis=1)
+        out, met = np.full((len(paths), 4), np.inf), (every <= 0.0).all(axis=1)
+        out[met] = self.objectives(self.values(paths[met]))
+        return out, every
 
     def objectives(self, values: Floats) -> Floats:
         """Objectives (n, 4) of values (n, 5): length, exposure, clearance negated, and time or energy."""
@@ -187,14 +197,25 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
     by_energy = energy is not None and scenario.planner.objective != "time"
     travel = energy if energy is not None and by_energy else time_cost(table)
     frame = rotated_frame(problem.space.start, problem.space.destination)
-    search, certified = problem.search, problem.certified
-    scored = search._replace(
-        buffer=0.5 * (search.buffer + certified.buffer),
-        start_buffer=0.5 * (search.start_buffer + certified.start_buffer),
-        destination_buffer=0.5 * (search.destination_buffer + certified.destination_buffer),
-        kill_margin=0.5 * (search.kill_margin + certified.kill_margin),
-    )
+    scored = _scored(problem, MARGINS[0])
     return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)
+
+
+def _scored(problem: Problem, share: float) -> ProblemArrays:
+    """The problem with the margins of the certificate and a share of what a search keeps beyond them."""
+    search, certified = problem.search, problem.certified
+    names = ("buffer", "start_buffer", "destination_buffer", "kill_margin")
+    least = {name: getattr(certified, name) for name in names}
+    return search._replace(**{name: low + share * (getattr(search, name) - low) for name, low in least.items()})
+
+
+def fitted_task(task: FrontTask, default: Floats) -> FrontTask:
+    """The task with margins that the default plan's path (w, 3) keeps: others may pass gaps as narrow as it does."""
+    for share in MARGINS:
+        task = task._replace(scored=_scored(task.problem, share))
+        if (task.scores(default[None])[1] <= 0.0).all():
+            break
+    return task
 
 
 def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
@@ -265,15 +286,13 @@ def _preferences(task: FrontTask) -> Iterator[ProblemArrays]:
 
 def _search(
     task: FrontTask,
+    search: FrontSampling,
     default: Floats,
-    reference: Floats,
-    rng: np.random.Generator,
     progress: SearchProgress | None,
     stop: StopCondition | None,
     generations: int,
-) -> tuple[FrontSampling, int]:
-    """Sample from the seeds on; the search, and the number of paths evaluated."""
-    search = make_sampling(task, len(default), reference, rng)
+) -> int:
+    """Sample from the seeds on; the number of paths evaluated."""
     seeds = np.array(list(seed_paths(task, np.array(default))))
     search.tell(task.vectors(seeds), *task.scores(seeds))
     evaluations = len(seeds)
@@ -285,11 +304,13 @@ def _search(
         evaluations += len(vectors)
         if progress is not None:
             progress(generation + 1, generations, f"{len(search.vectors)} paths that no other dominates")
-    return search, evaluations
+    return evaluations
 
 
-def make_sampling(task: FrontTask, waypoints: int, reference: Floats, rng: np.random.Generator) -> FrontSampling:
-    """The estimation of distribution for paths of so many waypoints."""
+def make_sampling(
+    task: FrontTask, waypoints: int, reference: Floats, size: int, rng: np.random.Generator
+) -> FrontSampling:
+    """The estimation of distribution for paths of so many waypoints, which keeps so many solutions."""
     data, frame, inner = task.problem.search, task.frame, waypoints - 2
     corners = np.array([[x, y, 0.0] for x in (data.west, data.east) for y in (data.south, data.north)])
     rotated = frame.rotate(corners)
@@ -297,7 +318,7 @@ def make_sampling(task: FrontTask, waypoints: int, reference: Floats, rng: np.ra
     high = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
     scales = np.array([ALONG * frame.length / (inner + 1), ACROSS * frame.length, UP * (high[2] - low[2])])
     return FrontSampling(
-        np.tile(low, inner), np.tile(high, inner), directions(inner, scales), reference, ARCHIVE, POPULATION, rng
+        np.tile(low, inner), np.tile(high, inner), directions(inner, scales), reference, 3, size, POPULATION, rng
     )
 
 
@@ -323,20 +344,19 @@ def directions(inner: int, scales: Floats) -> Floats:
 def _certified(
     task: FrontTask, search: FrontSampling, count: int, template: Plan, finish: Callable[[Plan], Plan]
 ) -> list[FrontPlan]:
-    """Plans of the solutions that cover most, each certified and completed; one that is not safe is passed over."""
-    found: list[FrontPlan] = []
+    """Plans of the solutions that cover most of those that are safe, each certified and completed."""
+    found: dict[int, FrontPlan] = {}
     left = np.arange(len(search.vectors))
-    while left.size and len(found) < count:
-        order = covering_order(search.objectives[left], search._reference, count - len(found))
-        if not order.size:
-            break
-        for row in left[order]:
-            path = task.paths(search.vectors[row][None])[0]
-            plan = finish(_plan(task, path, template))
-            if plan.safe:
-                found.append(_valued(task, plan))
-        left = np.setdiff1d(left, left[order])
-    return found
+    while True:
+        order = left[covering_order(search.objectives[left], search.reference, count)].tolist()
+        for row in order:
+            if row not in found:
+                path = task.paths(search.vectors[row][None])[0]
+                found[row] = _valued(task, finish(_plan(task, path, template)))
+        unsafe = [row for row in order if not found[row].plan.safe]
+        if not unsafe:
+            return [found[row] for row in order]
+        left = np.setdiff1d(left, unsafe)
 
 
 def _undominated(found: list[FrontPlan], fourth: str) -> list[FrontPlan]:

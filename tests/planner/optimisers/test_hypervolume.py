@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.optimisers.hypervolume import covering_order, hypervolume
+from planner.optimisers.hypervolume import PROBES, SEED, covering_order, hypervolume
 
 
 @pytest.mark.parametrize(
@@ -45,3 +45,28 @@ def test_the_best_of_each_objective_comes_first_then_what_adds_most() -> None:
     assert order[3] == 4
     assert 5 not in covering_order(front, np.ones(2), 9)
     assert covering_order(front, np.full(2, -1.0), 3).size == 0
+
+
+@pytest.mark.parametrize("axes", [2, 4])
+def test_each_choice_adds_most_probes_as_counted_anew_for_all(axes: int) -> None:
+    points = np.random.default_rng(axes).random((60, axes))
+    # Equal ones, of which the first is taken.
+    points[30:40] = points[20:30]
+    inside = np.flatnonzero((points < 0.9).all(axis=1))
+    best = points[inside].min(axis=0)
+    probes = best + np.random.default_rng(SEED).random((PROBES, axes)) * (0.9 - best)
+    covered = (points[inside][:, None] <= probes[None]).all(axis=2)
+    order = [int(np.argmin(points[inside, k])) for k in range(axes)]
+    while len(order) < 20:
+        adds = (covered & ~covered[order].any(axis=0)).sum(axis=1)
+        adds[order] = -1
+        order.append(int(np.argmax(adds)))
+    assert covering_order(points, np.full(axes, 0.9), 20).tolist() == inside[order].tolist()
+
+
+def test_probes_are_drawn_anew_from_a_stream_that_is_given() -> None:
+    points, rng = np.random.default_rng(1).random((80, 4)), np.random.default_rng(SEED)
+    first, second = (covering_order(points, np.ones(4), 30, rng).tolist() for _ in range(2))
+    assert first == covering_order(points, np.ones(4), 30).tolist()
+    assert first != second
+    assert first[:4] == second[:4]

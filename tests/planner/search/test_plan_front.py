@@ -7,7 +7,8 @@ import pytest
 
 from aircraft.path_limits import Limits
 from planner.plan import Plan, plan_json
-from planner.search.plan_front import Front, plan_front
+from planner.search import plan_front as fronts
+from planner.search.plan_front import Front, fitted_task, front_task, plan_front
 from world.scenario import Scenario
 
 GENERATIONS = 4
@@ -71,3 +72,40 @@ def test_without_a_safe_plan_there_is_no_front(scenario: Scenario, limits: Limit
     found = plan_front(scenario, limits, 6, seed=3, generations=1, finish=refuse)
     assert found.plans == ()
     assert not found.default.plan.safe
+
+
+def test_a_path_that_breaks_a_constraint_has_no_objectives(scenario: Scenario, limits: Limits, front: Front) -> None:
+    task = front_task(scenario, limits)
+    met = front.default.plan.waypoints
+    under = np.array(met)
+    under[1:-1, 2] = 0.0
+    objectives, violations = task.scores(np.array([under, met]))
+    assert violations[0].max() > 0.0
+    assert violations[1].max() <= 0.0
+    assert np.isinf(objectives[0]).all()
+    first = front.default
+    # Above the ground as sampled, which is the certificate's to a metre or two.
+    assert objectives[1, [0, 1, 3]].tolist() == pytest.approx([first.length, first.exposure, first.time])
+    assert objectives[1, 2] == pytest.approx(-first.clearance, abs=2.0)
+
+
+def test_the_search_keeps_more_solutions_than_plans_are_asked_for(
+    scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fronts, "ARCHIVE", 1)
+    assert len(plan_front(scenario, limits, 6, seed=3, generations=2).plans) > 2
+
+
+def test_margins_are_halved_and_given_up_where_the_default_plan_does_not_keep_them(
+    scenario: Scenario, limits: Limits, front: Front
+) -> None:
+    task, path = front_task(scenario, limits), front.default.plan.waypoints
+    search, certified = task.problem.search, task.problem.certified
+    assert search.kill_margin > certified.kill_margin
+    under = np.array(path)
+    under[1:-1, 2] = 0.0
+    for given, share in ((path, 0.5), (under, 0.0)):
+        scored = fitted_task(task, given).scored
+        for name in ("kill_margin", "buffer", "start_buffer", "destination_buffer"):
+            low, high = getattr(certified, name), getattr(search, name)
+            assert getattr(scored, name) == pytest.approx((1.0 - share) * low + share * high)
