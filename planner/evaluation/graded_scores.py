@@ -169,7 +169,8 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
     paths of exactly equal length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
-    _score_paths(data, paths, violations, objectives)
+    # A plan's own path cannot be written, which would make all of this another kernel.
+    _score_paths(data, np.require(paths, requirements="CW"), violations, objectives)
     return as_columns(violations), as_columns(objectives)
 
 

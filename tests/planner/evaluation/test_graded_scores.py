@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
-from planner.evaluation.graded_scores import graded_scores
+from planner.evaluation.graded_scores import _score_paths, graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_KILL_MARGIN, Problem, ProblemArrays, make_problem
 from planner.plan import Objective, Violation
 from tests.planner.tracking_limits import with_tracking_error
 from world.frames import polymap
+from world.kernels import read_only
 from world.scenario import Scenario
 
 
@@ -26,6 +27,16 @@ def test_a_path_beside_everything_has_no_violation(problem: Problem) -> None:
     assert objectives[0, Objective.KILL_EXPOSURE] == 0.0
     assert smooth[0, Objective.KILL_EXPOSURE] == 0.0
     assert smooth[0, Objective.LENGTH_RATIO] == objectives[0, Objective.LENGTH_RATIO]
+
+
+def test_a_path_that_cannot_be_written_is_scored_by_the_same_kernel(problem: Problem) -> None:
+    """As a plan's own is; another took eight seconds to compile."""
+    paths = np.array([[problem.space.start, problem.space.destination]])
+    found = graded_scores(problem.search, paths)
+    kernels = len(_score_paths.signatures)  # type: ignore[attr-defined]
+    again = graded_scores(problem.search, read_only(paths))
+    assert [scores.tolist() for scores in again] == [scores.tolist() for scores in found]
+    assert len(_score_paths.signatures) == kernels  # type: ignore[attr-defined]
 
 
 def test_a_sphere_cut_between_points_is_seen_only_by_the_graded_scores(problem: Problem) -> None:

@@ -119,7 +119,7 @@ def counted_legs(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
     return joins
 
 
-@pytest.mark.parametrize("population", [60, 120])
+@pytest.mark.parametrize("population", some([60, 120], 2))
 def test_a_search_that_finds_no_way_evaluates_so_many_legs(
     population: int,
     small: Callable[..., Scenario],
