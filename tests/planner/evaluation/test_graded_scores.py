@@ -33,10 +33,10 @@ def test_a_path_that_cannot_be_written_is_scored_by_the_same_kernel(problem: Pro
     """As a plan's own is; another took eight seconds to compile."""
     paths = np.array([[problem.space.start, problem.space.destination]])
     found = graded_scores(problem.search, paths)
-    kernels = len(_score_paths.signatures)  # type: ignore[attr-defined]
+    kernels = len(_score_paths.signatures)
     again = graded_scores(problem.search, read_only(paths))
     assert [scores.tolist() for scores in again] == [scores.tolist() for scores in found]
-    assert len(_score_paths.signatures) == kernels  # type: ignore[attr-defined]
+    assert len(_score_paths.signatures) == kernels
 
 
 def test_a_sphere_cut_between_points_is_seen_only_by_the_graded_scores(problem: Problem) -> None:
