@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from world.geometry import wrap
-from world.kernels import Record, inner, record_dtype
+from world.kernels import Record, Records, inner, record_dtype
 
 # A waypoint, and the leg that begins there.
 WAYPOINT = record_dtype(
@@ -37,6 +37,19 @@ WAYPOINT = record_dtype(
     ("straight", np.bool_),  # whether the leg to it leads from wherever the aircraft is, along no line
     "slope_base",  # m, as of `flight.mission.return_path.ReturnCircle`
 )
+
+
+def waypoint_column(count: int) -> Records:
+    """`WAYPOINT` records (count,), all 0, as apart from each other in memory as those of a flight's path.
+
+    Records side by side are another type to numba, for which every law would be compiled a second time.
+
+    >>> waypoint_column(3).shape, waypoint_column(3).flags.c_contiguous
+    ((3,), False)
+    """
+    return np.zeros(2 * count, WAYPOINT)[::2]
+
+
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.
 WAYPOINT_RADIUS = 90.0
 # L1 integrates only this near to its line (rad), and up to this much (rad).

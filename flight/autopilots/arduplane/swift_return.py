@@ -286,8 +286,8 @@ def fly_stages(
 
     climb: whether the first stage is a climb, and how far.  staged: the parameters of that climb.
     """
-    # A circle is flown until the return is over: no leg comes after it.  A waypoint is left for one like it.
-    waypoints, turns = np.zeros(3, WAYPOINT), np.zeros(1, _CIRCLING)
+    # As `waypoint_column` has them.  A circle is flown until the return is over: no leg comes after it.
+    waypoints, turns = np.zeros(6, WAYPOINT)[::2], np.zeros(1, _CIRCLING)
     b, circling = waypoints[1], turns[0]
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, state, own = motions[0], states[0], memories[0]
@@ -335,7 +335,7 @@ def fly_stages(
     if out.clearance <= 0.0:
         out.ended = HIT
     # Compiled code frees an array after its last use, and a record of it does not count as one.
-    held = motions.size + states.size + memories.size + turns.size == 4
+    held = motions.size + states.size + memories.size + turns.size + waypoints.size == 7
     out.energy = used / 3600.0 if aircraft.has_power and held else math.nan
 
 

@@ -21,7 +21,7 @@ from flight.autopilots.arduplane.law import (
 )
 from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import ERRORS, MOTION
 from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
 from world.scenario_tables import Navigation
@@ -95,7 +95,7 @@ def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -
     """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
-    _fill(record, airspeed, TURNS, speeds, fly_over, corners, np.zeros(3, WAYPOINT))
+    _fill(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
     share, more = WIND_SPREAD
     corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Plans are the same on every machine, and a library's sines are not.

@@ -16,7 +16,7 @@ from flight.autopilots.px4.lateral import wanted_bank
 from flight.autopilots.px4.law import PX4_MEMORY, ROLL_LAG
 from flight.autopilots.px4.navigator import navigate, reach_radius
 from flight.autopilots.px4.parameters import Px4Parameters
-from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import ERRORS, MOTION
 from world.kernels import Record, Records, compiled, field_names, inner, record_dtype
 from world.scenario_tables import Navigation
@@ -117,7 +117,7 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
-    _fill(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, np.zeros(3, WAYPOINT))
+    _fill(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
     share, more = WIND_SPREAD
     corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Plans are the same on every machine, and a library's sines are not.

@@ -8,7 +8,7 @@ import numpy as np
 from flight.autopilots.arduplane.law import ARDUPILOT_MEMORY
 from flight.autopilots.arduplane.parameters import default_parameters
 from flight.dynamics.state import STATE
-from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import MOTION
 from world.kernels import Record
 
@@ -31,7 +31,7 @@ def flying(east: float = 0.0, north: float = 0.0, up: float = 500.0, course: flo
 
 def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
     """Waypoints (w,) at east, north, up, flown to at 25 m/s; fields: of all of them."""
-    made = np.zeros(len(points), WAYPOINT)
+    made = waypoint_column(len(points))
     made["east"], made["north"], made["up"] = np.array(points).T
     made["airspeed"] = 25.0
     for name, value in fields.items():

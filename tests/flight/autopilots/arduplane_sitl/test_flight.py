@@ -7,7 +7,7 @@ import pytest
 
 from flight.autopilots.sitl.flight import beyond_end, place_on_path
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
-from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import MOTION
 from flight.guidance.path import NODE, PIECE
 
@@ -16,7 +16,7 @@ FIRST = (0.0, 1000.0, 0.0, 0.0, 0.0, 0.0, 0, math.inf)
 SECOND = (1000.0, 1000.0, 0.0, 1000.0, math.pi / 2, 0.0, 1, math.inf)
 PIECES = np.array([FIRST, SECOND], PIECE)
 NODES = np.array([(0.0, 500.0, 0.0, 0.0), (1000.0, 500.0, 0.05, 0.0), (2000.0, 550.0, 0.05, 0.0)], NODE)
-WAYPOINTS = np.zeros(3, WAYPOINT)
+WAYPOINTS = waypoint_column(3)
 WAYPOINTS["east"], WAYPOINTS["north"] = (0.0, 0.0, 1000.0), (0.0, 1000.0, 1000.0)
 
 
