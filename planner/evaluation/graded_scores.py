@@ -170,7 +170,7 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
     # A plan's own path cannot be written, which would make all of this another kernel.
-    _score_paths(data, np.require(paths, requirements="CW"), violations, objectives)
+    _score_paths(data, np.require(paths, requirements=["C", "W"]), violations, objectives)
     return as_columns(violations), as_columns(objectives)
 
 

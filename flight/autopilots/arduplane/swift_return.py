@@ -287,10 +287,10 @@ def fly_stages(
     climb: whether the first stage is a climb, and how far.  staged: the parameters of that climb.
     """
     # As `waypoint_column` has them.  A circle is flown until the return is over: no leg comes after it.
-    waypoints, turns = np.zeros(6, WAYPOINT)[::2], np.zeros(1, _CIRCLING)
-    b, circling = waypoints[1], turns[0]
+    spaced, turns = np.zeros(6, WAYPOINT), np.zeros(1, _CIRCLING)
+    waypoints, circling = spaced[::2], turns[0]
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
-    estimated, state, own = motions[0], states[0], memories[0]
+    b, estimated, state, own = waypoints[1], motions[0], states[0], memories[0]
     _begin(start, estimated, known, out)
     _fly_to(stages, 0, waypoints, estimated, own)
     _take_over(start, parameters, aircraft, excess, state, own)
@@ -335,7 +335,7 @@ def fly_stages(
     if out.clearance <= 0.0:
         out.ended = HIT
     # Compiled code frees an array after its last use, and a record of it does not count as one.
-    held = motions.size + states.size + memories.size + turns.size + waypoints.size == 7
+    held = motions.size + states.size + memories.size + turns.size + spaced.size == 10
     out.energy = used / 3600.0 if aircraft.has_power and held else math.nan
 
 
