@@ -98,11 +98,12 @@ def main() -> int:
         folder = Path(name)
         (folder / "field.toml").write_text(FIELD, encoding="utf-8")
         (folder / "field.waypoints").write_text(MISSION, encoding="utf-8")
+        # The longest of what is beside each other, and no kernel's.
+        reading = subprocess.Popen([*PYTEST, "-n", "0", "--collect-only"], cwd=ROOT)
         compile_units([*BOTH, *GLIDING], cache_folder(), lambda _: None)
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = [sys.executable, "-m", "tests.kernels"]
         started = [subprocess.Popen([*command, str(k)], cwd=folder, env=environment) for k in range(len(PROCESSES))]
-        reading = subprocess.Popen([*PYTEST, "-n", "0", "--collect-only"], cwd=ROOT)
         failed = max(one.wait() for one in started)
         reading.wait()
     if not failed:
