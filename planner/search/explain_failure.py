@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
+from planner.evaluation.certify import certify
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import BUFFER_GROWTH, Problem, make_problem
 from planner.plan import Plan, Violation
@@ -206,7 +207,8 @@ MAX_NAMES, MAX_CLOSING, ZONE_PITCH = 4, 12, 20.0
 def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     """Lines that state what blocks an infeasible plan, and what a search in its encoding cannot find.
 
-    limits: of the path; if given, the margins that a plan requires are examined too.
+    limits: of the path; if given, the margins that a plan requires are examined too, and nothing is said of a path that
+    keeps all of them.
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
@@ -224,6 +226,10 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     lines = _walls(scenario)
     if limits is not None:
         problem = make_problem(scenario, limits if chosen is None else limits_for(chosen, limits))
+        found = certify(problem, plan.waypoints)
+        if found.ok and found.kill_distance > 0.0 and not plan.violations.any():
+            # What is wrong is the autopilot's, and stands in the certificate: the search has found a path.
+            return []
         lines += closed_bands(problem) or ([] if lines else _margin_walls(problem))
         lines += _closing(problem)
     closed = separating_zones(scenario)

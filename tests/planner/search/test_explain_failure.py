@@ -1,6 +1,7 @@
 """Zones that separate start and destination: a wall, a ring around an end, a floor to pass under, and a gap."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -166,3 +167,15 @@ def test_obstacles_that_block_every_route_are_named(
     assert "turn back or circle to climb were searched" in lines[-1]
     alone = plan_path(walled, make_limits(walled), seed=1, algorithm="umda")
     assert "a route that must turn back was not searched" in explain_failure(alone)[-1]
+
+
+def test_of_a_path_that_fails_by_its_autopilot_alone_nothing_is_said(small: Small, make_limits: MakeLimits) -> None:
+    """The certificate names that: no obstacle is to blame, and no longer search would help."""
+    scenario = small(terrain={"kind": "flat", "amsl_m": 0})
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    circles = replace(plan, certificate=replace(plan.certificate, problems=("it circles at a waypoint",)))
+    assert plan.safe
+    assert not circles.safe
+    assert explain_failure(circles, make_limits(scenario)) == []
+    stray = replace(circles, waypoints=plan.waypoints - [0.0, 0.0, 200.0])
+    assert explain_failure(stray, make_limits(scenario)) != []
