@@ -1,19 +1,29 @@
 """Do a unit of work, and report which of its kernels are ready."""
 
 import functools
+import math
 import os
 import tomllib
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
+
+from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.tracking_error import tracking_error
+from flight.dynamics.envelope_tables import load_envelope
 from flight.mission_files.formats import parse_mission
+from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
-from planfly.airframe import Airframe, load_airframe
+from planfly.airframe import Airframe, find_airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.pipeline import fly_and_judge, make_setup
 from planfly.returns_beside import returns_beside, returns_line
-from planner.search.kernel_calls import PARTS, call_kernels
+from planner.evaluation.problem import make_problem
+from planner.search.kernel_calls import FEW, PARTS, call_kernels
+from planner.search.search_state import SCORE_COLUMNS, best_first
 from world.compile_events import tell_before_compiling
 from world.scenario import Scenario, from_spec
 
@@ -64,6 +74,23 @@ def _world() -> tuple[Scenario, Airframe]:
     return scenario, load_airframe(scenario)
 
 
+def _make_problem() -> None:
+    scenario = from_spec(tomllib.loads(FIELD), "field")
+    aircraft, _ = find_airframe(scenario)
+    limits = make_limits(
+        scenario, load_envelope(aircraft), aircraft.airspeed, math.radians(scenario.flight.max_bank_deg)
+    )
+    make_problem(scenario, limits)
+
+
+def _track() -> None:
+    tracking_error(default_parameters(), load_aircraft("aerosonde").airspeed, "gnss")
+
+
+def _rank() -> None:
+    best_first(np.zeros((FEW, SCORE_COLUMNS)))
+
+
 def _plan(part: str) -> None:
     scenario, airframe = _world()
     call_kernels(part, scenario, airframe.limits)
@@ -86,6 +113,9 @@ def _glide() -> None:
 
 
 UNITS: dict[str, Callable[[], None]] = {
+    "problem": _make_problem,
+    "tracking": _track,
+    "ranks": _rank,
     **{part: functools.partial(_plan, part) for part in PARTS},
     "flight": _fly,
     "glides": _glide,

@@ -3,29 +3,34 @@
 Those that they call themselves are compiled with them.  `tests/planfly/kernel_units` holds this to what is called.
 """
 
-_WORLD = (
+_FIELD = (
     "world.least_squares._least_squares",
     "world.frames._polymap_many",
     "world.terrain._heights_many",
-    "flight.autopilots.arduplane.tracking_error._fill",
 )
-_PROBLEM = (
-    *_WORLD,
+_TRACKING = ("flight.autopilots.arduplane.tracking_error._fill",)
+_WORLD = (*_FIELD, *_TRACKING)
+_RANKS = ("planner.optimisers.preference._rank_rows",)
+_ARRAYS = (
     "world.terrain.steepest_slopes",
     "planner.airspace.zone_limits._reduce_margins",
     "planner.evaluation.threat_index._fill_cells",
     "planner.evaluation.threat_index._lists",
 )
+_PROBLEM = (*_WORLD, *_ARRAYS)
 _CERTIFY = "planner.evaluation.certify_kernels."
 _SIDES = "planner.seeding.side_routes."
 _LAYOUT = "logs.recording.mcap_writer."
 _GLIDES = "logs.verdict.returns."
 
 UNIT_KERNELS: dict[str, tuple[str, ...]] = {
+    "problem": (*_FIELD, *_ARRAYS),
+    "tracking": _TRACKING,
+    "ranks": _RANKS,
     "scores": (
         *_PROBLEM,
         "planner.evaluation.graded_scores._score_paths",
-        "planner.optimisers.preference._rank_rows",
+        *_RANKS,
         "planner.seeding.pattern_search._search",
     ),
     "certificates": (
@@ -52,6 +57,9 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "planner.seeding.grids.continue_route",
         "planner.seeding.grids.end_route",
         "planner.seeding.waypoint_fitting._choose",
+    ),
+    "sides": (
+        *_PROBLEM,
         "planner.seeding.grids.find_obstacles",
         _SIDES + "cheapest_passings",
         _SIDES + "grid_costs",
@@ -98,12 +106,13 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     ),
 }
 
-# What a default plan, a flight and its report's glides call, the longest first: whoever shares units out begins with
-# those.
-PLANNING = ("scores", "shortening", "routes", "certificates", "paper")
-FLYING = ("flight",)
+# What a default plan, a flight and its report's glides call.  First what the others call too, so that two processes do
+# not compile it at once; the first of it takes as long as the other two.  Then the longest first.
+_SHARED = ("problem", "tracking", "ranks")
+PLANNING = (*_SHARED, "scores", "shortening", "routes", "certificates", "paper", "sides")
+FLYING = ("tracking", "flight")
 GLIDING = ("glides",)
-BOTH = ("scores", "flight", "shortening", "routes", "certificates", "paper")
+BOTH = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "paper", "sides")
 
 
 def kernels_of(units: tuple[str, ...]) -> frozenset[str]:

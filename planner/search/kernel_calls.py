@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
-from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_frame, rotated_vectors
+from planner.evaluation.encoding import ENCODINGS, Encoding, RotatedFrame, rotated_frame, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import Problem, make_problem
@@ -21,7 +21,7 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-PARTS = ("scores", "certificates", "shortening", "routes", "paper")
+PARTS = ("scores", "certificates", "shortening", "routes", "sides", "paper")
 WAYPOINTS = 8
 STAGES, MAX_ROUTES, FEW = 12, 2, 4
 # Offset of the path's middle to the side and upwards, m.
@@ -67,18 +67,26 @@ def _shorten(task: _Task) -> None:
 
 
 def _route(task: _Task) -> None:
-    data, space, lower, upper = task.problem.search, task.problem.space, task.encoding.lower, task.encoding.upper
-    frame = rotated_frame(space.start, space.destination)
-    span = (float(lower[1::3].min()), float(upper[1::3].max()))
+    data, (frame, span) = task.problem.search, _across(task)
     found = grid_route(data, frame, make_grid(data, frame, span, STAGES))
     for route in [found] if isinstance(found, GridRoute) else []:
         fit_waypoints(data, frame, route.points, WAYPOINTS)
+
+
+def _pass_sides(task: _Task) -> None:
+    data, (frame, span) = task.problem.search, _across(task)
     grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
     side_routes(data, frame, grid, 2.0 * frame.length, MAX_ROUTES)
+
+
+def _across(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
+    """The frame of the direct line, and how far to its sides waypoints may lie, m."""
+    space, lower, upper = task.problem.space, task.encoding.lower, task.encoding.upper
+    return rotated_frame(space.start, space.destination), (float(lower[1::3].min()), float(upper[1::3].max()))
 
 
 def _score_as_the_paper(task: _Task) -> None:
     paper_scores(task.problem.certified, task.path[None])
 
 
-_CALLS = dict(zip(PARTS, (_score, _certify, _shorten, _route, _score_as_the_paper), strict=True))
+_CALLS = dict(zip(PARTS, (_score, _certify, _shorten, _route, _pass_sides, _score_as_the_paper), strict=True))

@@ -8,4 +8,4 @@ from planner.search.kernel_calls import PARTS
 def test_planning_and_flying_call_all_units() -> None:
     assert set(BOTH) == {*PLANNING, *FLYING}
     assert {*BOTH, *GLIDING} == set(UNIT_KERNELS) == set(UNITS)
-    assert set(PLANNING) == set(PARTS)
+    assert {*PLANNING, "flight"} == set(BOTH) == {"problem", "tracking", "ranks", "flight", *PARTS}
