@@ -5,6 +5,10 @@ Technological University 2005) in 20 variables, each moved and turned by a seed 
 method.  Three seeds take four minutes of CPU.  Each result is kept in ``--kept FILE`` as it comes, and not computed
 again; a line of progress for each function goes to the standard error.
 
+``python -m benchmarks.black_box [--seeds N] bbob``: the same for the 24 functions of BBOB in 20 variables, as the
+package coco-experiment computes them (Hansen and others, "COCO: a platform for comparing continuous optimizers in a
+black-box setting", Optimization Methods and Software 36, 2021); each seed is an instance of its own.
+
 ``python -m benchmarks.black_box paths TERRAIN [--seeds N]``: the cost of Phung and Ha, "Safety-enhanced UAV path
 planning with spherical vector-based particle swarm optimization", Applied Soft Computing 107, 2021, on the scenario
 that their program SPSO comes with.  TERRAIN is its elevation file, ChrismasTerrain.tif, which is public with that
@@ -33,6 +37,14 @@ Floats = NDArray[np.float64]
 Cost = Callable[[Floats], Floats]
 
 VARIABLES, EVALUATIONS = 20, 100_000
+# Functions of BBOB, by number.
+BBOB = {
+    1: "sphere", 2: "ellipsoid", 3: "Rastrigin", 4: "Büche-Rastrigin", 5: "linear slope", 6: "attractive sector",
+    7: "step ellipsoid", 8: "Rosenbrock", 9: "Rosenbrock, turned", 10: "ellipsoid, turned", 11: "discus",
+    12: "bent cigar", 13: "sharp ridge", 14: "different powers", 15: "Rastrigin, turned", 16: "Weierstrass",
+    17: "Schaffers F7", 18: "Schaffers F7, ill-conditioned", 19: "Griewank-Rosenbrock", 20: "Schwefel",
+    21: "Gallagher, 101 peaks", 22: "Gallagher, 21 peaks", 23: "Katsuura", 24: "Lunacek, two funnels",
+}  # fmt: skip
 # Of each method on a function.
 ON_FUNCTIONS = 50_000
 KEPT = Path("runs") / "black-box-functions.json"
@@ -193,6 +205,18 @@ def functions(seed: int) -> dict[str, Cost]:
     }
 
 
+def bbob_functions(seed: int) -> dict[str, Cost]:
+    """Errors of points (n, d) in [-5, 5] on the functions of BBOB, in the instance that a seed numbers."""
+    from cocoex import BareProblem
+
+    def cost(number: int) -> Cost:
+        problem = BareProblem("bbob", number, VARIABLES, seed)
+        least = float(problem.best_value())
+        return lambda points: np.array([problem(point) for point in points]) - least
+
+    return {f"{number} {name}": cost(number) for number, name in BBOB.items()}
+
+
 def by_model(model: Model, cost: Cost, seed: int) -> float:
     """Least value by `planfly.optimise`."""
     search = planfly.optimise([-5.0] * VARIABLES, [5.0] * VARIABLES, model=model, seed=seed)
@@ -236,26 +260,26 @@ def by_pymoo(name: str, cost: Cost, seed: int) -> float:
     return float(found.F[0])
 
 
-def measure_functions(seeds: int, kept: Path) -> None:
-    """Print the median error of every method on every function, with what is kept of earlier runs."""
+def measure_functions(made: Callable[[int], dict[str, Cost]], seeds: int, kept: Path) -> None:
+    """Print the median error of every method on every function of a seed, with what is kept of earlier runs."""
     methods: dict[str, Callable[[Cost, int], float]] = {model: partial(by_model, model) for model in MODELS}
     methods |= {"cmaes": by_cmaes} | {f"pymoo {name}": partial(by_pymoo, name) for name in ("DE", "GA", "PSO")}
     kept.parent.mkdir(exist_ok=True)
     known: dict[str, float] = json.loads(kept.read_text(encoding="utf-8")) if kept.exists() else {}
     print(f"functions in {VARIABLES} variables: median error after {ON_FUNCTIONS:,} evaluations, {seeds} seeds")
-    print(f"{'':12s}" + "".join(f"{name:>13s}" for name in methods), flush=True)
-    for function in functions(FIRST_SEED):
+    print(f"{'':32s}" + "".join(f"{name:>13s}" for name in methods), flush=True)
+    for function in made(FIRST_SEED):
         row, began = [], time.process_time()
         for name, method in methods.items():
             values = []
             for seed in range(FIRST_SEED, FIRST_SEED + seeds):
                 key = f"{function}, {name}, {ON_FUNCTIONS}, {seed}"
                 if key not in known:
-                    known[key] = method(functions(seed)[function], seed)
+                    known[key] = method(made(seed)[function], seed)
                     kept.write_text(json.dumps(known, indent=1) + "\n", encoding="utf-8")
                 values.append(known[key])
             row.append(float(np.median(values)))
-        print(f"{function:12s}" + "".join(f"{value:13.2g}" for value in row), flush=True)
+        print(f"{function:32s}" + "".join(f"{value:13.2g}" for value in row), flush=True)
         print(f"  {function}: {time.process_time() - began:.0f} s of CPU", file=sys.stderr, flush=True)
 
 
@@ -264,13 +288,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.black_box")
     parser.add_argument("--seeds", type=int, default=10)
     parts = parser.add_subparsers(dest="part", required=True)
-    parts.add_parser("functions").add_argument("--kept", type=Path, default=KEPT, help="file that keeps the results")
+    for name in ("functions", "bbob"):
+        parts.add_parser(name).add_argument("--kept", type=Path, default=KEPT, help="file that keeps the results")
     parts.add_parser("paths").add_argument("terrain", type=Path)
     args = parser.parse_args()
     if args.part == "paths":
         measure_paths(args.terrain, args.seeds)
     else:
-        measure_functions(args.seeds, args.kept)
+        measure_functions(bbob_functions if args.part == "bbob" else functions, args.seeds, args.kept)
 
 
 if __name__ == "__main__":
