@@ -21,11 +21,11 @@ class ElevationFormat(NamedTuple):
     opener: str
 
 
-# All that are read: by what a file begins with, else by its suffix.
+# All that are read: by what a file begins with (four bytes, for two may be a height), else by its suffix.
 FORMATS = (
     ElevationFormat("a GeoTIFF", ".tif", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), "open_geotiff"),
     ElevationFormat("an SRTM .hgt", ".hgt", (), "open_hgt"),
-    ElevationFormat("an .npz with `elevation`", ".npz", (b"PK",), "open_npz"),
+    ElevationFormat("an .npz with `elevation`", ".npz", (b"PK\x03\x04",), "open_npz"),
 )
 SUFFIXES = tuple(known.suffix for known in FORMATS)
 # A list of such files, of which only their names are read (`world.elevation_tiles`).

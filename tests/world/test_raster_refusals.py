@@ -27,6 +27,7 @@ from tests.world.made.elevation_files import (
     write_npz,
     write_raster,
 )
+from world.elevation_formats import FORMATS
 from world.errors import TerrainError
 from world.frames import GeoOrigin
 from world.raster import open_raster
@@ -180,3 +181,8 @@ def test_hgt_void_is_missing_data(tmp_path: Path) -> None:
     posts[row, col] = -32768
     path.write_bytes(posts.tobytes())
     assert_refused(path, "no data at east")
+
+
+def test_no_format_is_known_by_fewer_than_four_bytes() -> None:
+    """A file of another kind begins with a height, which may be any two bytes."""
+    assert all(len(mark) >= 4 for known in FORMATS for mark in known.begins)
