@@ -36,7 +36,8 @@ from world.scenario import Scenario, from_spec, load_scenario
 
 Floats = NDArray[np.float64]
 
-BINARY = Path(os.environ.get("PLANFLY_ARDUPLANE", Path(__file__).parents[2] / "shared" / "autopilot" / "arduplane"))
+# The program of a real ArduPlane; without the variable, one of the working folder.
+BINARY = Path(os.environ.get("PLANFLY_ARDUPLANE", "arduplane"))
 # Corners that count: they turn by this much at least (rad), onto a leg of this length at least (m).
 MIN_TURN, MIN_LEG = math.radians(10.0), 250.0
 # Of the leg after a corner, how much of it is looked at: the next corner begins on the rest.

@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 PROBLEMS = (7, 15, 30, 60)
 # Grids that seed a peer: stages of each, and routes from each.
 GRIDS, ROUTES = (36, 66, 130), 2
-BEST_KNOWN = Path(__file__).parents[0] / "authorities" / "best_known.json"
+BEST_KNOWN = Path(__file__).parents[1] / "tests" / "authorities" / "best_known.json"
 
 
 @dataclass(frozen=True, slots=True)

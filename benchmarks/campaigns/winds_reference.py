@@ -39,7 +39,7 @@ from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.statistics.decision import Estimator, Goal, Tally
 from planfly.campaigns.worker_pool import FlightRequest, FlyOne, Workers, worker_pool
 
-REFERENCE = Path(__file__).parents[1] / "authorities" / "winds_reference.json"
+REFERENCE = Path(__file__).parents[2] / "tests" / "authorities" / "winds_reference.json"
 GOAL = WindsGoal(0.99, 0.95, 16, 20.0, 5000)
 WITHIN = 0.5
 # Laws of the reference: they begin to fail 1 - P there, m/s, and grow so steeply, 1/(m/s).
