@@ -2,11 +2,10 @@
 
 ``python -m benchmarks.against_arduplane [--plans N] [--from SEED] [--steep] [--json FILE] [--keep FILE]`` plans
 across the ridges near Jacksboro (random ends, winds of 0 to 10 m/s from anywhere, light or moderate turbulence),
-flies each plan with the law and with the program that PLANFLY_ARDUPLANE names (default:
-``../shared/autopilot/arduplane`` beside the checkout), and prints, for all corners that turn enough, how far each
-overshoots, and how much ground clearance each keeps.  --steep plans for climbs that take all the throttle there is;
-plans otherwise leave gusts a share of it.  --keep writes what the program flew, with its missions, as
-`tests.authorities` keeps it.
+flies each plan with the law and with the program that PLANFLY_ARDUPLANE names (default: ``arduplane`` in the working
+folder), and prints, for all corners that turn enough, how far each overshoots, and how much ground clearance each
+keeps.  --steep plans for climbs that take all the throttle there is; plans otherwise leave gusts a share of it.
+--keep writes what the program flew, with its missions, as `tests.authorities` keeps it.
 """
 
 import argparse

@@ -19,7 +19,7 @@ def test_what_a_benchmark_reads_is_there(module: str, name: str) -> None:
 
 
 def test_the_best_known_path_of_a_hard_problem_is_read() -> None:
-    """1.0100, by CMA-ES, OMPL or SLSQP, whichever was the shortest (tests/authorities/best_known.json)."""
+    """1.0099: the shortest of what CMA-ES, OMPL, SLSQP and the planner found (tests/authorities/best_known.json)."""
     from benchmarks.task import best_known
 
     assert 1.0 < best_known("hard-07") < 1.02

@@ -156,7 +156,7 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
         placed["sideslip_max"] = math.radians(3.0)
     else:
         placed["yaw_rate_gain"] = placed["sideslip_gain"] = placed["side_gain"] = 0.0
-    placed["slow_margin"] = 0.12 * aircraft.airspeed
+    placed["slow_margin"] = 0.16 * aircraft.airspeed
     placed["arc_slowing_max"] = 0.08 * aircraft.airspeed
     return Gains(**placed)
 

@@ -293,7 +293,7 @@ def steer_height(
 def _push_ceiling(
     gains: Record, memory: Record, airspeed: float, climb_rate: float, rate_gain: float, dt: float
 ) -> float:  # pragma: no cover - compiled
-    """Most acceleration upwards that the energy allows, m/s^2; infinite while it is not slow and has more to give.
+    """Most acceleration upwards that the energy allows, m/s^2; infinite while the aircraft has more to give.
 
     What the aircraft gains now is what it can climb at a steady airspeed.
     """
@@ -305,10 +305,9 @@ def _push_ceiling(
     memory.last_airspeed = airspeed
     memory.energy_rate += (energy_rate - memory.energy_rate) * dt / _ENERGY_LAG
     memory.airspeed += (airspeed - memory.airspeed) * dt / _AIRSPEED_LAG
-    # A gust that takes the airspeed is not waited for: in moderate turbulence it leads into the stall within a second.
-    excess = min(airspeed, memory.airspeed) - (memory.speed_command - gains.slow_margin)
-    if memory.full_throttle <= _ALL_IT_HAS and excess >= 0.0:
+    if memory.full_throttle <= _ALL_IT_HAS:
         return math.inf
+    excess = memory.airspeed - (memory.speed_command - gains.slow_margin)
     ceiling: float = rate_gain * (memory.energy_rate + excess * airspeed / (GRAVITY * 3.0) - climb_rate)
     return ceiling
 
