@@ -69,13 +69,17 @@ MISSION = """QGC WPL 110
 """
 
 
+def _field() -> Scenario:
+    return from_spec(tomllib.loads(FIELD), "field")
+
+
 def _world() -> tuple[Scenario, Airframe]:
-    scenario = from_spec(tomllib.loads(FIELD), "field")
+    scenario = _field()
     return scenario, load_airframe(scenario)
 
 
 def _make_problem() -> None:
-    scenario = from_spec(tomllib.loads(FIELD), "field")
+    scenario = _field()
     aircraft, _ = find_airframe(scenario)
     limits = make_limits(
         scenario, load_envelope(aircraft), aircraft.airspeed, math.radians(scenario.flight.max_bank_deg)
