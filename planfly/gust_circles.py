@@ -87,6 +87,25 @@ def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     return expected
 
 
+def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
+    """How many waypoints, both ends among them, other plans beside a safe one may have: as many as level flight allows.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from planner.search.plan_path import plan_path
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> airframe = load_airframe(scenario)
+    >>> waypoints_in_gusts(plan_path(scenario, airframe.limits, seed=1), airframe)
+    22
+    """
+    scenario, count = plan.scenario, len(plan.waypoints)
+    climb, sink = airframe.limits.rates(float(plan.waypoints[:, 2].max()))
+    chance = airframe.autopilot.off_height_chance(climb, sink, scenario.wind.turbulence)
+    if chance == 0.0:
+        return count
+    return max(count, min(scenario.planner.waypoints, 2 + int(MOST_CIRCLES / chance)))
+
+
 def _what_is_wrong(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
     """Why a plan is not safe in its turbulence, and what would help, in one line."""
     count, name = len(plan.waypoints) - 2, autopilot.height_parameter

@@ -37,6 +37,8 @@ from planfly.reference_flights import judge_with_reference_flights
 from planfly.returns_beside import ReturnsBeside, returns_beside
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
+from planner.search.replan import replan
+from planner.search.search_state import StopCondition
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
 
@@ -135,22 +137,61 @@ def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
 
 
 def make_plan(
-    scenario: Scenario, airframe: Airframe, seed: int, algorithm: str | None = None, advance: Advance | None = None
+    scenario: Scenario,
+    airframe: Airframe,
+    seed: int,
+    algorithm: str | None = None,
+    advance: Advance | None = None,
+    *,
+    stop: StopCondition | None = None,
+    flown: tuple[Plan, int] | None = None,
+    onward: bool = False,
 ) -> Plan:
     """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
 
-    Where the autopilot circles at the mission's end, the certificate names what that may come too near to; where gusts
-    make it circle before that, the plan has as few waypoints as it can do with (`planfly.gust_circles`).
+    All commands plan by this, so that what one calls safe no other calls unsafe. Where gusts make the autopilot circle
+    at waypoints, the plan has as few of them as it can do with (`planfly.gust_circles`); the ways from and to the
+    ground are laid; and where the autopilot circles at the mission's end, the certificate names what that may come too
+    near to.
+
+    stop: as of `planner.search.plan_path.plan_path`.
+    flown: the plan that is being flown, and the leg to plan again from; None for a new plan.
+    onward: whether the mission that it becomes a part of goes on from its destination.
     """
+    limits = airframe.limits.surely()
+
+    def settle(plan: Plan, search: Callable[[Scenario], Plan]) -> Plan:
+        return settle_in_gusts(plan, airframe, search)
+
+    if flown is not None:
+        old, leg = flown
+        again = replan(
+            scenario, limits, old, leg, seed=seed, algorithm=algorithm, progress=advance, stop=stop, settle=settle
+        )
+        return _completed(again, airframe, old, onward=onward)
 
     def search(world: Scenario) -> Plan:
-        return plan_path(world, airframe.limits.surely(), seed=seed, algorithm=algorithm, progress=advance)
+        return plan_path(world, limits, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
-    plan = laid_from_the_ground(settle_in_gusts(search(scenario), airframe, search), airframe)
-    if not airframe.autopilot.loiter_rules.ends_in_circle:
+    return _completed(settle(search(scenario), search), airframe, onward=onward)
+
+
+def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
+    """A path that was found, with all that `make_plan` does after its search; nothing else is searched for."""
+    return _completed(settle_in_gusts(plan, airframe), airframe, onward=onward)
+
+
+def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
+    """The plan with its ways from and to the ground, and with what the circles at its end may come too near to.
+
+    old: the plan that is being flown.
+    """
+    plan = laid_from_the_ground(plan, airframe, old)
+    if onward or not airframe.autopilot.loiter_rules.ends_in_circle:
         return plan
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-    beside = beside_end(route_requirements(make_setup(scenario, airframe, mission, seed, plan=plan)))
+    setup = make_setup(plan.scenario, airframe, mission, plan.seed, plan=plan)
+    beside = beside_end(route_requirements(setup))
     if beside is None or not beside[1]:
         return plan
     circles = f"{airframe.autopilot.title} circles about the destination, up to {beside[0]:.0f} m from it"

@@ -9,16 +9,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from planfly.airframe import choose_seed, laid_from_the_ground, load_airframe
+from planfly.airframe import choose_seed, load_airframe
 from planfly.api.planning import Wind, changed_scenario, opened_scenario, stop_condition
 from planfly.arguments import RANGES, check_arguments
+from planfly.choice_of_ways import make_front
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.stages import stage
 from planfly.targets import RUN_FOLDER, clean_folder, filled_pattern
 from planner.plan import plan_json
 from planner.search.plan_front import Front, FrontPlan
-from planner.search.plan_front import plan_front as find_front
 from world.files import write_whole
 from world.scenario import Scenario
 from world.scenario_tables import Guidance, Navigation
@@ -83,15 +83,7 @@ def plan_front(
     if out is not None:
         folder = clean_folder(filled_pattern(out, world.name, number), FRONT_FILES, overwrite=overwrite)
     with stage(f"planning a front of {world.name}", "planning a front") as advance:
-        found = find_front(
-            world,
-            airframe.limits.surely(),
-            count,
-            seed=number,
-            progress=advance,
-            stop=stop_condition(seconds, stop),
-            finish=lambda plan: laid_from_the_ground(plan, airframe),
-        )
+        found = make_front(world, airframe, number, count, advance, stop=stop_condition(seconds, stop))
     if folder is not None:
         _write(found, world, folder)
     return found

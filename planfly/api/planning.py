@@ -8,17 +8,15 @@ from pathlib import Path
 
 from flight.autopilots.catalog import load_autopilot, program_autopilot
 from logs.verdict.conditions import Conditions, conditions_of
-from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, laid_from_the_ground, load_airframe
+from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, load_airframe
 from planfly.arguments import check_arguments, is_wind
 from planfly.first_start import with_warm_up
-from planfly.gust_circles import settle_in_gusts
 from planfly.kernel_units.unit_kernels import PLANNING
+from planfly.pipeline import make_plan
 from planfly.stages import stage
 from planfly.targets import file_target
 from planner.plan import Plan, plan_json, read_plan
 from planner.search.explain_failure import explain_failure
-from planner.search.plan_path import plan_path
-from planner.search.replan import replan as replan_path
 from planner.search.replan import same_mission
 from planner.search.search_state import StopCondition
 from world.errors import ArgumentError, ScenarioError
@@ -286,18 +284,8 @@ def _planned(
         read = None if isinstance(source, Scenario) else Path(source)
         target = file_target(out, world.name, number, overwrite=overwrite, source=read)
     airframe, ends = load_airframe(world), stop_condition(seconds, stop)
-    limits = airframe.limits.surely()
     with stage(f"planning {world.name}", "planning") as advance:
-
-        def search(asked: Scenario) -> Plan:
-            return plan_path(asked, limits, seed=number, algorithm=algorithm, progress=advance, stop=ends)
-
-        if flown is None:
-            made = settle_in_gusts(search(world), airframe, search)
-        else:
-            old, leg = flown
-            made = replan_path(world, limits, old, leg, seed=number, algorithm=algorithm, progress=advance, stop=ends)
-    made = laid_from_the_ground(made, airframe, None if flown is None else flown[0])
+        made = make_plan(world, airframe, number, algorithm, advance, stop=ends, flown=flown)
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, plan_json(made))

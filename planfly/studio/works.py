@@ -17,17 +17,15 @@ from flight.mission.items import Mission
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.views.failures import track_distance
-from planfly.airframe import Airframe, laid_from_the_ground
-from planfly.gust_circles import settle_in_gusts
-from planfly.pipeline import fly_and_judge
+from planfly.airframe import Airframe
+from planfly.choice_of_ways import make_front
+from planfly.pipeline import fly_and_judge, make_plan
 from planfly.studio.changes import flight_figures
 from planfly.studio.desk import Desk
 from planfly.studio.pilot import Advance
 from planfly.studio.sheet import findings_json, rounded, states_json, verdict_json
 from planfly.studio.states import place_states
-from planner.plan import Plan
-from planner.search.plan_front import FrontPlan, plan_front
-from planner.search.plan_path import plan_path
+from planner.search.plan_front import FrontPlan
 from world.scenario import Scenario, from_spec
 
 Floats = NDArray[np.float64]
@@ -95,19 +93,13 @@ def plan(asked: PlanAsked, advance: Advance) -> list[FrontPlan]:
     """A path, or several to choose from, the shortest first; where none is safe the one that comes nearest to it."""
     scenario = asked.scenario if asked.ends is None else between(asked.scenario, *asked.ends)
     seconds = SECONDS if asked.ways == 1 else SECONDS_FOR_SEVERAL
-    limits, stop = asked.airframe.limits.surely(), partial(_ended, time.monotonic() + seconds)
-
-    def finish(made: Plan) -> Plan:
-        return laid_from_the_ground(made, asked.airframe) if asked.ends is None else made
-
+    airframe, seed, stop = asked.airframe, asked.seed, partial(_ended, time.monotonic() + seconds)
+    # Between two items of a mission it goes on to what follows the second.
+    onward = asked.ends is not None
     if asked.ways > 1:
-        front = plan_front(scenario, limits, asked.ways, seed=asked.seed, progress=advance, stop=stop, finish=finish)
+        front = make_front(scenario, airframe, seed, asked.ways, advance, stop=stop, onward=onward)
         return list(front.plans) or [front.default]
-
-    def search(asked_for: Scenario) -> Plan:
-        return plan_path(asked_for, limits, seed=asked.seed, algorithm=asked.algorithm, progress=advance, stop=stop)
-
-    made = finish(settle_in_gusts(search(scenario), asked.airframe, search))
+    made = make_plan(scenario, airframe, seed, asked.algorithm, advance, stop=stop, onward=onward)
     # Beside no other nothing is to compare: what takes longer to work out is not known.
     length = float(np.linalg.norm(np.diff(made.waypoints, axis=0), axis=1).sum())
     clearance = float(made.certificate.clearance) + scenario.limits.min_clearance_m

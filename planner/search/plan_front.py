@@ -29,6 +29,7 @@ from planner.optimisers.hypervolume import covering_order
 from planner.plan import Objective, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.plan_path import plan_path
+from planner.search.replan import with_waypoints
 from planner.search.search_state import SearchProgress, StopCondition
 from planner.seeding.first_samples import bridge_modes
 from planner.seeding.shortening import resample, shorten_path
@@ -103,12 +104,16 @@ def plan_front(
     seed: int,
     progress: SearchProgress | None = None,
     stop: StopCondition | None = None,
+    default: Plan | None = None,
+    waypoints: int | None = None,
     finish: Callable[[Plan], Plan] = lambda plan: plan,
     generations: int = GENERATIONS,
 ) -> Front:
     """Up to `count` plans of a front; none where the default planner finds no safe plan.
 
     The fourth objective is energy; time where the scenario asks for time or the aircraft's power is unknown.
+    default: the plan to begin from, complete; None to plan it here, and to finish it as the others.
+    waypoints: of the others while they are searched for, both ends among them; None for as many as it has.
     finish: completes a plan, as with ways from the ground; only plans that are safe after it are taken.
     The same scenario, limits, count and seed give the same front.
 
@@ -120,15 +125,20 @@ def plan_front(
     (4, True)
     """
     task = front_task(scenario, limits)
-    default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
-    task = fitted_task(task, default.waypoints)
+    if default is None:
+        default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
+    path = with_waypoints(default.waypoints, waypoints or 0)
+    task = fitted_task(task, path)
     first = _valued(task, default)
     reference = reference_point(task, first)
     if not default.safe:
         return Front((), task.fourth, first, reference, 0)
+    if len(path) == 2:
+        # Nothing lies between its ends that could be moved.
+        return Front((first,), task.fourth, first, reference, 0)
     size = max(ARCHIVE, KEPT * count)
-    search = make_sampling(task, len(default.waypoints), reference, size, stream(seed, PLANNER))
-    evaluations = _search(task, search, default.waypoints, progress, stop, generations)
+    search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
+    evaluations = _search(task, search, path, progress, stop, generations)
     plans = _certified(task, search, count, replace(default, evaluations=evaluations), finish)
     # The default plan is among those that the search began from: it is wanted once, where nothing is better.
     kept = _undominated([*plans, first], task.fourth)[:count]

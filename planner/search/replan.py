@@ -1,6 +1,7 @@
 """Replanning in flight: flown legs stay, and the rest is planned again around newly known threats."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,9 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
+# Completes a plan, with a search that plans a changed scenario as the plan was planned.
+Settle = Callable[[Plan, Callable[[Scenario], Plan]], Plan]
+
 # Minimum number of waypoints of the path ahead: with fewer it cannot avoid anything.
 MIN_WAYPOINTS = 8
 
@@ -34,12 +38,15 @@ def replan(
     algorithm: str | None = None,
     progress: SearchProgress | None = None,
     stop: StopCondition | None = None,
+    settle: Settle | None = None,
 ) -> Plan:
     """Plan again from the waypoint at which leg `leg` of an old plan begins; the legs before it are flown and stay.
 
     scenario: with the threats known now (`world.scenario.with_threats`). The turn at that waypoint is measured from the
     course of the last flown leg. The search starts from the rest of the old plan, in addition to its grid routes. The
     certificate is of the path ahead; violations and objectives are of the whole path in this scenario.
+
+    settle: completes the path ahead in a scenario that begins where it does, before the flown legs come before it.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -65,7 +72,15 @@ def replan(
     course = scenario.start_course if leg == 0 else float(leg_courses(old.waypoints)[leg - 1])
     table = scenario.planner.model_copy(update={"waypoints": len(rest)})
     ahead = replace(scenario, start=rest[0], start_course=course, planner=table)
-    made = plan_path(ahead, limits, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=rest)
+
+    def search(asked: Scenario) -> Plan:
+        # One of other waypoints than the old plan's does not start from it.
+        previous = rest if asked.planner.waypoints == len(rest) else None
+        return plan_path(asked, limits, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=previous)
+
+    made = search(ahead)
+    if settle is not None:
+        made = settle(made, search)
     waypoints = np.concatenate([old.waypoints[:leg], made.waypoints])
     within = limits_for(find_algorithm(made.algorithm, scenario.name), limits)
     counts, objectives = paper_scores(make_problem(scenario, within).certified, waypoints[None])

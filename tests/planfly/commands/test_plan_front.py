@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from planfly.api import fronts
+from planfly import choice_of_ways
 from planfly.cli import main
 from planner.plan import read_plan
 from tests.soak import SOAK
@@ -17,7 +17,7 @@ def test_a_front_is_a_folder_of_plans_with_their_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     if not SOAK:
-        monkeypatch.setattr(fronts, "find_front", partial(fronts.find_front, generations=20))
+        monkeypatch.setattr(choice_of_ways, "plan_front", partial(choice_of_ways.plan_front, generations=20))
     folder, answer = tmp_path / "front", tmp_path / "answer.json"
     assert main(["plan", "tight", "--front", "3", "--seed", "2", "--out", str(folder), "--json", str(answer)]) == 0
     text = capsys.readouterr().out

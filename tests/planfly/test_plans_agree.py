@@ -1,0 +1,129 @@
+"""Whoever plans, a plan is called safe by the same things: circles in gusts, and those at the destination."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import planfly
+from planfly import choice_of_ways
+from planfly.airframe import load_airframe
+from planfly.gust_circles import MOST_CIRCLES, expected_circles, waypoints_in_gusts
+from planfly.pipeline import make_plan
+from planfly.studio import works
+from planner.plan import Plan
+from tests.planfly.test_gust_circles import SEED, scenario_of
+from world.scenario import Scenario
+
+# Beside the destination at 8,000 m: the way to it stays 150 m outside, and a circle of PX4's about it does not.
+BESIDE_THE_END: dict[str, Any] = {
+    "threats": [
+        {"name": "sam", "east_m": 8300.0, "north_m": 0.0, "amsl_m": 100.0, "kill_radius_m": 150.0, "kill_scale_m": 50.0}
+    ]
+}
+
+
+def planned(scenario: Scenario) -> Plan:
+    return planfly.plan(scenario, seed=SEED)
+
+
+def planned_again(scenario: Scenario) -> Plan:
+    """Again from the third leg on; the first two were planned for planfly's own law in still air."""
+    calm = scenario_of("none", "ideal", threats=scenario.to_json().get("threats", []))
+    return planfly.replan(scenario, planned(calm), 2, seed=SEED)
+
+
+def first_of_a_front(scenario: Scenario) -> Plan:
+    front = planfly.plan_front(scenario, 2, seed=SEED, seconds=0.1)
+    return front.plans[0].plan if front.plans else front.default.plan
+
+
+def planned_in_the_studio(scenario: Scenario, ways: int = 1, ends: Any = None) -> Plan:
+    asked = works.PlanAsked(scenario, load_airframe(scenario), SEED, ways=ways, ends=ends)
+    return works.plan(asked, lambda done, total, remark: None)[0].plan
+
+
+def first_way_of_the_studio(scenario: Scenario) -> Plan:
+    return planned_in_the_studio(scenario, 2)
+
+
+WAYS: list[Callable[[Scenario], Plan]] = [
+    *(planned, planned_again, first_of_a_front, planned_in_the_studio, first_way_of_the_studio)
+]
+NAMES = ["plan", "again", "front", "studio", "ways of the studio"]
+
+
+@pytest.mark.parametrize("way", WAYS, ids=NAMES)
+def test_what_circles_about_the_destination_reach_is_in_every_certificate(way: Callable[[Scenario], Plan]) -> None:
+    (problem,) = way(scenario_of("none", **BESIDE_THE_END)).certificate.problems
+    assert "PX4 circles about the destination" in problem
+    assert "the missile sam reaches it" in problem
+
+
+@pytest.mark.parametrize("ways", [1, 2])
+def test_where_the_mission_goes_on_nobody_circles(ways: int) -> None:
+    scenario = scenario_of("none", **BESIDE_THE_END)
+    ends = tuple(scenario.start.tolist()), tuple(scenario.destination.tolist())
+    assert planned_in_the_studio(scenario, ways, ends).safe
+
+
+@pytest.mark.parametrize("way", WAYS, ids=NAMES)
+def test_no_plan_has_more_waypoints_than_gusts_allow(way: Callable[[Scenario], Plan]) -> None:
+    scenario = scenario_of("moderate")
+    airframe, plan = load_airframe(scenario), way(scenario)
+    ahead = replace(plan, waypoints=plan.waypoints[plan.flown_legs :])
+    assert plan.safe
+    assert 0.0 < expected_circles(ahead, airframe.autopilot, airframe.limits) <= MOST_CIRCLES
+
+
+def test_all_give_the_same_plan() -> None:
+    scenario = scenario_of("moderate")
+    expected = make_plan(scenario, load_airframe(scenario), SEED).waypoints
+    for way in (planned, planned_in_the_studio):
+        np.testing.assert_array_equal(way(scenario).waypoints, expected)
+    front = planfly.plan_front(scenario, 2, seed=SEED)
+    np.testing.assert_array_equal(front.default.plan.waypoints, expected)
+
+
+def test_flown_legs_stay_as_they_were_and_later_waypoints_are_fewer() -> None:
+    old = planned(scenario_of("none"))
+    again = planfly.replan(scenario_of("moderate"), old, 2, seed=SEED)
+    assert again.safe
+    assert again.flown_legs == 2
+    np.testing.assert_array_equal(again.waypoints[:3], old.waypoints[:3])
+    assert len(again.waypoints) < len(old.waypoints) - 2
+
+
+@pytest.mark.parametrize("searched", [None, 12])
+def test_each_plan_of_a_front_is_safe_in_gusts(searched: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The shortest way is straight, and others lead around a radar: an X8 may expect one waypoint's circles, not two's.
+
+    Even if the others are searched for with as many waypoints as in still air, none of the front has them.
+    """
+    if searched is not None:
+        monkeypatch.setattr(choice_of_ways, "waypoints_in_gusts", lambda plan, airframe: searched)
+    radar = {"name": "radar", "east_m": 2000.0, "north_m": 500.0, "amsl_m": 0.0}
+    reach = {"detection_radius_m": 1500.0, "detection_scale_m": 800.0}
+    scenario = scenario_of("moderate", threats=[radar | reach], zones=[])
+    airframe = load_airframe(scenario)
+    front = planfly.plan_front(scenario, 5, seed=SEED)
+    assert len(front.default.plan.waypoints) == 2
+    assert len(front.plans) >= (3 if searched is None else 1)
+    for one in front.plans:
+        assert one.plan.safe
+        assert expected_circles(one.plan, airframe.autopilot, airframe.limits) <= MOST_CIRCLES
+
+
+def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
+    """With 12 m about their heights three, at 0.0083 each, for 0.03; where nobody circles, as many as the plan has."""
+    scenario = scenario_of("moderate")
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, SEED)
+    climb, sink = airframe.limits.rates(150.0)
+    wider = replace(airframe, autopilot=airframe.autopilot.with_parameters(NAV_FW_ALT_RAD=12.0))
+    assert wider.autopilot.off_height_chance(climb, sink, "moderate") == pytest.approx(0.0083, abs=0.0001)
+    assert waypoints_in_gusts(plan, wider) == 5
+    calm = scenario_of("none")
+    assert waypoints_in_gusts(replace(plan, scenario=calm), load_airframe(calm)) == len(plan.waypoints)
