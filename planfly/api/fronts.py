@@ -59,7 +59,9 @@ def plan_front(
 
     They are compared by length, exposure to radars, least height above ground, and energy; by time in place of energy
     where the scenario's ``[planner] objective`` is "time" or the aircraft's power is not known.  Each has its own
-    certificate and is safe.  There may be fewer than asked for; where no safe plan is found there is none.
+    certificate and is safe.  Each gains something that is noticed over those taken before it: more than 0.1 % in length
+    or energy, 1 % in exposure or 1 m in height.  There may be fewer such plans than asked for; where no safe plan is
+    found there is none.
 
     count: plans at most, 2 to 100.
     out: a folder for plan-1.json, plan-2.json, ..., the shortest first, their table as front.csv and front.json, and

@@ -95,6 +95,17 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
     )
 
 
+def fewer_line(front: "Front") -> str:
+    """Why a front has fewer plans than were asked for."""
+    from planner.search.plan_front import NOTICED, NOTICED_CLEARANCE, NOTICED_EXPOSURE
+
+    share, seen, height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
+    return (
+        f"{len(front.plans)} of the {front.asked} asked for: no other that was found gains more than {share} in length"
+        f" or {front.fourth}, {seen} in exposure or {height} in height"
+    )
+
+
 def front_lines(front: "Front", folder: Path) -> list[str]:
     """A front on the terminal: a line a plan, and what was written."""
     from logs.verdict.conditions import autopilot_line, condition_lines
@@ -106,9 +117,9 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
         reasons = [f"  failed  {problem}" for problem in default.certificate.problems]
         return ["no safe plan, so no front", *reasons, f"front     {folder}/ (front.csv, front.json)"]
     conditions = conditions_of_plan(default)
+    compared = f", none better than another in length, exposure, height above ground and {front.fourth} at once"
     lines = [
-        f"front of {len(front.plans)} safe plans, none better than another in length, exposure, height above ground "
-        f"and {front.fourth} at once",
+        "front of 1 safe plan" if len(front.plans) == 1 else f"front of {len(front.plans)} safe plans{compared}",
         *condition_lines(conditions),
         autopilot_line(conditions, flown=False),
         "  plan   length km  exposure s  above ground m  energy Wh   time s",
@@ -117,5 +128,7 @@ def front_lines(front: "Front", folder: Path) -> list[str]:
         energy = f"{one.energy / 3600.0:11.2f}" if math.isfinite(one.energy) else "          -"
         values = f"{one.length / 1e3:>12.3f}{one.exposure:>12.2f}{one.clearance:>16.1f}{energy}{one.time:>9.1f}"
         lines.append(f"  {number:>4}{values}")
+    if len(front.plans) < front.asked:
+        lines.append(f"  note    {fewer_line(front)}")
     names = f"plan-1.json ... plan-{len(front.plans)}.json" if len(front.plans) > 1 else "plan-1.json"
     return [*lines, f"front     {folder}/ ({names}, front.csv, front.json, {', '.join(PICTURES)})"]

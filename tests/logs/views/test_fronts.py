@@ -21,7 +21,7 @@ def front() -> Front:
     rows = [(9e3, 8.0, 60.0, 400.0, 3.6e5), (9.1e3, 7.0, 61.0, 401.0, 3.7e5), (9.2e3, 1.0, 60.0, 402.0, 3.8e5)]
     rows.append((9.3e3, 9.0, 99.0, 403.0, 3.9e5))
     plans = tuple(FrontPlan(replace(plan, waypoints=path + 10.0 * k), *row) for k, row in enumerate(rows))
-    return Front(plans, "energy", plans[0], np.array([2e4, 10.0, 0.0, 9e5]), 99)
+    return Front(plans, 4, "energy", plans[0], np.array([2e4, 10.0, 0.0, 9e5]), 99)
 
 
 def test_each_plan_stands_at_its_values_in_each_panel(front: Front) -> None:

@@ -19,11 +19,12 @@ def test_a_front_is_a_folder_of_plans_with_their_table(
     if not SOAK:
         monkeypatch.setattr(choice_of_ways, "plan_front", partial(choice_of_ways.plan_front, generations=20))
     folder, answer = tmp_path / "front", tmp_path / "answer.json"
-    assert main(["plan", "tight", "--front", "3", "--seed", "2", "--out", str(folder), "--json", str(answer)]) == 0
+    assert main(["plan", "hard-07", "--front", "3", "--seed", "2", "--out", str(folder), "--json", str(answer)]) == 0
     text = capsys.readouterr().out
     made = json.loads(answer.read_text(encoding="utf-8"))
     plans = [read_plan(Path(one["file"])) for one in made["plans"]]
-    assert 1 <= len(plans) <= 3
+    assert len(plans) == 3
+    assert "asked for" not in text
     assert all(plan.safe for plan in plans)
     names = {f"plan-{number}.json" for number in range(1, len(plans) + 1)}
     pictures = {"front-map.png", "front-values.png"}
@@ -38,6 +39,22 @@ def test_a_front_is_a_folder_of_plans_with_their_table(
             assert float(row[name]) == entry[name] == one[name]
         legs = plan.waypoints[1:] - plan.waypoints[:-1]
         assert float(row["length_m"]) == pytest.approx(((legs**2).sum(axis=1) ** 0.5).sum(), abs=0.06)
+
+
+def test_a_front_without_choices_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Level ground without radars, between ends at 75 m: all there is to choose is how short it is."""
+    if not SOAK:
+        monkeypatch.setattr(choice_of_ways, "plan_front", partial(choice_of_ways.plan_front, generations=20))
+    assert main(["plan", "tight", "--front", "10", "--seed", "1", "--out", str(tmp_path / "front")]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("front of 1 safe plan\n")
+    assert (
+        "  note    1 of the 10 asked for: no other that was found gains more than 0.1% in length or energy, 1% in "
+        "exposure or 1 m in height\n"
+    ) in text
+    assert [file.name for file in (tmp_path / "front").glob("plan-*")] == ["plan-1.json"]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.plan import Plan, plan_json
 from planner.search import plan_front as fronts
-from planner.search.plan_front import Front, fitted_task, front_task, plan_front
+from planner.search.plan_front import Front, fitted_task, front_task, noticed_amounts, plan_front
 from world.scenario import Scenario
 
 GENERATIONS = 4
@@ -39,6 +39,46 @@ def test_no_plan_is_better_than_another_in_everything(front: Front) -> None:
     # The envelope written by hand knows no power.
     assert front.fourth == "time"
     assert [one.length for one in front.plans] == sorted(one.length for one in front.plans)
+
+
+def test_each_plan_gains_something_that_is_noticed(front: Front, scenario: Scenario, limits: Limits) -> None:
+    """0.1 % of length and time, 1 % of exposure and 1 m: so much better than any other, one of two is in something."""
+    rows, default = front.objectives(), front.default
+    amounts = noticed_amounts(default, "time")
+    assert amounts.tolist() == [0.001 * default.length, 0.01 * default.exposure, 1.0, 0.001 * default.time]
+    assert default.exposure > 1.0
+    assert noticed_amounts(replace(default, exposure=0.5, energy=4e5), "energy").tolist()[1::2] == [0.01, 400.0]
+    for k, one in enumerate(rows):
+        for other in rows[:k]:
+            assert (np.abs(one - other) > amounts).any()
+    assert front.asked == 6
+
+
+def test_of_paths_that_hardly_differ_one_is_a_choice(
+    scenario: Scenario, limits: Limits, front: Front, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where half the length, a hundred times the exposure or 500 m go unnoticed, the shortest is all there is."""
+    for name, value in (("NOTICED", 0.5), ("NOTICED_EXPOSURE", 100.0), ("NOTICED_CLEARANCE", 500.0)):
+        monkeypatch.setattr(fronts, name, value)
+    found = plan_front(scenario, limits, 6, seed=3, generations=GENERATIONS)
+    assert [one.length for one in found.plans] == [min(one.length for one in front.plans)]
+    assert found.asked == 6
+
+
+def test_a_plan_that_its_certificate_makes_no_choice_gives_way_to_another(
+    scenario: Scenario, limits: Limits, front: Front
+) -> None:
+    """Plans that lose what they gain as they are finished are replaced by others that were found."""
+    best = max(one.clearance for one in front.plans)
+
+    def lower(plan: Plan) -> Plan:
+        certificate = plan.certificate
+        low = min(certificate.clearance, best - 30.0 - 20.0)
+        return replace(plan, certificate=replace(certificate, clearance=low))
+
+    found = plan_front(scenario, limits, 6, seed=3, generations=GENERATIONS, finish=lower)
+    assert len(found.plans) == 6
+    assert max(one.clearance for one in found.plans) == pytest.approx(best - 20.0)
 
 
 def test_the_front_offers_what_the_shortest_plan_does_not(front: Front) -> None:
