@@ -43,8 +43,13 @@ def settle_in_gusts(plan: Plan, airframe: Airframe, search: Callable[[Scenario],
     True
     """
     autopilot, limits = airframe.autopilot, airframe.limits
-    if not plan.safe or expected_circles(plan, autopilot, limits) <= MOST_CIRCLES:
+    expected = expected_circles(plan, autopilot, limits)
+    if not plan.safe or expected == 0.0:
         return plan
+    if expected <= MOST_CIRCLES:
+        # With as many waypoints as plans have where nobody circles, no corner is too sharp.
+        has_all = len(plan.waypoints) >= plan.scenario.planner.waypoints
+        return plan if has_all or _is_settled(plan, airframe) else _refused(plan, _what_is_wide(plan, airframe))
     fewer = drop_waypoints(plan, limits.surely())
     if _is_settled(fewer, airframe):
         return fewer
@@ -56,22 +61,43 @@ def settle_in_gusts(plan: Plan, airframe: Airframe, search: Callable[[Scenario],
         other = replace(search(replace(scenario, planner=table)), scenario=scenario)
         if other.safe and _is_settled(other, airframe):
             return other
+    return _refused(plan, _what_is_wrong(plan, autopilot, limits))
+
+
+def _refused(plan: Plan, problem: str) -> Plan:
     certificate = plan.certificate
-    problems = (*certificate.problems, _what_is_wrong(plan, autopilot, limits))
-    return replace(plan, certificate=replace(certificate, problems=problems))
+    return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, problem)))
 
 
 def _is_settled(plan: Plan, airframe: Airframe) -> bool:
-    """Whether a plan expects few enough circles, and its corners, sharper than those of more waypoints, no corridor."""
-    scenario, limits, autopilot = plan.scenario, airframe.limits, airframe.autopilot
-    if expected_circles(plan, autopilot, limits) > MOST_CIRCLES:
+    """Whether a plan expects few enough circles, and no corner, sharper for being one of few, leaves its corridor."""
+    if expected_circles(plan, airframe.autopilot, airframe.limits) > MOST_CIRCLES:
         return False
-    tracking = limits.tracking
-    if tracking is None:
-        return True
-    corridor = corridor_half_width(scenario.limits.corridor_m, autopilot.acceptance_radius) - GUSTS_ASIDE
-    turns, speeds = turning_angles(plan.waypoints), corner_speeds(scenario, plan.waypoints, limits.airspeed)
-    return all(tracking.corner_excursion(float(one), v) <= corridor for one, v in zip(turns, speeds, strict=True))
+    return max(_excursions(plan, airframe), default=0.0) <= _corridor(plan, airframe)
+
+
+def _corridor(plan: Plan, airframe: Airframe) -> float:
+    """How far (m) from its legs a plan's flight may be."""
+    return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.acceptance_radius)
+
+
+def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
+    """How far (m) from its legs each corner of a plan is flown in gusts; none where that is not known."""
+    limits = airframe.limits
+    if (tracking := limits.tracking) is None:
+        return []
+    turns, speeds = turning_angles(plan.waypoints), corner_speeds(plan.scenario, plan.waypoints, limits.airspeed)
+    return [tracking.corner_excursion(float(one), v) + GUSTS_ASIDE for one, v in zip(turns, speeds, strict=True)]
+
+
+def _what_is_wide(plan: Plan, airframe: Airframe) -> str:
+    """Which corner leaves the corridor, in one line."""
+    excursions = _excursions(plan, airframe)
+    aside = max(excursions)
+    return (
+        f"in {plan.scenario.wind.turbulence} turbulence {airframe.autopilot.title} is {aside:.0f} m off the legs at the"
+        f" corner of waypoint {1 + excursions.index(aside)}; the corridor is {_corridor(plan, airframe):.0f} m"
+    )
 
 
 def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:

@@ -112,6 +112,14 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
     corner = replace(found, waypoints=np.array([scenario.start, [4000.0, aside, 150.0], scenario.destination]))
     assert expected_circles(corner, airframe_of_x8.autopilot, airframe_of_x8.limits) <= MOST_CIRCLES
     assert settle_in_gusts(found, airframe_of_x8, lambda _: corner).feasible is taken
+    # One that was found with so few waypoints, too.
+    settled = settle_in_gusts(corner, airframe_of_x8)
+    assert (settled is corner) is taken
+    assert settled.feasible is taken
+    wide = [
+        problem for problem in settled.certificate.problems if "m off the legs at the corner of waypoint 1" in problem
+    ]
+    assert (len(wide), taken) in ((0, True), (1, False))
 
 
 def plan_of(airframe: Airframe, waypoints: np.ndarray) -> Plan:
