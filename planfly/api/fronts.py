@@ -14,7 +14,7 @@ from planfly.api.planning import Wind, changed_scenario, opened_scenario, stop_c
 from planfly.arguments import RANGES, check_arguments
 from planfly.choice_of_ways import make_front
 from planfly.first_start import with_warm_up
-from planfly.kernel_units.unit_kernels import PLANNING
+from planfly.kernel_units.unit_kernels import CHOOSING
 from planfly.stages import stage
 from planfly.targets import RUN_FOLDER, clean_folder, filled_pattern
 from planner.plan import plan_json
@@ -35,7 +35,7 @@ FRONT_FILES = (
 )
 
 
-@with_warm_up(*PLANNING)
+@with_warm_up(*CHOOSING)
 def plan_front(
     scenario: Scenario | str | Path,
     count: int = 20,

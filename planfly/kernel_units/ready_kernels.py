@@ -22,7 +22,7 @@ from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.pipeline import fly_and_judge, make_setup
 from planfly.returns_beside import returns_beside, returns_line
 from planner.evaluation.problem import make_problem
-from planner.search.kernel_calls import FEW, PARTS, call_kernels
+from planner.search.kernel_calls import FEW, FRONT, PARTS, call_kernels
 from planner.search.search_state import SCORE_COLUMNS, best_first
 from world.compile_events import tell_before_compiling
 from world.scenario import Scenario, from_spec
@@ -120,7 +120,7 @@ UNITS: dict[str, Callable[[], None]] = {
     "problem": _make_problem,
     "tracking": _track,
     "ranks": _rank,
-    **{part: functools.partial(_plan, part) for part in PARTS},
+    **{part: functools.partial(_plan, part) for part in (*PARTS, FRONT)},
     "flight": _fly,
     "glides": _glide,
 }

@@ -65,6 +65,12 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         _SIDES + "grid_costs",
         _SIDES + "route_through",
     ),
+    "fronts": (
+        *_PROBLEM,
+        "planner.evaluation.front_scores._fill",
+        "planner.optimisers.hypervolume._covered",
+        "planner.optimisers.hypervolume._greedy",
+    ),
     "paper": (*_PROBLEM, "planner.evaluation.paper_scores._score_paths"),
     "flight": (
         *_WORLD,
@@ -110,6 +116,8 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
 # not compile it at once; the first of it takes as long as the other two.  Then the longest first.
 _SHARED = ("problem", "tracking", "ranks")
 PLANNING = (*_SHARED, "scores", "shortening", "routes", "certificates", "paper", "sides")
+# What a choice of plans calls: all of a default plan's, and its own.
+CHOOSING = (*_SHARED, "scores", "shortening", "routes", "certificates", "fronts", "paper", "sides")
 FLYING = ("tracking", "flight")
 GLIDING = ("glides",)
 BOTH = (*_SHARED, "scores", "flight", "shortening", "routes", "certificates", "paper", "sides")

@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding, RotatedFrame, rotated_frame, rotated_vectors
+from planner.evaluation.front_scores import front_values
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import Problem, make_problem
+from planner.evaluation.travel_cost import energy_cost
+from planner.optimisers.hypervolume import covering_order
 from planner.search.search_state import best_first, score_table
 from planner.seeding.grids import GridRoute, grid_route, make_grid
 from planner.seeding.pattern_search import search_patterns
@@ -21,7 +24,9 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
+# Of a search for one plan, and what a choice of plans calls beside it.
 PARTS = ("scores", "certificates", "shortening", "routes", "sides", "paper")
+FRONT = "fronts"
 WAYPOINTS = 8
 STAGES, MAX_ROUTES, FEW = 12, 2, 4
 # Offset of the path's middle to the side and upwards, m.
@@ -37,7 +42,7 @@ class _Task(NamedTuple):
 
 
 def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
-    """Call the kernels of one part of planning, one of `PARTS`, on a scenario that should be small.
+    """Call the kernels of one part of planning, one of `PARTS` or `FRONT`, on a scenario that should be small.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -89,4 +94,11 @@ def _score_as_the_paper(task: _Task) -> None:
     paper_scores(task.problem.certified, task.path[None])
 
 
-_CALLS = dict(zip(PARTS, (_score, _certify, _shorten, _route, _pass_sides, _score_as_the_paper), strict=True))
+def _choose(task: _Task) -> None:
+    data = task.problem.search
+    front_values(data, energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
+    covering_order(np.eye(FEW), np.full(FEW, 2.0), FEW)
+
+
+_PARTS = (_score, _certify, _shorten, _route, _pass_sides, _score_as_the_paper)
+_CALLS = {**dict(zip(PARTS, _PARTS, strict=True)), FRONT: _choose}

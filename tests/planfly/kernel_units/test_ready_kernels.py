@@ -9,7 +9,7 @@ import pytest
 
 from planfly.kernel_units import ready_kernels
 from planfly.kernel_units.ready_kernels import do_unit, is_ready
-from planfly.kernel_units.unit_kernels import BOTH, GLIDING, UNIT_KERNELS, kernels_of
+from planfly.kernel_units.unit_kernels import BOTH, CHOOSING, GLIDING, UNIT_KERNELS, kernels_of
 from world.compile_events import kernel_is_compiled
 from world.kernels import compiled
 
@@ -34,12 +34,16 @@ def test_units_call_what_is_counted_for_them() -> None:
     missed = 1
     while missed:
         done = subprocess.run(
-            [sys.executable, "-c", CODE, *BOTH, *GLIDING], cwd=ROOT, capture_output=True, text=True, check=True
+            [sys.executable, "-c", CODE, *BOTH, *GLIDING, *CHOOSING],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
         )
         missed, said, called = json.loads(done.stdout)
     for unit, lines in said.items():
         assert sorted(lines) == sorted(f"ready {name}" for name in UNIT_KERNELS[unit]), unit
-    assert called == sorted(kernels_of((*BOTH, *GLIDING)))
+    assert called == sorted(kernels_of((*BOTH, *GLIDING, *CHOOSING)))
 
 
 # ----------------------------------------------------------------------
