@@ -10,6 +10,8 @@ from logs.views.map import MapChart, NamedWind, end_labels, map_extent, world_ma
 from planner.search.plan_front import Front
 
 _WATT_HOUR = 3600.0
+# What axes span at least: in s, m and Wh, and of the length as a share. Plans that are closer are alike.
+LEAST_SPAN, LEAST_LENGTH = 1.0, 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ def front_chart(front: Front) -> Chart:
     ]
     panels = []
     for title, unit, values in columns:
-        layers = [Layer("dots", "other plans", "front-other", along[rest], values[rest])]
+        layers = [Layer("dots", "other plans", "front-other", along[rest], values[rest])] if len(rest) else []
         layers += [
             Layer("dots", f"{one.row + 1}: {one.name}", one.role, along[[one.row]], values[[one.row]]) for one in named
         ]
@@ -84,8 +86,8 @@ def front_chart(front: Front) -> Chart:
             for row in [*(one.row for one in named), *rest]
             if math.isfinite(values[row])
         )
-        panels.append(Panel(title, unit, tuple(layers), min_span=1e-3, labels=labels))
-    margin = 0.03 * max(float(np.ptp(along)), 1e-3)
+        panels.append(Panel(title, unit, tuple(layers), min_span=LEAST_SPAN, labels=labels))
+    margin = 0.03 * max(float(np.ptp(along)), LEAST_LENGTH * float(along.min()))
     reach = (float(along.min()) - margin, float(along.max()) + margin)
     name = plans[0].plan.scenario.name
     return Chart(
