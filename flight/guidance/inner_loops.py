@@ -15,6 +15,7 @@ GUIDANCE_MEMORY = record_dtype(
     "trim_elevator",  # rad, of level flight at the reference airspeed
     "trim_alpha",  # rad
     "trim_throttle",  # 0..1
+    "stall_speed",  # m/s, equivalent
     # Where on the path.
     ("piece", np.int64),  # index of the piece of the path
     ("leg", np.int64),
@@ -50,7 +51,6 @@ GUIDANCE_MEMORY = record_dtype(
     "energy_rate",  # m/s, filtered rate of total energy height
     "last_airspeed",  # m/s, negative before the first tick
     "airspeed",  # m/s, without its gusts
-    "full_throttle",  # s without a break
     "bend_acceleration",  # m/s^2 upwards, of the path ahead
     # Roll.
     "bank",  # rad, of the model roll

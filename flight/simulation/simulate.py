@@ -256,6 +256,7 @@ class Flight(Airborne):
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha
         memory.trim_throttle = (straight(model, start.airspeed, start.amsl) or level).throttle
         memory.last_airspeed = -1.0
+        memory.stall_speed = self.fdm.aircraft.stall_speed
         if self._ways.take_off is not None:
             throttle, elevator = self._from_ground.released_throttle, level.elevator
             begin = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ways.take_off)

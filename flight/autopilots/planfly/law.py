@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
+from aircraft.tracking import density_factor
 from flight.guidance.inner_loops import follow_roll, roll_model, steer_elevator
 from flight.guidance.lateral_reference_laws import (
     WAYPOINT_RADIUS,
@@ -39,8 +40,10 @@ LAWS: dict[Guidance, int] = {"path": CROSS_TRACK, "l1": L1, "vector-field": VECT
 # Time constants of the energy rate and of the airspeed without its gusts, s.
 _ENERGY_LAG = 1.0
 _AIRSPEED_LAG = 2.0
-# Full throttle for this long (s) means that the aircraft gives all it has: then height gives way to speed.
-_ALL_IT_HAS = 1.0
+# Stall speeds below which height gives way to speed at once: a take-off's safety speed (14 CFR 25.107, V2).
+SAFE_SPEED = 1.2
+# Time in which the ceiling brings an airspeed back, s.
+_SPEED_BACK = 3.0
 # Of the lateral acceleration at the greatest bank, what an arc may take before the aircraft slows down for it.
 ARC_SHARE = 0.95
 # Longest tick that the whole lead of a correction is for, s.
@@ -280,7 +283,7 @@ def steer_height(
     memory.bend_acceleration = bend * along * along
     push = memory.bend_acceleration + rate_gain * (wanted_rate + correction - climb_rate)
     push -= gains.height_integral * memory.height_sum
-    ceiling = _push_ceiling(gains, memory, airspeed, climb_rate, rate_gain, dt)
+    ceiling = _push_ceiling(estimated, gains, memory, commands, airspeed, rate_gain, dt)
     held = push > ceiling
     push = min(8.0, max(-6.0, min(push, ceiling)))
     if not held and abs(error) < 5.0:
@@ -291,12 +294,21 @@ def steer_height(
 
 @inner
 def _push_ceiling(
-    gains: Record, memory: Record, airspeed: float, climb_rate: float, rate_gain: float, dt: float
+    estimated: Record,
+    gains: Record,
+    memory: Record,
+    commands: Record,
+    airspeed: float,
+    rate_gain: float,
+    dt: float,
 ) -> float:  # pragma: no cover - compiled
-    """Most acceleration upwards that the energy allows, m/s^2; infinite while the aircraft has more to give.
+    """Most acceleration upwards that the energy allows, m/s^2.
 
-    What the aircraft gains now is what it can climb at a steady airspeed.
+    What the aircraft gains now, and would gain with the throttle that is left, is what it can climb at a steady
+    airspeed.  More than that comes from an airspeed above the slowest one that is let, less goes into one below it.
+    Near the stall the airspeed counts as it is, with its gusts: a gust takes it there within a second.
     """
+    climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:
         memory.last_airspeed = airspeed
         memory.airspeed = airspeed
@@ -305,10 +317,12 @@ def _push_ceiling(
     memory.last_airspeed = airspeed
     memory.energy_rate += (energy_rate - memory.energy_rate) * dt / _ENERGY_LAG
     memory.airspeed += (airspeed - memory.airspeed) * dt / _AIRSPEED_LAG
-    if memory.full_throttle <= _ALL_IT_HAS:
-        return math.inf
-    excess = memory.airspeed - (memory.speed_command - gains.slow_margin)
-    ceiling: float = rate_gain * (memory.energy_rate + excess * airspeed / (GRAVITY * 3.0) - climb_rate)
+    left = (1.0 - commands.throttle) / max(1e-3, gains.throttle_per_slope) * airspeed
+    safe = min(memory.speed_command, SAFE_SPEED * memory.stall_speed * density_factor(estimated.up))
+    slowest = max(safe, memory.speed_command - gains.slow_margin)
+    excess = min(memory.airspeed - slowest, airspeed - safe)
+    climb = memory.energy_rate + left + excess * airspeed / (GRAVITY * _SPEED_BACK)
+    ceiling: float = rate_gain * (climb - climb_rate)
     return ceiling
 
 
@@ -332,7 +346,6 @@ def _set_throttle(
     steady = memory.trim_throttle + gains.throttle_per_slope * ahead_slope * along / airspeed
     wanted = steady + gains.speed_gain * slow + gains.speed_integral * memory.speed_sum
     commands.throttle = min(1.0, max(0.0, wanted))
-    memory.full_throttle = memory.full_throttle + dt if wanted >= 1.0 else 0.0
     # Below the throttle that gives thrust, which grows with the airspeed, the integral would wind up on nothing.
     idle = gains.throttle_idle * airspeed / gains.reference_airspeed
     if (wanted < 1.0 or slow < 0.0) and (wanted > idle or slow > 0.0):

@@ -126,13 +126,49 @@ def test_too_slow_takes_throttle_too_fast_gives_it_back_within_0_and_1() -> None
     assert Channel().height(airspeed=speed + 15.0).throttle == 0.0
 
 
-def test_after_a_second_at_full_throttle_height_gives_way_to_speed() -> None:
-    def elevator(full_throttle: float) -> float:
-        channel = Channel()
-        channel.memory.full_throttle = full_throttle
-        return float(channel.height(up=480.0, airspeed=channel.speed - GAINS.slow_margin - 2.0).elevator)
+SLOWEST = GAINS.reference_airspeed - GAINS.slow_margin
 
-    assert elevator(1.1) > elevator(0.9)
+
+@pytest.mark.parametrize(
+    ("throttle", "airspeed", "stall", "climbs"),
+    [
+        # At the slowest airspeed that is let, steady, an aircraft gains nothing with all its throttle...
+        (1.0, SLOWEST, 0.0, 0.0),
+        # ... and with a tenth of it left climbs by that: throttle_per_slope is throttle for a climb of one rad.
+        (0.9, SLOWEST, 0.0, 0.1 / GAINS.throttle_per_slope * SLOWEST),
+        # An airspeed that is too fast by 2 m/s or too slow by one is brought back in 3 s: v dv / (g t).
+        (1.0, SLOWEST + 2.0, 0.0, 2.0 * (SLOWEST + 2.0) / (GRAVITY * 3.0)),
+        (1.0, SLOWEST - 1.0, 0.0, -(SLOWEST - 1.0) / (GRAVITY * 3.0)),
+        # 1.2 times the stall, at 500 m where true airspeeds are 1.02445 times equivalent ones, is slower than it is...
+        (1.0, SLOWEST, 0.9 * SLOWEST / (1.2 * 1.02445), 0.0),
+        # ... or faster, by 2 m/s: then that counts.
+        (1.0, SLOWEST, (SLOWEST + 2.0) / (1.2 * 1.02445), -2.0 * SLOWEST / (GRAVITY * 3.0)),
+        # Never faster than what is flown: with nothing in hand it would sink all the way.
+        (1.0, GAINS.reference_airspeed, GAINS.reference_airspeed, 0.0),
+    ],
+)
+def test_far_below_the_path_it_climbs_by_what_it_gains(
+    throttle: float, airspeed: float, stall: float, climbs: float
+) -> None:
+    held, free = Channel(), Channel(slope=climbs / GAINS.reference_airspeed)
+    held.memory.stall_speed, held.commands.throttle = stall, throttle
+    # The same pull as on a path of this climb, a little below it and far.
+    assert held.height(up=400.0, airspeed=airspeed).elevator == pytest.approx(free.height(airspeed=airspeed).elevator)
+
+
+def test_near_the_stall_a_gust_counts_at_once() -> None:
+    """The airspeed without its gusts is still fast; of the gust alone height gives way."""
+
+    def elevator(stall: float) -> float:
+        channel = Channel()
+        channel.memory.stall_speed = stall
+        channel.memory.airspeed = channel.memory.last_airspeed = GAINS.reference_airspeed
+        channel.commands.throttle = 1.0
+        # As fast a tick ago: nothing is gained or lost.
+        channel.memory.last_airspeed = 20.0
+        return float(channel.height(up=480.0, airspeed=20.0).elevator)
+
+    assert elevator(20.0 / 1.2) > elevator(10.0) + 0.01
 
 
 def test_wings_level_in_still_air_there_is_nothing_to_do() -> None:
