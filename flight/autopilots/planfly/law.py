@@ -44,6 +44,8 @@ _AIRSPEED_LAG = 2.0
 SAFE_SPEED = 1.2
 # Time in which the ceiling brings an airspeed back, s.
 _SPEED_BACK = 3.0
+# How far from the course the nose may point against the wind, rad.
+_NOSE_OFF = math.radians(80.0)
 # Of the lateral acceleration at the greatest bank, what an arc may take before the aircraft slows down for it.
 ARC_SHARE = 0.95
 # Longest tick that the whole lead of a correction is for, s.
@@ -130,6 +132,10 @@ def _along_path(
     push += home + gains.push_lead * min(1.0, (LEAD_TICK / dt) ** 2) * change
     lift = GRAVITY + memory.bend_acceleration
     wanted = math.atan((turn + push) / (lift * crab))
+    # A nose that far off the course gives nothing more against the wind: turning on would take it all the way round.
+    nose = wrap(state.yaw - course)
+    if abs(nose) > _NOSE_OFF and wanted * nose > 0.0:
+        wanted = math.copysign(abs(nose) - _NOSE_OFF, -nose)
     bank: float = min(memory.max_bank, max(-memory.max_bank, wanted))
     sharpest = max_curvature(pieces, k, s, s + speed * gains.arc_slowing_time)
     memory.arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, sharpest))

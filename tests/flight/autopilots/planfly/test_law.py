@@ -113,3 +113,13 @@ def test_end_of_the_path(tick: Tick) -> None:
     assert [tick.memory.leg, tick.memory.done] == [1, False]
     tick(east=3000.1, north=3000.0, course=math.pi / 2)
     assert [tick.memory.leg, tick.memory.done] == [1, True]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_nose_is_not_turned_past_the_wind(tick: Tick, side: float) -> None:
+    """Blown aside and back, 20 m from the path, it points into the wind and waits, and does not go round."""
+    blown = {"east": side * 20.0, "course": side * math.radians(100.0)}
+    assert side * tick(**blown, yaw=-side * math.radians(75.0)).aileron < 0.0
+    assert side * tick(**blown, yaw=-side * math.radians(95.0)).aileron > 0.0
+    # With its nose the other way, too far as well, it turns back over the course.
+    assert side * tick(**blown, yaw=side * math.radians(95.0)).aileron < 0.0
