@@ -68,6 +68,8 @@ class Limits:
     max_bank: rad, the tighter of scenario and aircraft.
     wind: over the whole area.
     tracking: tracking error of the autopilot, None if it follows its path exactly.
+    reserve_height, reserve_climb: distance from the ground and from threats (m), and climb rate (m/s), kept for
+    downdrafts.
     """
 
     max_turn: float | None
@@ -79,6 +81,8 @@ class Limits:
     max_bank: float
     wind: Wind
     tracking: TrackingError | None = None
+    reserve_height: float = 0.0
+    reserve_climb: float = 0.0
     # Each is made once: a route asks for the same few speeds again and again.
     _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)
 
@@ -139,18 +143,23 @@ class Limits:
         )
 
 
-def derated(table: PerformanceTable, share: float) -> PerformanceTable:
-    """The same aircraft with a share (0..1) of its climb and descent; negative angles, a loss of height, are unchanged.
+def derated(table: PerformanceTable, climb_share: float, sink_share: float, reserve: float = 0.0) -> PerformanceTable:
+    """The same aircraft with shares (0..1) of its climb and descent, and at least a climb rate (m/s) kept in reserve.
+
+    Negative angles, a loss of height, are unchanged; level flight is left to all that do not lose height.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
-    >>> derated(table, 0.5).climb.tolist()
-    [0.1, -0.1]
+    >>> derated(table, 0.5, 1.0).climb.tolist(), derated(table, 0.9, 0.9, reserve=3.0).climb.round(3).tolist()
+    ([0.1, -0.1], [0.079, -0.1])
     """
-    climb, descent = (
-        _read_only(np.where(angles > 0.0, share * angles, angles)) for angles in (table.climb, table.descent)
-    )
-    return table._replace(climb=climb, descent=descent)
+    shares = (climb_share, table.climb), (sink_share, table.descent)
+    climb, descent = (np.where(angles > 0.0, share * angles, angles) for share, angles in shares)
+    if reserve > 0.0:
+        speeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
+        left = np.arcsin(np.maximum(0.0, np.sin(table.climb) - reserve / speeds))
+        climb = np.where(climb > 0.0, np.minimum(climb, left), climb)
+    return table._replace(climb=_read_only(climb), descent=_read_only(descent))
 
 
 def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:

@@ -48,7 +48,8 @@ class TrackingError:
     lag: time by which height follows a slope, s.
     step: a leg that changes height by less than this is flown level at the height of its end, m.
     climb_rate, sink_rate: fastest change of the height demand, m/s; inf for no limit.
-    slope_share: share (0..1) of the aircraft's steepest climb and descent that leaves it near its height in gusts.
+    own_climb_share, own_sink_share: shares (0..1) of the aircraft's steepest climb and descent that leave it near its
+    height in gusts.
     """
 
     airspeed: float
@@ -62,7 +63,8 @@ class TrackingError:
     step: float
     climb_rate: float = math.inf
     sink_rate: float = math.inf
-    slope_share: float = 1.0
+    own_climb_share: float = 1.0
+    own_sink_share: float = 1.0
     record: Record = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

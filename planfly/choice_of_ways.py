@@ -2,6 +2,7 @@
 
 from planfly.airframe import Airframe
 from planfly.gust_circles import waypoints_in_gusts
+from planfly.gust_heights import limits_of_others
 from planfly.pipeline import Advance, finish_plan, make_plan
 from planner.plan import Plan
 from planner.search.plan_front import Front, plan_front
@@ -32,7 +33,7 @@ def make_front(
 
     return plan_front(
         scenario,
-        airframe.limits.surely(),
+        limits_of_others(default, airframe),
         count,
         seed=seed,
         progress=advance,

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from aircraft.path_limits import Limits
 from flight.autopilots.catalog import program_autopilot
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
@@ -33,11 +34,12 @@ from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, laid_from_the_ground, load_airframe
 from planfly.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.gust_circles import settle_in_gusts
+from planfly.gust_heights import keep_height
 from planfly.reference_flights import judge_with_reference_flights
 from planfly.returns_beside import ReturnsBeside, returns_beside
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
-from planner.search.replan import replan
+from planner.search.replan import Search, replan
 from planner.search.search_state import StopCondition
 from world.errors import FlightError, StartError
 from world.scenario import Scenario
@@ -150,9 +152,9 @@ def make_plan(
     """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
 
     All commands plan by this, so that what one calls safe no other calls unsafe. Where gusts make the autopilot circle
-    at waypoints, the plan has as few of them as it can do with (`planfly.gust_circles`); the ways from and to the
-    ground are laid; and where the autopilot circles at the mission's end, the certificate names what that may come too
-    near to.
+    at waypoints, the plan has as few of them as it can do with (`planfly.gust_circles`); where downdrafts take it down,
+    it keeps as much height (`planfly.gust_heights`); the ways from and to the ground are laid; and where the autopilot
+    circles at the mission's end, the certificate names what that may come too near to.
 
     stop: as of `planner.search.plan_path.plan_path`.
     flown: the plan that is being flown, and the leg to plan again from; None for a new plan.
@@ -160,8 +162,9 @@ def make_plan(
     """
     limits = airframe.limits.surely()
 
-    def settle(plan: Plan, search: Callable[[Scenario], Plan]) -> Plan:
-        return settle_in_gusts(plan, airframe, search)
+    def settle(plan: Plan, search: Search) -> Plan:
+        few = settle_in_gusts(plan, airframe, lambda asked: search(asked, limits))
+        return keep_height(few, airframe, lambda kept: search(plan.scenario, kept))
 
     if flown is not None:
         old, leg = flown
@@ -170,15 +173,15 @@ def make_plan(
         )
         return _completed(again, airframe, old, onward=onward)
 
-    def search(world: Scenario) -> Plan:
-        return plan_path(world, limits, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
+    def search(world: Scenario, within: Limits) -> Plan:
+        return plan_path(world, within, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
-    return _completed(settle(search(scenario), search), airframe, onward=onward)
+    return _completed(settle(search(scenario, limits), search), airframe, onward=onward)
 
 
 def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
     """A path that was found, with all that `make_plan` does after its search; nothing else is searched for."""
-    return _completed(settle_in_gusts(plan, airframe), airframe, onward=onward)
+    return _completed(keep_height(settle_in_gusts(plan, airframe), airframe), airframe, onward=onward)
 
 
 def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:

@@ -446,6 +446,13 @@ class Autopilot(ABC):
         """
         return 0.0
 
+    def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
+        """How far (m) below its path downdrafts may take it; 0 where its tracking error has all that is kept for them.
+
+        climb: what the aircraft has in hand against them, m/s.
+        """
+        return 0.0
+
     def with_parameters(self, **values: float) -> "Autopilot":
         """The same law with other values of parameters, by its own names and in its own units."""
         raise ValueError(f"{self.title} has no parameters")

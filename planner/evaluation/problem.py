@@ -306,15 +306,16 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     certified = _certified_arrays(scenario, limits, terrain)
     across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.has_error else (0.0, 0.0)
     # Plus the rise of the ground across the tracking error; the certificate measures the ground there.
-    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up + across * certified.slope_bounds.steepest
-    airspace = _search_airspace(scenario, certified, attempt, up)
+    more = limits.reserve_height + up + across * certified.slope_bounds.steepest
+    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + more
+    airspace = _search_airspace(scenario, certified, attempt, up, limits.reserve_height)
     if airspace.max_height < math.inf:
         buffer = min(buffer, _max_buffer(certified))
     search = _inset(
         certified._replace(
             buffer=buffer,
             airspace=airspace,
-            kill_margin=SEARCH_KILL_MARGIN + across,
+            kill_margin=SEARCH_KILL_MARGIN + limits.reserve_height + across,
             start_buffer=_end_buffer(terrain, limits, scenario.start, buffer),
             destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer),
         ),
@@ -329,7 +330,9 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     units = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
     tracking = no_tracking() if limits.tracking is None else limits.tracking.record
-    buffer, share = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
+    vertical, share = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
+    # Downdrafts take an aircraft down, and from no height limit above it.
+    buffer = vertical + limits.reserve_height
     arrays = ProblemArrays(
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.record,
@@ -349,7 +352,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         angle_margin=ANGLE_MARGIN,
         clearance=float(limits.min_clearance),
         buffer=buffer,
-        kill_margin=CERTIFIED_KILL_MARGIN,
+        kill_margin=CERTIFIED_KILL_MARGIN + limits.reserve_height,
         sample_pitch=min(50.0, max(15.0, 0.4 * terrain.spacing)),
         start_course=_or_nan(scenario.start_course),
         destination_course=_or_nan(scenario.destination_course),
@@ -359,16 +362,18 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
         tracking=tracking,
-        airspace=make_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
+        airspace=make_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, buffer, share), vertical),
         travel=LENGTH,
     )
     return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
 
 
-def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> PlannerAirspace:
+def _search_airspace(
+    scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, reserve: float
+) -> PlannerAirspace:
     """Airspace with the margins of a search."""
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
-    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer, 1.0)
+    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer + reserve, 1.0)
     return make_airspace(scenario, margins, min(buffer, _max_buffer(certified)))
 
 
@@ -390,8 +395,9 @@ def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
     """Performance of the aircraft, reduced in turbulence and for its autopilot, within the rates that this demands."""
     share, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
-        return derated(limits.performance(), share)
-    table = derated(limits.performance(), min(share, tracking.slope_share))
+        return derated(limits.performance(), share, share, limits.reserve_climb)
+    climb_share, sink_share = (min(share, own) for own in (tracking.own_climb_share, tracking.own_sink_share))
+    table = derated(limits.performance(), climb_share, sink_share, limits.reserve_climb)
     return within_rates(table, tracking.climb_rate, tracking.sink_rate)
 
 

@@ -21,8 +21,10 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Completes a plan, with a search that plans a changed scenario as the plan was planned.
-Settle = Callable[[Plan, Callable[[Scenario], Plan]], Plan]
+# Plans a scenario within limits.
+Search = Callable[[Scenario, Limits], Plan]
+# Completes a plan, with a search that plans a changed scenario, or within other limits, as the plan was planned.
+Settle = Callable[[Plan, Search], Plan]
 
 # Minimum number of waypoints of the path ahead: with fewer it cannot avoid anything.
 MIN_WAYPOINTS = 8
@@ -73,12 +75,12 @@ def replan(
     table = scenario.planner.model_copy(update={"waypoints": len(rest)})
     ahead = replace(scenario, start=rest[0], start_course=course, planner=table)
 
-    def search(asked: Scenario) -> Plan:
+    def search(asked: Scenario, within: Limits) -> Plan:
         # One of other waypoints than the old plan's does not start from it.
         previous = rest if asked.planner.waypoints == len(rest) else None
-        return plan_path(asked, limits, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=previous)
+        return plan_path(asked, within, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=previous)
 
-    made = search(ahead)
+    made = search(ahead, limits)
     if settle is not None:
         made = settle(made, search)
     waypoints = np.concatenate([old.waypoints[:leg], made.waypoints])

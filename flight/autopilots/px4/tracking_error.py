@@ -85,7 +85,8 @@ def tracking_error(
         step=0.0,
         climb_rate=_SHARE[turbulence] * min(made["FW_T_CLMB_R_SP"], made["FW_T_CLMB_MAX"]),
         sink_rate=_SHARE[turbulence] * min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
-        slope_share=_SLOPE_SHARE[turbulence],
+        own_climb_share=_SLOPE_SHARE[turbulence],
+        own_sink_share=_SLOPE_SHARE[turbulence],
     )
 
 

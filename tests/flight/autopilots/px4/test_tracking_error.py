@@ -60,7 +60,7 @@ def test_slopes_are_those_of_the_reference_and_late_by_its_lag(
     assert (error.climb_rate, error.sink_rate, error.lag, error.step) == pytest.approx(
         (share * 5.0, share * 2.0, 2.0, 0.0)
     )
-    assert error.slope_share == of_aircraft
+    assert (error.own_climb_share, error.own_sink_share) == (of_aircraft, of_aircraft)
     # Three standard deviations of 1.5 m beside 2 and 3 m.
     assert (error.across, error.up) == pytest.approx((math.hypot(2.0, 4.5), math.hypot(3.0, 4.5)))
 
