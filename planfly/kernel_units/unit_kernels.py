@@ -31,7 +31,8 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         *_PROBLEM,
         "planner.evaluation.graded_scores._score_paths",
         *_RANKS,
-        "planner.seeding.pattern_search._search",
+        "planner.seeding.pattern_search._begin_search",
+        "planner.seeding.pattern_search._continue_search",
     ),
     "certificates": (
         *_PROBLEM,
@@ -61,8 +62,9 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "sides": (
         *_PROBLEM,
         "planner.seeding.grids.find_obstacles",
+        _SIDES + "begin_grid_costs",
         _SIDES + "cheapest_passings",
-        _SIDES + "grid_costs",
+        _SIDES + "continue_grid_costs",
         _SIDES + "route_through",
     ),
     "fronts": (

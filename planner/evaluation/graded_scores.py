@@ -108,21 +108,79 @@ def score_path(
     objectives: Record,
 ) -> None:  # pragma: no cover - compiled
     """Evaluate a path (w, 3): add to a zeroed `VIOLATIONS` record and fill an `OBJECTIVES` record."""
+    score_legs(data, limits, scratch, path, violations, objectives)
+    score_ground(data, limits, scratch, path, violations)
+    score_missiles(data, limits, scratch, path, violations, objectives)
+    score_airspace(data, scratch, path, violations)
+
+
+@inner
+def score_legs(
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    scratch: PathScratch,
+    path: Floats,
+    violations: Record,
+    objectives: Record,
+) -> None:  # pragma: no cover - compiled
+    """First part of a path's evaluation: what needs no ground, missile or zone. Each part only adds to violations.
+
+    objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
+    """
+    legs, corners, flown, extents, lags = scratch.legs, scratch.corners, scratch.flown, scratch.extents, scratch.lags
+    aircraft = data.aircraft
+    measure_legs(path, legs)
+    measure_corners(data, limits.wind, path, legs, corners)
+    add_leg_violations(data, limits, path, legs, corners, True, violations)
+    if data.tracking.has_error:
+        measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
+        _measure_tracked(corners, flown, extents)
+    else:
+        _measure_exact(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
+    length = 0.0
+    for i in range(legs.shape[0]):
+        length += legs[i].length
+    objectives.length_ratio, objectives.kill_exposure = length / limits.straight_distance, 0.0
+
+
+@inner
+def score_ground(
+    data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
+) -> None:  # pragma: no cover - compiled
+    """Second part: the ground below the legs."""
+    legs, terrain_legs = scratch.legs, scratch.terrain_legs
+    sample_terrain(
+        data.heights,
+        data.slope_bounds,
+        data.to_pixel,
+        limits.required,
+        path,
+        legs,
+        scratch.extents,
+        scratch.lags,
+        terrain_legs,
+        scratch.unfinished,
+    )
+    for i in range(legs.shape[0]):
+        violations.terrain += terrain_legs[i].depth
+
+
+@inner
+def score_missiles(
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    scratch: PathScratch,
+    path: Floats,
+    violations: Record,
+    objectives: Record,
+) -> None:  # pragma: no cover - compiled
+    """Third part: missiles, and the ground below corners as flown."""
     # Arrays are taken out of the data once: passing it on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
     legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
     terrain_legs, gaps, lags = scratch.terrain_legs, scratch.gaps, scratch.lags
     count, has_error = path.shape[0], data.tracking.has_error
-    measure_legs(path, legs)
-    measure_corners(data, limits.wind, path, legs, corners)
-    add_leg_violations(data, limits, path, legs, corners, True, violations)
-    if has_error:
-        measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
-        _measure_tracked(corners, flown, extents)
-    else:
-        _measure_exact(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
-    sample_terrain(heights, bounds, to_pixel, required, path, legs, extents, lags, terrain_legs, scratch.unfinished)
     length, kill = 0.0, 0.0
     for i in range(count - 1):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
@@ -133,7 +191,6 @@ def score_path(
             missiles, margin, within, x, y, z, x2, y2, z2, extents[i], extents[i + 1], lag.max_below, -lag.min_below
         )
         gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
-        violations.terrain += terrain_legs[i].depth
         kill += dose * legs[i].length
         length += legs[i].length
     for i in range(1, count - 1):
@@ -154,10 +211,16 @@ def score_path(
             violations.terrain += _corner_depth(heights, bounds, to_pixel, required, more, vertices)
         if close:
             kill += _corner_kill(missiles, spare, vertices, below, above)
-    if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
-        add_airspace_violations(data, path, legs, corners, flown, lags, violations)
-    objectives.length_ratio = length / limits.straight_distance
     objectives.kill_exposure = kill * POINTS * (count - 1) / length
+
+
+@inner
+def score_airspace(
+    data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record
+) -> None:  # pragma: no cover - compiled
+    """Last part: zones and the maximum height above ground."""
+    if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
+        add_airspace_violations(data, path, scratch.legs, scratch.corners, scratch.flown, scratch.lags, violations)
 
 
 def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:

@@ -308,7 +308,12 @@ def _search(
     generations: int,
 ) -> int:
     """Sample from the seeds on; the number of paths evaluated."""
-    seeds = np.array(list(seed_paths(task, np.array(default))))
+    paths = []
+    for path in seed_paths(task, np.array(default)):
+        paths.append(path)
+        if stop is not None and stop():
+            break
+    seeds = np.array(paths)
     search.tell(task.vectors(seeds), *task.scores(seeds))
     evaluations = len(seeds)
     for generation in range(generations):

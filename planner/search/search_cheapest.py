@@ -9,6 +9,7 @@ costs less, so that a plan never costs more than the shortest path does.
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,10 +61,11 @@ def search_cheapest(search: Search, found: _Found, cost: TravelCost) -> _Found:
         return found
     data = search.problem.search._replace(travel=cost)
     cheapest = found
-    for start in _starts(search, found[0]):
-        if search.must_end():
-            return cheapest
-        cheapest = _cheaper(search, data, start, cheapest)
+    with suppress(SearchEnded):
+        for start in _starts(search, found[0]):
+            if search.must_end():
+                return cheapest
+            cheapest = _cheaper(search, data, start, cheapest)
     for _ in range(MAX_REPEATS):
         before = _cost(data, cheapest[0])
         for start in (resample(cheapest[0], len(cheapest[0])), cheapest[0]):
@@ -81,7 +83,10 @@ def _cost(data: ProblemArrays, path: Floats) -> float:
 
 
 def _starts(search: Search, shortest: Floats) -> Iterator[Floats]:
-    """Paths (w, 3) to begin from: the shortest, with equal legs too, the straight line, and routes on other sides."""
+    """Paths (w, 3) to begin from: the shortest, with equal legs too, the straight line, and routes on other sides.
+
+    Raises SearchEnded if the search is asked to stop.
+    """
     count, space, data = len(shortest), search.problem.space, search.problem.search
     yield shortest
     yield resample(shortest, count)
@@ -93,7 +98,7 @@ def _starts(search: Search, shortest: Floats) -> Iterator[Floats]:
     bound = SLACK * float(path_length(shortest))
     for shrink in SHRINKS:
         grid = optimistic_grid(data, frame, span, STAGES, shrink=shrink, spread=SPREAD, ratio=RATIO)
-        for route in side_routes(data, frame, grid, bound, MAX_ROUTES):
+        for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
             yield resample(frame.restore(route.points), count)
 
 

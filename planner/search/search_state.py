@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.airspace_scores import airspace_counts
 from planner.evaluation.certify import certify
-from planner.evaluation.encoding import Encoding
+from planner.evaluation.encoding import Encoding, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
@@ -85,6 +85,8 @@ NARROW_RESERVE = 1.0
 TIGHTENING_EVALUATIONS = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
+# Pauses for which a search that is asked to stop before it has a result looks for its first route: some 100 ms.
+GRACE = 10
 # Certificates made before the stop condition is checked: some 10 ms if none passes.
 CERTIFICATES_AT_ONCE = 4
 
@@ -154,6 +156,7 @@ class Search:
     intervals.
     budget_exhausted: whether the budget is too small for another shortening.
     is_closed: whether it is proven that no safe path exists.
+    grace: pauses that are left to a search without a result, once it is asked to stop.
     """
 
     problem: Problem
@@ -175,6 +178,7 @@ class Search:
     shortest: tuple[Floats, Certificate] | None = None
     budget_exhausted: bool = False
     is_closed: bool = False
+    grace: int = GRACE
 
     def __post_init__(self) -> None:
         """Create an empty archive."""
@@ -196,7 +200,7 @@ class Search:
         at_once, scores = max(1, WAYPOINTS_AT_ONCE // self.encoding.waypoints), no_scores()
         for first in range(0, len(vectors), at_once):
             scores = np.concatenate([scores, self.score(vectors[first : first + at_once])])
-            if len(scores) < len(vectors) and self._asked_to_end():
+            if len(scores) < len(vectors) and self.asked_to_end():
                 break
         self._take(vectors[: len(scores)], scores)
         if len(scores) < len(vectors):
@@ -204,11 +208,30 @@ class Search:
         return scores
 
     def pause(self) -> None:
-        """Raise SearchEnded if the search is asked to stop and has a result."""
-        if len(self.archive.scores) and self._asked_to_end():
-            raise SearchEnded
+        """Raise SearchEnded if the search is asked to stop.
 
-    def _asked_to_end(self) -> bool:
+        A search of whole paths that has no result yet goes on for some pauses, to its first route. Where there is none
+        by then, the straight line is its result.
+        """
+        if not self.asked_to_end():
+            return
+        if not len(self.archive.scores):
+            self.grace -= 1
+            if self.grace > 0:
+                return
+            self.evaluate(self.straight_vectors())
+        raise SearchEnded
+
+    def straight_vectors(self) -> Floats:
+        """The straight line as a vector (1, d) of the rotated encoding."""
+        encoding, space = self.encoding, self.problem.space
+        edges = encoding.lower[0::3], encoding.upper[0::3]
+        share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
+        path = space.start + np.concatenate([[0.0], share, [1.0]])[:, None] * (space.destination - space.start)
+        return rotated_vectors(space, encoding, path[None])
+
+    def asked_to_end(self) -> bool:
+        """Whether the stop condition asks the search to end; it is remembered why."""
         reason = self.stop() if self.stop is not None else ""
         self.ended = reason or self.ended
         return bool(reason)
@@ -230,7 +253,7 @@ class Search:
         left = min(max_evaluations, self._budget() - self.evaluations)
         if left < 2:
             return np.asarray(self.evaluate(vector[None])[0])
-        found, made = search_patterns(self.problem.search, self.encoding, vector, int(left))
+        found, made = search_patterns(self.problem.search, self.encoding, vector, int(left), self.asked_to_end)
         scores = self.evaluate(found)
         # The pattern search has counted these vectors already.
         self.evaluations += made - len(found)
@@ -345,7 +368,7 @@ class Search:
         first: tuple[Floats, Certificate] | None = None
         exposed: tuple[Floats, Certificate] | None = None
         for number, vector in enumerate(self.archive.vectors):
-            if number >= CERTIFICATES_AT_ONCE and self._asked_to_end():
+            if number >= CERTIFICATES_AT_ONCE and self.asked_to_end():
                 break
             path = np.ascontiguousarray(self.encoding.decode(vector[None])[0])
             certificate = self._certificate(vector, path)

@@ -27,7 +27,7 @@ from planner.plan import Certificate
 from planner.search.search_state import Search, SearchEnded, best_first, safe, with_narrow_margins
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
-from planner.seeding.lattice import ceiling_route, lattice_route, turning_step
+from planner.seeding.lattice import ceiling_route, lattice_route, make_lattice, turning_step
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
@@ -44,20 +44,11 @@ BAND_EFFORT = 3
 MAX_FOLLOWED = 2
 
 
-def straight_vectors(search: Search) -> Floats:
-    """The straight line as a vector (1, d) of the rotated encoding."""
-    encoding, space = search.encoding, search.problem.space
-    edges = encoding.lower[0::3], encoding.upper[0::3]
-    share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
-    path = space.start + np.concatenate([[0.0], share, [1.0]])[:, None] * (space.destination - space.start)
-    return rotated_vectors(space, encoding, path[None])
-
-
 def straight_line(search: Search) -> bool:
     """Whether the straight line is a safe path: no path is shorter, and the search is finished."""
     if search.encoding.name != "rotated":
         return False
-    vectors = straight_vectors(search)
+    vectors = search.straight_vectors()
     scores = search.score(vectors)
     if not safe(scores[0]):
         return False
@@ -109,10 +100,7 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
     found, scores = [], []
     followed_free = search.shortens and search.algorithm.optimiser == "waypoints" and not search.first_safe
     limited = is_limited(data.airspace)
-    routes = (
-        airspace_routes(data, frame, span, grids) if limited else grid_routes(data, frame, span, grids, search.pause)
-    )
-    for route in routes:
+    for route in (airspace_routes if limited else grid_routes)(data, frame, span, grids, search.pause):
         if followed_free and search.has_safe():
             search.shorten(resample(frame.restore(route.points), encoding.waypoints))
             if search.must_end():
@@ -157,7 +145,7 @@ def search_other_sides(search: Search) -> None:
     """Shorten the best path, and routes on other sides of the obstacles."""
     if not len(search.archive.scores):
         # A search needs a result, even where the grids show no way.
-        search.evaluate(straight_vectors(search))
+        search.evaluate(search.straight_vectors())
     if search.shortens and search.has_safe():
         shorten_best(search)
     length = search.length_ratio() if search.has_safe() else MAX_DETOUR
@@ -179,7 +167,7 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     for stages, shrink, ratio in grids:
         grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=SPREAD, ratio=ratio)
         bound = straight * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
-        for route in side_routes(data, frame, grid, bound, MAX_ROUTES):
+        for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
             if search.must_end():
                 return tried
             tried.append(resample(frame.restore(route.points), encoding.waypoints))
@@ -261,8 +249,10 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
     """The path (w, 3) along a route that may turn back and its certificate, if better than `found`; else `found`."""
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
-    for share in STEPS:
-        if search.must_end():
+    lattices = [make_lattice(data, frame, share * step) for share in STEPS]
+    for number, share in enumerate(STEPS):
+        # Where memory sets the step, a smaller one makes the same lattice again.
+        if search.must_end() or lattices[number] in lattices[:number]:
             break
         try:
             route = lattice_route(data, frame, share * step, search.pause)

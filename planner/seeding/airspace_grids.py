@@ -6,7 +6,7 @@ obstacle between two cells may be narrower than their spacing.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from planner.seeding.grids import (
     LAYERS_PER_STEP,
     SIDEWAYS,
     GridRoute,
+    distance_to_goal,
     find_obstacles,
     position_of,
     proximity_cost,
@@ -136,10 +137,17 @@ def _slopes(
 
 @inner
 def _set_cell_costs(
-    grid: AirspaceGrid, columns: Records, obstacles: Records, along: float, extra: Floats, price: Floats
+    grid: AirspaceGrid,
+    columns: Records,
+    obstacles: Records,
+    along: float,
+    extra: Floats,
+    low: int,
+    high: int,
+    price: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the cost per m of a stage's cells (across, layers); inf where a path is not allowed."""
-    for y in range(grid.across.size):
+    """Fill the cost per m of a stage's cells (low..high, layers); inf where a path is not allowed."""
+    for y in range(low, high + 1):
         column = columns[y]
         first = column.lowest if grid.follows else grid.floor
         middle, half = 0.5 * (column.lowest + column.highest), 0.5 * (column.highest - column.lowest)
@@ -218,29 +226,101 @@ def _relax_stage(
                         parents[to, z2] = y * grid.layers + z
 
 
-@compiled
+class AirspaceSearch(NamedTuple):
+    """A search for the cheapest route over a grid, as far as it has come.
+
+    obstacles: `OBSTACLE` records. columns: `COLUMN` records (stages + 1, across). cells: (stages + 1, across, layers),
+    the parent of each cell, as across x layers. cost, after, price: (across, layers) of the last stage reached, and
+    scratch. home: index across of both ends. stage: the last one reached.
+    """
+
+    obstacles: Records
+    columns: Records
+    cells: Codes
+    cost: Floats
+    after: Floats
+    price: Floats
+    home: int
+    stage: int
+
+
+# Cells of a grid that are reached between two calls of `pause`: some 20 ms at most.
+CELLS_AT_ONCE = 100_000
+
+
 def cheapest_airspace_route(
-    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, extra: Floats, bound: float
-) -> tuple[Floats, float]:  # pragma: no cover - compiled
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    grid: AirspaceGrid,
+    extra: Floats,
+    bound: float,
+    pause: Callable[[], None] = lambda: None,
+) -> tuple[Floats, float]:
     """Points (stages + 1, 3) along, across, up of the cheapest route over a grid, and its cost; else (0, 3) and inf.
 
-    extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost.
+    extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost. pause: called after every
+    `CELLS_AT_ONCE` cells; an exception raised there stops the search.
     """
+    stages = max(1, CELLS_AT_ONCE // (grid.across.size * grid.layers))
+    search: AirspaceSearch = begin_airspace_route(data, frame, grid)
+    while search.stage < grid.stages:
+        search = continue_airspace_route(data, frame, grid, extra, bound, search, stages)
+        pause()
+    points, cost = end_airspace_route(data, frame, grid, search)
+    return points, cost
+
+
+@compiled
+def begin_airspace_route(
+    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid
+) -> AirspaceSearch:  # pragma: no cover - compiled
+    """A search that is at the start."""
     stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
     home = int(np.argmin(np.abs(grid.across)))
-    obstacles = find_obstacles(data, frame, step)
     columns = np.zeros((stages + 1, wide), dtype=COLUMN)
-    cells = np.full((stages + 1, wide, grid.layers), -1, dtype=np.int32)
-    cost, after = np.full((wide, grid.layers), math.inf), np.full((wide, grid.layers), math.inf)
-    price = np.full((wide, grid.layers), math.inf)
     for y in range(wide):
         _column(data, frame, grid, 0.0, grid.across[y], columns[0, y])
+    cost = np.full((wide, grid.layers), math.inf)
     cost[home, _layer(grid, columns[0, home], data.start[2])] = 0.0
-    for stage in range(1, stages + 1):
-        along = stage * step
+    return AirspaceSearch(
+        find_obstacles(data, frame, step),
+        columns,
+        np.full((stages + 1, wide, grid.layers), -1, dtype=np.int32),
+        cost,
+        np.full((wide, grid.layers), math.inf),
+        np.full((wide, grid.layers), math.inf),
+        home,
+        0,
+    )
+
+
+@compiled
+def continue_airspace_route(
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    grid: AirspaceGrid,
+    extra: Floats,
+    bound: float,
+    search: AirspaceSearch,
+    more: int,
+) -> AirspaceSearch:  # pragma: no cover - compiled
+    """The search after up to `more` further stages, or at the last one if no route comes further."""
+    stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
+    obstacles, columns, cells, cost, after, price, home, reached = search
+    last_stage, ahead = min(stages, reached + more), np.empty(wide)
+    for stage in range(reached + 1, last_stage + 1):
+        along, low, high = stage * step, wide, -1
         for y in range(wide):
+            if cost[y].min() < math.inf:
+                low, high = min(low, y), max(high, y)
+        if low > high:
+            # No cell of the stage before is reached, and so none of the last.
+            last_stage = stages
+            break
+        low, high = max(0, low - SIDEWAYS), min(wide - 1, high + SIDEWAYS)
+        for y in range(low, high + 1):
             _column(data, frame, grid, along, grid.across[y], columns[stage, y])
-        _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], price)
+        _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], low, high, price)
         if stage == stages:
             price[home, _layer(grid, columns[stage, home], data.destination[2])] = 1.0
         after[:] = math.inf
@@ -257,22 +337,31 @@ def cheapest_airspace_route(
             cells[stage - 1],
             cells[stage],
         )
-        for y in range(wide):
-            left = math.sqrt((frame.length - along) ** 2 + grid.across[y] ** 2)
+        distance_to_goal(wide, home, stages - stage, step, 1.0, ahead)
+        for y in range(low, high + 1):
             for z in range(grid.layers):
-                if after[y, z] + left > bound:
+                if ahead[y] == math.inf or after[y, z] + ahead[y] > bound:
                     after[y, z] = math.inf
         cost, after = after, cost
-    points = np.empty((stages + 1, 3))
-    y, z = home, _layer(grid, columns[stages, home], data.destination[2])
-    total = cost[y, z]
+    return AirspaceSearch(obstacles, columns, cells, cost, after, price, home, last_stage)
+
+
+@compiled
+def end_airspace_route(
+    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
+) -> tuple[Floats, float]:  # pragma: no cover - compiled
+    """Points (stages + 1, 3) of the route found, and its cost; (0, 3) and inf if there is none."""
+    stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.home
+    z = _layer(grid, columns[stages, y], data.destination[2])
+    total = search.cost[y, z]
     if total == math.inf:
         return np.empty((0, 3)), math.inf
+    points = np.empty((stages + 1, 3))
     for stage in range(stages, -1, -1):
         first = columns[stage, y].lowest if grid.follows else grid.floor
         points[stage, 0], points[stage, 1], points[stage, 2] = stage * step, grid.across[y], first + z * grid.pitch
         if stage > 0:
-            code = cells[stage, y, z]
+            code = search.cells[stage, y, z]
             y, z = code // grid.layers, code % grid.layers
     return points, total
 
@@ -327,23 +416,27 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
 
 
 def airspace_routes(
-    data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    span: tuple[float, float],
+    grids: tuple[tuple[int, int], ...],
+    pause: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
     """Routes in the order found, for each grid (stages, number of different routes), with `FINER` times its stages.
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
-    gaps can require steep or curved routes.
+    gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
     """
     expected = EXPECTED * math.dist(data.start, data.destination)
     for number, (stages, each) in enumerate(grids):
         grid = airspace_grid(data, frame, span, FINER * stages)
         if number == 0:
-            route = _route(data, frame, grid._replace(gentle=False), (), expected)
+            route = _route(data, frame, grid._replace(gentle=False), (), expected, pause)
             if route is not None:
                 yield route
         used: tuple[GridRoute, ...] = ()
         for _ in range(each):
-            route = _route(data, frame, grid, used, math.inf if used else expected)
+            route = _route(data, frame, grid, used, math.inf if used else expected, pause)
             if route is None:
                 break
             expected = expected if used else route.cost
@@ -352,12 +445,17 @@ def airspace_routes(
 
 
 def _route(
-    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, used: tuple[GridRoute, ...], expected: float
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    grid: AirspaceGrid,
+    used: tuple[GridRoute, ...],
+    expected: float,
+    pause: Callable[[], None],
 ) -> GridRoute | None:
     """Cheapest route over a grid away from those used, None if there is none. expected: first bound to try."""
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
     for bound in (expected, math.inf):
-        points, cost = cheapest_airspace_route(data, frame, grid, extra, bound)
+        points, cost = cheapest_airspace_route(data, frame, grid, extra, bound, pause)
         if len(points):
             return GridRoute(points, float(cost))
         if bound == math.inf:

@@ -26,6 +26,7 @@ from world.kernels import Records, compiled, copy_into, inner
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int64]
+Numbers = NDArray[np.int32]
 Flags = NDArray[np.bool_]
 Bytes = NDArray[np.int8]
 
@@ -41,6 +42,8 @@ TURN_COST = 0.1
 CLOSED = 1.05
 # Status of a step.
 _UNKNOWN, _FREE, _SHUT = range(3)
+# Parent of a state of the start.
+_FIRST = -1
 # A point of a route: steps along and across from the start, and its layer.
 LATTICE_CELL = np.dtype([("along", np.int64), ("across", np.int64), ("layer", np.int64)], align=True)
 
@@ -78,7 +81,7 @@ def _set_position(
     out[2] = lattice.low + layer * lattice.pitch
 
 
-@inner
+@compiled
 def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:  # pragma: no cover - compiled
     """Maximum climb and descent (8, 2) of a step on each course, in layers."""
     out, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
@@ -96,11 +99,12 @@ def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) ->
 class _StateTable(NamedTuple):
     """State of the search. Per state: cost (m), parent, and whether it is closed. Per step: whether it is feasible.
 
-    rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.
+    parents: one more than the parent's number; 0 for a state that is not reached, whose cost is not set, and `_FIRST`
+    for one of the start. rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.
     """
 
     cost: Floats
-    parents: Codes
+    parents: Numbers
     done: Flags
     rises: Codes
     steps: Bytes
@@ -137,7 +141,7 @@ def _expand_state(
             _set_position(frame, lattice, next_along, next_across, next_layer, b)
             length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
             total = table.cost[state] + length + TURN_COST * lattice.step * abs(turn)
-            if table.done[code] or total >= table.cost[code]:
+            if table.done[code] or (table.parents[code] != 0 and total >= table.cost[code]):
                 continue
             # The feasibility of a step does not depend on the course before it.
             number = (cell * 8 + to) * width + next_layer - layer + sinks
@@ -145,7 +149,7 @@ def _expand_state(
                 free = _inside(data, b) and leg_cost(data, limits, a, b, CLOSED * length) <= CLOSED * length
                 table.steps[number] = _FREE if free else _SHUT
             if table.steps[number] == _FREE:
-                table.cost[code], table.parents[code] = total, state
+                table.cost[code], table.parents[code] = total, state + 1
                 away = math.sqrt((b[0] - goal[0]) ** 2 + (b[1] - goal[1]) ** 2 + (b[2] - goal[2]) ** 2)
                 heapq.heappush(open_states, (total + away, code))
 
@@ -163,27 +167,34 @@ class LatticeSearch(NamedTuple):
     found: int
 
 
-@compiled
-def begin_lattice_search(
-    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice
-) -> LatticeSearch:  # pragma: no cover - compiled
+def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> LatticeSearch:
     """The search for a route from start to destination before its first step."""
     rises = _climb_layers(data, frame, lattice)
     size = lattice.along * lattice.across * lattice.layers * 8
-    width = np.max(rises[:, 0]) + np.max(rises[:, 1]) + 1
+    width = int(rises.max(axis=0).sum()) + 1
+    # Made by NumPy, large arrays of zeros take memory only where they are written to: mostly a small part of them.
     table = _StateTable(
-        np.full(size, math.inf),
-        np.full(size, -1, dtype=np.int64),
+        np.empty(size),
+        np.zeros(size, dtype=np.int32),
         np.zeros(size, dtype=np.bool_),
         rises,
         np.zeros(size * width, dtype=np.int8),
     )
+    states = _reach_start(data, frame, lattice, table)
+    return LatticeSearch(table, np.zeros(states.size), states, 0, -1)
+
+
+@compiled
+def _reach_start(
+    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, table: _StateTable
+) -> Codes:  # pragma: no cover - compiled
+    """The states of the start, (k,), which are then reached."""
     first = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
     prescribed = _nearest_course(frame, data.start_course)
     states = np.arange(first, first + 8) if prescribed < 0 else np.array([first + prescribed])
     for state in states:
-        table.cost[state] = 0.0
-    return LatticeSearch(table, np.zeros(states.size), states, 0, -1)
+        table.cost[state], table.parents[state] = 0.0, _FIRST
+    return states
 
 
 @compiled
@@ -234,11 +245,11 @@ def _inside(data: ProblemArrays, point: Floats) -> bool:  # pragma: no cover - c
 
 
 @compiled
-def trace_route(parents: Codes, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
+def trace_route(parents: Numbers, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
     """`LATTICE_CELL` records from the start to a state."""
     count, state = 0, found
     while state >= 0:
-        count, state = count + 1, parents[state]
+        count, state = count + 1, parents[state] - 1
     cells = np.zeros(count, dtype=LATTICE_CELL)
     state = found
     for k in range(count - 1, -1, -1):
@@ -247,7 +258,7 @@ def trace_route(parents: Codes, found: int, lattice: Lattice) -> Records:  # pra
         cells[k].layer = cell % lattice.layers
         cells[k].along = place // lattice.across - lattice.behind
         cells[k].across = place % lattice.across - lattice.right
-        state = parents[state]
+        state = parents[state] - 1
     return cells
 
 

@@ -6,6 +6,7 @@ with fewer evaluations. It minimises the length ratio plus priced violations.
 """
 
 import math
+from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -13,7 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.encoding import Encoding, WaypointFrames, frames_of
-from planner.evaluation.graded_scores import PathScratch, make_scratch, score_path
+from planner.evaluation.graded_scores import (
+    PathScratch,
+    make_scratch,
+    score_airspace,
+    score_ground,
+    score_legs,
+    score_missiles,
+)
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays
 from planner.plan import Objective
@@ -32,13 +40,28 @@ FIRST_ALONG, FIRST_ACROSS, FIRST_UP = 0.2, 0.15, 25.0
 MIN_STEP = 0.002
 
 
-class _Found(NamedTuple):
-    """Best feasible vector (d,) (inf if none), the vector with the lowest merit, and whether they are the same."""
+# Evaluations between two questions whether to end: some 20 ms at most.
+EVALUATIONS_AT_ONCE = 150
 
+
+class _State(NamedTuple):
+    """A search as far as it has come; vectors are (d,).
+
+    here: with the lowest merit, which is `best`. feasible: the best feasible one (inf if none), of merit `shortest`.
+    before: where the round began. steps: (k,) of the moves. move: the next of the round; alive: whether any has been
+    tried in it. made: evaluations. ended: whether no move is left.
+    """
+
+    here: Floats
+    best: float
     feasible: Floats
-    cheapest: Floats
-    same: bool
-    evaluations: int
+    shortest: float
+    before: Floats
+    steps: Floats
+    move: int
+    alive: bool
+    made: int
+    ended: bool
 
 
 class _Box(NamedTuple):
@@ -57,11 +80,18 @@ class _Candidate(NamedTuple):
     scratch: PathScratch
 
 
-def search_patterns(data: ProblemArrays, encoding: Encoding, vector: Floats, evaluations: int) -> tuple[Floats, int]:
+def search_patterns(
+    data: ProblemArrays,
+    encoding: Encoding,
+    vector: Floats,
+    evaluations: int,
+    must_end: Callable[[], bool] = lambda: False,
+) -> tuple[Floats, int]:
     """Shorten a path of the rotated encoding.
 
-    vector: (d,). evaluations: maximum number. Returns the best vectors (k, d), namely the best feasible one, if any,
-    and the one with the lowest merit; and the number of evaluations made.
+    vector: (d,). evaluations: maximum number. must_end: asked after every `EVALUATIONS_AT_ONCE` evaluations whether to
+    end with what is found so far. Returns the best vectors (k, d), namely the best feasible one, if any, and the one
+    with the lowest merit; and the number of evaluations made.
     """
     frames = frames_of(encoding)
     inner = encoding.waypoints - 2
@@ -69,14 +99,20 @@ def search_patterns(data: ProblemArrays, encoding: Encoding, vector: Floats, eva
     moves, axes = _triangular_basis(inner)
     steps = np.array([FIRST_ALONG * span, FIRST_ACROSS * span, FIRST_UP])[axes]
     start = np.array(vector, dtype=np.float64)
-    found = _search(data, frames, _Box(encoding.lower, encoding.upper), start, moves, steps, evaluations)
-    if found.same:
-        vectors = [found.feasible]
-    elif math.isinf(found.feasible[0]):
-        vectors = [found.cheapest]
+    box, first = _Box(encoding.lower, encoding.upper), steps.copy()
+    state: _State = _begin_search(data, frames, start, steps)
+    while not state.ended:
+        until = min(evaluations, state.made + EVALUATIONS_AT_ONCE)
+        state = _continue_search(data, frames, box, moves, first, state, until, evaluations)
+        if not state.ended and must_end():
+            break
+    if state.shortest <= state.best:
+        vectors = [state.feasible]
+    elif math.isinf(state.feasible[0]):
+        vectors = [state.here]
     else:
-        vectors = [found.feasible, found.cheapest]
-    return np.array(vectors), int(found.evaluations)
+        vectors = [state.feasible, state.here]
+    return np.array(vectors), int(state.made)
 
 
 def merits(scores: Floats) -> Floats:
@@ -119,10 +155,20 @@ def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:  # pragm
 
 @inner
 def _merit(
-    data: ProblemArrays, limits: PrecomputedLimits, frames: WaypointFrames, vector: Floats, candidate: _Candidate
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    frames: WaypointFrames,
+    vector: Floats,
+    candidate: _Candidate,
+    best: float,
+    shortest: float,
 ) -> tuple[float, bool]:  # pragma: no cover - compiled
-    """Length ratio plus priced violations, and whether the path is feasible."""
-    path, inner = candidate.path, vector.reshape((vector.size // 3, 3))
+    """Length ratio plus priced violations, and whether the path is feasible.
+
+    Parts of a path's evaluation only add to its merit: it ends as soon as that reaches `best`, and `shortest` if the
+    path is still feasible. What is returned then is no less than these, either.
+    """
+    path, inner, scratch = candidate.path, vector.reshape((vector.size // 3, 3)), candidate.scratch
     for i in range(inner.shape[0]):
         along, across = inner[i, 0], inner[i, 1]
         path[i + 1, 0] = frames.east[i] + frames.cosine[i] * along - frames.sine[i] * across
@@ -130,7 +176,19 @@ def _merit(
         path[i + 1, 2] = inner[i, 2]
     violations, objectives = candidate.violations[0], candidate.objectives[0]
     violations.turn, violations.slope, violations.terrain, violations.bounds = 0.0, 0.0, 0.0, 0.0
-    score_path(data, limits, candidate.scratch, path, violations, objectives)
+    score_legs(data, limits, scratch, path, violations, objectives)
+    merit, feasible = _price(violations, objectives)
+    if merit >= best and (merit >= shortest or not feasible):
+        return merit, feasible
+    score_ground(data, limits, scratch, path, violations)
+    merit, feasible = _price(violations, objectives)
+    if merit >= best and (merit >= shortest or not feasible):
+        return merit, feasible
+    score_missiles(data, limits, scratch, path, violations, objectives)
+    merit, feasible = _price(violations, objectives)
+    if merit >= best and (merit >= shortest or not feasible):
+        return merit, feasible
+    score_airspace(data, scratch, path, violations)
     return _price(violations, objectives)
 
 
@@ -150,38 +208,48 @@ def _price(violations: Record, objectives: Record) -> tuple[float, bool]:  # pra
 
 
 @compiled
-def _search(
+def _begin_search(
+    data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats
+) -> _State:  # pragma: no cover - compiled
+    """The search at a vector (d,), with moves of these initial steps (k,), which it modifies."""
+    limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
+    best, fit = _merit(data, limits, frames, start, candidate, math.inf, math.inf)
+    feasible = np.full(start.size, np.inf)
+    if fit:
+        copy_into(feasible, start)
+    return _State(start, best, feasible, best if fit else math.inf, start.copy(), steps, 0, False, 1, False)
+
+
+@compiled
+def _continue_search(
     data: ProblemArrays,
     frames: WaypointFrames,
     box: _Box,
-    start: Floats,
     moves: Floats,
-    steps: Floats,
+    first: Floats,
+    state: _State,
+    until: int,
     max_evaluations: int,
-) -> _Found:  # pragma: no cover - compiled
-    """Search from a vector (d,) with moves (k, d) of these initial steps (k,), which it modifies."""
-    limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
-    feasible = np.full(start.size, np.inf)
-    here, trial, before = start.copy(), start.copy(), start.copy()
-    best, fit = _merit(data, limits, frames, here, candidate)
-    shortest = best if fit else math.inf
-    if fit:
-        copy_into(feasible, here)
-    made = 1
-    first = steps.copy()
+) -> _State:  # pragma: no cover - compiled
+    """The search, with moves (k, d) of initial steps `first` (k,), until at least so many evaluations are made."""
+    here, best, feasible, shortest, before, steps, move, alive, made, _ = state
+    limits, candidate, trial = precompute_limits(data), _make_candidate(data, here.size // 3 + 2), here.copy()
     while made < max_evaluations:
-        alive = False
-        copy_into(before, here)
+        if move == 0:
+            alive = False
+            copy_into(before, here)
         # The last trial of a round repeats the displacement of the whole round (pattern move).
-        for k in range(moves.shape[0] + 1):
+        for k in range(move, moves.shape[0] + 1):
+            if made >= until and made < max_evaluations:
+                return _State(here, best, feasible, shortest, before, steps, k, alive, made, False)
             if made >= max_evaluations or (k < moves.shape[0] and abs(steps[k]) < MIN_STEP * first[k]):
                 continue
             better = False
             for _ in range(2):
-                for d in range(start.size):
+                for d in range(here.size):
                     step = steps[k] * moves[k, d] if k < moves.shape[0] else here[d] - before[d]
                     trial[d] = min(box.upper[d], max(box.lower[d], here[d] + step))
-                merit, fit = _merit(data, limits, frames, trial, candidate)
+                merit, fit = _merit(data, limits, frames, trial, candidate, best, shortest)
                 made += 1
                 if fit and merit < shortest:
                     shortest = merit
@@ -196,6 +264,7 @@ def _search(
             if k < moves.shape[0]:
                 steps[k] *= 1.5 if better else 0.5
                 alive = True
+        move = 0
         if not alive:
             break
-    return _Found(feasible, here, shortest <= best, made)
+    return _State(here, best, feasible, shortest, before, steps, 0, alive, made, True)

@@ -6,6 +6,7 @@ to the cheapest of all routes that pass it on the left; the same two passes give
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -104,47 +105,105 @@ def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> Non
                 left[z, y] = math.inf
 
 
-@compiled
+class SideSearch(NamedTuple):
+    """A search for the costs of partial routes, as far as it has come: from the start, then back from the destination.
+
+    price: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
+    cells within the bound. done: stages that are done, of those there and back; twice the grid's once it has ended.
+    """
+
+    costs: GridCosts
+    step_layers: Records
+    obstacles: Records
+    price: Floats
+    spans: Records
+    home: int
+    goal: int
+    done: int
+
+
+# Cells of a grid that are reached between two calls of `pause`: some 10 ms.
+CELLS_AT_ONCE = 100_000
+
+
 def grid_costs(
-    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float
-) -> GridCosts:  # pragma: no cover - compiled
-    """Costs of the cheapest partial routes over a grid, from its start and to its destination, up to a bound."""
+    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
+) -> GridCosts:
+    """Costs of the cheapest partial routes over a grid, from its start and to its destination, up to a bound.
+
+    pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
+    """
+    stages = max(1, CELLS_AT_ONCE // (grid.across.size * grid.layers.size))
+    search: SideSearch = begin_grid_costs(data, frame, grid)
+    while search.done < 2 * grid.stages:
+        search = continue_grid_costs(data, frame, grid, bound, search, stages)
+        pause()
+    return search.costs
+
+
+@compiled
+def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:  # pragma: no cover - compiled
+    """A search that is at the start."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
-    pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
-    step_layers, required = layers_per_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
-    obstacles = find_obstacles(data, frame, step, grid.shrink)
     shape = (stages + 1, high, wide)
-    reached, left = np.full(shape, np.inf), np.full(shape, np.inf)
-    price, extra = np.full(shape, np.inf), np.zeros((stages + 1, wide))
-    parents, successors = np.zeros(shape, dtype=np.int32), np.zeros(shape, dtype=np.int32)
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
-    goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
-    rises, ahead = grid.layers - grid.layers[goal], np.empty(wide)
+    reached, left = np.full(shape, np.inf), np.full(shape, np.inf)
     spans = np.zeros((stages + 1, high), dtype=SPAN)
     for z in range(high):
         spans[0, z].first, spans[0, z].last = (home, home) if z == start else (wide, -1)
     reached[0, start, home] = 0.0
-    for stage in range(1, stages + 1):
-        low, last = wide, -1
-        for z in range(high):
-            low, last = min(low, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
-        low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
-        if low > last:
-            return GridCosts(reached, parents, left, successors)
-        set_cell_costs(data, required, frame, stage, obstacles, grid, extra, low, last, price[stage])
-        before, here = reached[stage - 1], reached[stage]
-        relax_stage(before, here, parents[stage], spans[stage - 1], step_layers, price[stage], step, pitch, grid.ratio)
-        distance_to_goal(wide, home, stages - stage, step, grid.ratio, ahead)
-        prune(reached[stage], spans[stage], ahead, rises, bound, low, last)
-    left[stages, goal, home] = 0.0
-    for stage in range(stages - 1, -1, -1):
+    return SideSearch(
+        GridCosts(reached, np.zeros(shape, dtype=np.int32), left, np.zeros(shape, dtype=np.int32)),
+        layers_per_step(data, frame, step, grid.layers, grid.ratio),
+        find_obstacles(data, frame, step, grid.shrink),
+        np.full(shape, np.inf),
+        spans,
+        home,
+        int(np.argmin(np.abs(grid.layers - data.destination[2]))),
+        0,
+    )
+
+
+@compiled
+def continue_grid_costs(
+    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, more: int
+) -> SideSearch:  # pragma: no cover - compiled
+    """The search after up to `more` further stages, or ended if no route comes further."""
+    stages, wide, high = grid.stages, grid.across.size, grid.layers.size
+    step, required = frame.length / stages, required_clearance(data)
+    pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
+    costs, step_layers, obstacles, price, spans, home, goal, done = search
+    reached, parents, left, successors = costs
+    rises, ahead, extra = grid.layers - grid.layers[goal], np.empty(wide), np.zeros((stages + 1, wide))
+    until = min(2 * stages, done + more)
+    for number in range(done, until):
+        stage = number + 1
+        if stage <= stages:
+            low, last = wide, -1
+            for z in range(high):
+                low, last = min(low, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
+            low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
+            if low > last:
+                until = 2 * stages
+                break
+            set_cell_costs(data, required, frame, stage, obstacles, grid, extra, low, last, price[stage])
+            before, here = reached[stage - 1], reached[stage]
+            relax_stage(
+                before, here, parents[stage], spans[stage - 1], step_layers, price[stage], step, pitch, grid.ratio
+            )
+            distance_to_goal(wide, home, stages - stage, step, grid.ratio, ahead)
+            prune(reached[stage], spans[stage], ahead, rises, bound, low, last)
+            continue
+        if number == stages:
+            left[stages, goal, home] = 0.0
+        stage = 2 * stages - 1 - number
         after, here = left[stage + 1], left[stage]
         _relax_stage_back(
             after, price[stage + 1], here, successors[stage], spans[stage], step_layers, step, pitch, grid.ratio
         )
         _bounded(reached[stage], left[stage], spans[stage], bound)
-    return GridCosts(reached, parents, left, successors)
+    return SideSearch(costs, step_layers, obstacles, price, spans, home, goal, until)
 
 
 @inlined
@@ -224,16 +283,17 @@ def side_routes(
     grid: Grid,
     bound: float,
     max_routes: int,
+    pause: Callable[[], None] = lambda: None,
 ) -> list[GridRoute]:
     """Up to `max_routes` routes with different sides and a cost of at most `bound`, cheapest first.
 
     Each is the cheapest that passes one obstacle on one side; the first is the cheapest of all. Of routes close to each
-    other only the cheapest is returned.
+    other only the cheapest is returned. pause: as in `grid_costs`.
     """
     if grid.layers.size == 0:
         return []
     step = frame.length / grid.stages
-    costs = grid_costs(data, frame, grid, bound)
+    costs = grid_costs(data, frame, grid, bound, pause)
     obstacles = find_obstacles(data, frame, step, grid.shrink)
     passings = cheapest_passings(costs, grid, obstacles, step).ravel()
     passings = passings[np.isfinite(passings["cost"])]
