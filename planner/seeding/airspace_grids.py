@@ -378,6 +378,9 @@ def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: n
 
 # Factor on the number of stages of a grid without zones: hills and gaps need short steps.
 FINER = 2
+# Bound on the cost of a first route, over that of the first on the grid before it. A finer grid's may cost a little
+# more, for it is freer to turn; the bound spares work and does not change the route.
+FINER_COST = 1.05
 # Minimum and maximum number of layers of a band of heights above ground.
 MIN_LAYERS, MAX_LAYERS = 8, 24
 # Minimum pitch of layers that do not follow the ground, as a share of the step along.
@@ -436,7 +439,7 @@ def airspace_routes(
                 yield route
         used: tuple[GridRoute, ...] = ()
         for _ in range(each):
-            route = _route(data, frame, grid, used, math.inf if used else expected, pause)
+            route = _route(data, frame, grid, used, math.inf if used else FINER_COST * expected, pause)
             if route is None:
                 break
             expected = expected if used else route.cost
