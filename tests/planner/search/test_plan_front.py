@@ -149,3 +149,14 @@ def test_margins_are_halved_and_given_up_where_the_default_plan_does_not_keep_th
         for name in ("kill_margin", "buffer", "start_buffer", "destination_buffer"):
             low, high = getattr(certified, name), getattr(search, name)
             assert getattr(scored, name) == pytest.approx((1.0 - share) * low + share * high)
+
+
+def test_a_front_that_is_to_end_is_begun_from_the_default_plan_alone(
+    scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def shorten(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(fronts, "shorten_path", shorten)
+    made = plan_front(scenario, limits, 6, seed=3, stop=lambda: "interrupted", generations=GENERATIONS)
+    assert [one.plan.safe for one in made.plans] == [True]

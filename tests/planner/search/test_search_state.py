@@ -1,22 +1,50 @@
 """Scores are ordered by constraints, then kill exposure, then length; equal ones keep their order."""
 
 import time
+from collections import Counter
 from collections.abc import Callable
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
+from planfly.airframe import load_airframe
 from planner.evaluation.certify import certify
-from planner.evaluation.problem import Problem
+from planner.evaluation.encoding import ENCODINGS
+from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Certificate, parse_plan, plan_json
 from planner.search import search_state
-from planner.search.algorithms import DEFAULT
+from planner.search.algorithms import ALGORITHMS, DEFAULT
 from planner.search.plan_path import plan_path
-from planner.search.search_state import DETECTION, HEIGHT, KILL, LENGTH, best_first, safe, score_table, violated
+from planner.search.search_state import (
+    DETECTION,
+    HEIGHT,
+    KILL,
+    LENGTH,
+    Search,
+    SearchEnded,
+    best_first,
+    safe,
+    score_table,
+    violated,
+)
+from planner.seeding import (
+    airspace_grids,
+    grids,
+    lattice,
+    pattern_search,
+    shortening,
+    side_routes,
+    waypoint_chains,
+    waypoint_fitting,
+)
+from tests.fresh_plans import fresh_scenario
 from tests.soak import SOAK
 from world.errors import ScenarioError
+from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, load_scenario, with_planner
 
 Floats = NDArray[np.float64]
@@ -136,6 +164,91 @@ def test_a_search_ends_within_fifty_milliseconds(
             return time.process_time() - ends[max(0, questions - 1)]
 
         assert any(ending() < AT_ONCE for _ in range(3))
+
+
+class Work:
+    """Work that kernels are asked for between two questions: the most of each kind, as calls of kernels."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Count from now on."""
+        self.since: Counter[str] = Counter()
+        self.most: Counter[str] = Counter()
+        for module, kernel in (
+            (airspace_grids, "continue_airspace_route"),
+            (grids, "continue_route"),
+            (side_routes, "continue_grid_costs"),
+            (lattice, "continue_lattice_search"),
+            (pattern_search, "_continue_search"),
+            (shortening, "continue_shortening"),
+            (waypoint_chains, "_advance"),
+            (waypoint_fitting, "_choose"),
+        ):
+            self._count(monkeypatch, module, kernel)
+
+    def _count(self, monkeypatch: pytest.MonkeyPatch, module: ModuleType, kernel: str) -> None:
+        called = getattr(module, kernel)
+
+        def counted(*arguments: Any) -> Any:
+            self.since[kernel] += 1
+            return called(*arguments)
+
+        monkeypatch.setattr(module, kernel, counted)
+
+    def ask(self) -> str:
+        """Go on, and begin to count anew."""
+        self.most |= self.since
+        self.since.clear()
+        return ""
+
+
+@pytest.mark.parametrize("number", [4001, 4134, 4286] if SOAK else [4001])
+def test_no_two_slices_of_work_are_done_without_a_question(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Among zones and below a greatest height, with no safe path where the numbers are larger: nearly all there is."""
+    scenario = fresh_scenario(number)
+    work = Work(monkeypatch)
+    plan_path(scenario, load_airframe(scenario).limits.surely(), seed=number + 1, stop=work.ask)
+    assert work.most["continue_airspace_route"] == 1
+    # Fitting and its rounds, which together are a few milliseconds.
+    assert work.most.pop("_choose") <= 5
+    assert set(work.most.values()) <= {1, 2}
+
+
+def test_a_search_without_a_result_goes_on_for_some_pauses(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    scenario = small(terrain={"kind": "flat", "amsl_m": 0})
+    problem = make_problem(scenario, make_limits(scenario))
+    encoding = ENCODINGS["rotated"](problem.space, scenario.planner.waypoints)
+    search = Search(problem, ALGORITHMS[DEFAULT], encoding, stream(1, PLANNER), None, lambda: "over", False, 10.0)
+    for _ in range(search_state.GRACE - 1):
+        search.pause()
+    with pytest.raises(SearchEnded):
+        search.pause()
+    assert search.ended == "over"
+    line = encoding.decode(search.archive.vectors)[0]
+    np.testing.assert_allclose(line[[0, -1]], [scenario.start, scenario.destination])
+    shares = (line - line[0]) @ (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0]) ** 2
+    np.testing.assert_allclose(line, line[0] + shares[:, None] * (line[-1] - line[0]), atol=1e-6)
+    # With a result it ends at once.
+    with pytest.raises(SearchEnded):
+        search.pause()
+
+
+def test_among_zones_a_stop_ends_a_search_whenever_it_comes() -> None:
+    scenario = fresh_scenario(4001)
+    limits = load_airframe(scenario).limits.surely()
+    asked: list[int] = []
+
+    def end(after: int) -> str:
+        asked.append(0)
+        return "interrupted" if len(asked) >= after else ""
+
+    for after in (1, 3, 10, 30):
+        asked.clear()
+        plan = plan_path(scenario, limits, seed=1, stop=lambda after=after: end(after))  # type: ignore[misc]
+        assert plan.ended == "interrupted"
+        assert len(plan.waypoints) == scenario.planner.waypoints
+        assert len(asked) <= after + search_state.GRACE + 4
 
 
 def test_few_paths_are_certified_once_a_search_is_to_end(

@@ -5,23 +5,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import planner.search.plan_path as plan_path_module
+import planner.search.seeds as seeds_module
+import planner.seeding.lattice as lattice_module
 from aircraft.path_limits import Limits
 from benchmarks.planning.wild_instances import wild_scenario
-from planner.evaluation.encoding import ENCODINGS, rotated_frame
-from planner.evaluation.problem import make_problem
+from planner.evaluation.encoding import ENCODINGS, RotatedFrame, rotated_frame
+from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.plan import Certificate
 from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search
-from planner.search.seeds import MIN_DETOUR, search_other_sides, starting_vectors, straight_line
+from planner.search.seeds import MIN_DETOUR, search_other_sides, search_turning_back, starting_vectors, straight_line
 from tests.instances import random_scenario
 from tests.soak import some
 from world.geometry import leg_courses, leg_runs
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, from_spec, load_scenario
 from world.scenario_file import parse_scenario
+
+Floats = NDArray[np.float64]
 
 FLAT = {"kind": "flat", "amsl_m": 0}
 GRIDS = ((24, 2),)
@@ -49,6 +54,26 @@ def test_one_seed_leads_and_the_archive_holds_what_it_was_improved_to(scenario: 
     assert starts.shape == (1, search.encoding.lower.size)
     assert search.best_is_safe()
     assert search.archive.scores[0, 4] <= search.score(starts)[0, 4]
+
+
+@pytest.mark.parametrize(("states", "searched"), [(None, 2), (20_000, 1)])
+def test_a_lattice_that_memory_makes_the_same_is_searched_once(
+    scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, states: int | None, searched: int
+) -> None:
+    """Where no route turns back, a lattice of smaller steps is tried; with few states allowed it is no finer."""
+    if states is not None:
+        monkeypatch.setattr(lattice_module, "MAX_LATTICE_STATES", states)
+    steps: list[float] = []
+
+    def find_none(data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None]) -> Floats:
+        steps.append(step)
+        return np.empty((0, 3))
+
+    monkeypatch.setattr(seeds_module, "lattice_route", find_none)
+    search = search_of(scenario, limits)
+    search.evaluate(search.straight_vectors())
+    search_turning_back(search, search.best_path())
+    assert len(steps) == searched
 
 
 def test_an_older_path_is_started_from_too(scenario: Scenario, limits: Limits) -> None:

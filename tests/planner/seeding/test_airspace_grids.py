@@ -1,5 +1,6 @@
 """Routes over a grid among zones and in a band of heights: which gaps they take, and that they are the shortest."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_ZONE_MARGIN, ProblemArrays, make_problem
+from planner.seeding import airspace_grids
 from planner.seeding.airspace_grids import (
     FINER,
     MAX_CELLS,
@@ -200,3 +202,55 @@ def test_routes_of_one_grid_take_both_sides(
     assert middles[0] < -800.0
     assert middles[1] > 1000.0
     assert routes[0].cost < routes[1].cost
+
+
+def test_a_search_in_slices_finds_the_same_route_and_asks_after_each(made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = made(zones=[wall(-2900.0, 700.0), wall(900.0, 2900.0)])
+    frame = rotated_frame(data.start, data.destination)
+    grid = AirspaceGrid(60, ACROSS, 3, 20.0, False, 130.0, gentle=True)
+    extra, asked = np.zeros((61, ACROSS.size)), list[int]()
+    whole, cost = cheapest_airspace_route(data, frame, grid, extra, np.inf, lambda: asked.append(0))
+    assert len(whole) == 61
+    assert len(asked) == 1
+    # Two stages of 41 x 3 cells at once: each of thirty slices.
+    monkeypatch.setattr(airspace_grids, "CELLS_AT_ONCE", 2 * 41 * 3)
+    sliced, same = cheapest_airspace_route(data, frame, grid, extra, np.inf, lambda: asked.append(0))
+    assert len(asked) == 1 + 30
+    np.testing.assert_array_equal(whole, sliced)
+    assert cost == same
+
+
+def test_a_bound_on_the_cost_changes_no_route_below_it(made: Made) -> None:
+    data = made(zones=[wall(-2900.0, 700.0), wall(900.0, 2900.0)])
+    frame = rotated_frame(data.start, data.destination)
+    grid = AirspaceGrid(60, ACROSS, 3, 20.0, False, 130.0, gentle=True)
+    extra = np.zeros((61, ACROSS.size))
+    whole, cost = cheapest_airspace_route(data, frame, grid, extra, np.inf)
+    for more in (1.0, 30.0, 3000.0):
+        bounded, same = cheapest_airspace_route(data, frame, grid, extra, cost + more)
+        np.testing.assert_array_equal(whole, bounded)
+        assert cost == same
+    assert len(cheapest_airspace_route(data, frame, grid, extra, cost - 1.0)[0]) == 0
+
+
+def test_a_search_that_comes_no_further_ends(made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = made(zones=[wall(-2900.0, 2900.0)])
+    frame = rotated_frame(data.start, data.destination)
+    grid, asked = AirspaceGrid(60, ACROSS, 3, 20.0, False, 130.0), list[int]()
+    monkeypatch.setattr(airspace_grids, "CELLS_AT_ONCE", 1)
+    points, cost = cheapest_airspace_route(
+        data, frame, grid, np.zeros((61, ACROSS.size)), np.inf, lambda: asked.append(0)
+    )
+    assert len(points) == 0
+    assert cost == math.inf
+    # The wall is half way, at stage 30 of 60.
+    assert 25 <= len(asked) <= 32
+
+
+def test_what_a_pause_raises_ends_the_routes(made: Made) -> None:
+    def end() -> None:
+        raise KeyboardInterrupt
+
+    data = made(zones=[wall(-2900.0, 700.0)])
+    with pytest.raises(KeyboardInterrupt):
+        next(airspace_routes(data, rotated_frame(data.start, data.destination), (-2000.0, 2000.0), ((20, 1),), end))

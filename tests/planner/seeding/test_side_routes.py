@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
+from planner.seeding import side_routes as side_routes_module
 from planner.seeding.grids import KILL_COST, SIDEWAYS, Grid, cheapest_route, find_obstacles, grid_route, make_grid
 from planner.seeding.side_routes import (
     LEFT,
@@ -114,6 +115,26 @@ def test_beyond_the_bound_there_is_no_way(data: ProblemArrays) -> None:
     assert (kept[total <= bound] == total[total <= bound]).all()
     assert np.isinf(kept[total > bound + 1e-6]).all()
     assert np.isinf(kept).sum() > np.isinf(total).sum()
+
+
+def test_costs_in_slices_are_the_same_and_it_asks_after_each(
+    data: ProblemArrays, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame, asked = rotated_frame(data.start, data.destination), list[int]()
+    whole = grid_costs(data, frame, GRID, 9000.0, lambda: asked.append(0))
+    assert len(asked) == 1
+    # One stage of ten cells at once: there and back over six.
+    monkeypatch.setattr(side_routes_module, "CELLS_AT_ONCE", 10)
+    sliced = grid_costs(data, frame, GRID, 9000.0, lambda: asked.append(0))
+    assert len(asked) == 1 + 12
+    for one, other in zip(whole, sliced, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+    def end() -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        side_routes(data, frame, GRID, 9000.0, 4, end)
 
 
 # ----------------------------------------------------------------------
