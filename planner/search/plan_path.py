@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
+from planner.airspace.zone_limits import is_limited
 from planner.evaluation.certify import kill_distance
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
@@ -50,6 +51,9 @@ ATTEMPTS = (
     (((24, 3), (52, 3), (80, 3), (110, 2)), 2),
     (((44, 3), (96, 3), (160, 2)), 3),
 )
+# Attempts among zones, where grids take the longest and a second has not led to a safe path yet: see
+# `planner.search.seeds.MAX_FOLLOWED_AGAIN`.
+MAX_ATTEMPTS_AMONG_ZONES = 2
 # Maximum evaluations of the final pattern search.
 LAST_SEARCH = 200
 # Scales of the moves that finally tighten the best path, relative to those that fit a seed; and rounds of each.
@@ -118,9 +122,11 @@ def plan_path(
 
 def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:
     """Search, and search again with finer grids and more samples while the certificate fails."""
-    attempts = ATTEMPTS if search.algorithm.seeded else ATTEMPTS[:1]
+    attempts = len(ATTEMPTS) if search.algorithm.seeded else 1
+    if is_limited(search.problem.search.airspace):
+        attempts = min(attempts, MAX_ATTEMPTS_AMONG_ZONES)
     best: tuple[Floats, Certificate] | None = None
-    for number in range(len(attempts)):
+    for number in range(attempts):
         if number > 0:
             _retry(search, number)
         try:
@@ -196,7 +202,7 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
         search.record()
         search.report(0)
         return
-    starts = starting_vectors(search, grids, previous)
+    starts = starting_vectors(search, grids, previous, again=number > 0)
     if len(search.archive.scores) and (search.first_safe_found() or search.must_end()):
         search.record()
         return

@@ -77,6 +77,9 @@ ARCHIVE_SIZE = 24
 EXTRA_MARGINS = (0.1, 2.0)
 # The same for further attempts from the first path, with corners as flown, where legs have to hold their turns.
 CORNER_MARGINS = (2.0, 5.0)
+# Additional margins of slopes, rad, for last attempts with a path that fails by its slopes alone: where a leg climbs as
+# steeply as it may, shortening ends some hundredths of a degree beyond that.
+SLOPE_MARGINS = (math.radians(0.2), math.radians(0.6))
 # A path that is still this deep inside a missile's sphere once it is shortened is not tried with other margins, m.
 HOPELESS = 15.0
 # What a search keeps from missiles in gaps that are too narrow for its usual margin, beside the certificate's, m.
@@ -274,17 +277,23 @@ class Search:
 
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""
-        attempts = [(margin, False) for margin in EXTRA_MARGINS]
-        if self.problem.search.legs_hold_turns:
-            attempts += [(margin, True) for margin in CORNER_MARGINS]
-        first = path
-        for extra_margin, corners_too in attempts:
+        data = self.problem.search
+        attempts = [(margin, False, 0.0) for margin in EXTRA_MARGINS]
+        if data.legs_hold_turns:
+            attempts += [(margin, True, 0.0) for margin in CORNER_MARGINS]
+        attempts += [(EXTRA_MARGINS[-1], False, angle) for angle in SLOPE_MARGINS]
+        first, certificate = path, None
+        for extra_margin, corners_too, angle in attempts:
             path = first if corners_too else path
+            if angle > 0.0 and not (certificate and self._fails_by_slopes(certificate)):
+                return False
             if self._budget() - self.evaluations < MAX_MODELS:
                 self.budget_exhausted = True
                 return False
+            # Another problem has to be laid out for kernels anew.
+            stricter = data._replace(angle_margin=data.angle_margin + angle) if angle > 0.0 else data
             path, made = shorten_path(
-                self.problem.search, path, extra_margin=extra_margin, corners_too=corners_too, pause=self.pause
+                stricter, path, extra_margin=extra_margin, corners_too=corners_too, pause=self.pause
             )
             self.evaluations += made
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight():
@@ -298,6 +307,12 @@ class Search:
             if certificate.kill_distance < -HOPELESS:
                 return False
         return False
+
+    def _fails_by_slopes(self, certificate: Certificate) -> bool:
+        """Whether a path meets all but the limits of slopes."""
+        others = certificate.turn, certificate.clearance, certificate.bounds, certificate.zone_distance
+        keeps_off = certificate.kill_distance >= self.required_distance and certificate.headroom >= 0.0
+        return certificate.slope < self.problem.certified.angle_margin and keeps_off and min(others) >= 0.0
 
     def must_end(self) -> bool:
         """Whether the search must end now: stopped, or out of budget."""

@@ -424,15 +424,21 @@ def airspace_routes(
     span: tuple[float, float],
     grids: tuple[tuple[int, int], ...],
     pause: Callable[[], None] = lambda: None,
+    *,
+    finer_only: bool = False,
 ) -> Iterator[GridRoute]:
     """Routes in the order found, for each grid (stages, number of different routes), with `FINER` times its stages.
 
     Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
     gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
+    finer_only: whether to leave out grids that `MAX_CELLS` makes no finer than one before.
     """
-    expected = EXPECTED * math.dist(data.start, data.destination)
+    expected, finest = EXPECTED * math.dist(data.start, data.destination), 0
     for number, (stages, each) in enumerate(grids):
         grid = airspace_grid(data, frame, span, FINER * stages)
+        if finer_only and grid.stages <= finest:
+            continue
+        finest = max(finest, grid.stages)
         if number == 0:
             route = _route(data, frame, grid._replace(gentle=False), (), expected, pause)
             if route is not None:

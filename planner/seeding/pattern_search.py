@@ -220,6 +220,16 @@ def _begin_search(
     return _State(start, best, feasible, best if fit else math.inf, start.copy(), steps, 0, False, 1, False)
 
 
+@inner
+def _move_all(
+    box: _Box, moves: Floats, k: int, steps: Floats, before: Floats, here: Floats, trial: Floats
+) -> None:  # pragma: no cover - compiled
+    """Fill a trial (d,): the vector after move k, or after the whole round's displacement if k is beyond the last."""
+    for d in range(here.size):
+        step = steps[k] * moves[k, d] if k < moves.shape[0] else here[d] - before[d]
+        trial[d] = min(box.upper[d], max(box.lower[d], here[d] + step))
+
+
 @compiled
 def _continue_search(
     data: ProblemArrays,
@@ -246,9 +256,7 @@ def _continue_search(
                 continue
             better = False
             for _ in range(2):
-                for d in range(here.size):
-                    step = steps[k] * moves[k, d] if k < moves.shape[0] else here[d] - before[d]
-                    trial[d] = min(box.upper[d], max(box.lower[d], here[d] + step))
+                _move_all(box, moves, k, steps, before, here, trial)
                 merit, fit = _merit(data, limits, frames, trial, candidate, best, shortest)
                 made += 1
                 if fit and merit < shortest:

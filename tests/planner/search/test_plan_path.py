@@ -5,14 +5,39 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+import planner.search.plan_path as plan_path_module
 from aircraft.path_limits import Limits
 from planner.plan import Objective, parse_plan, plan_json
 from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_path import plan_path
+from planner.search.search_state import Search
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario
 
 FLAT = {"kind": "flat", "amsl_m": 0}
+
+
+def test_among_zones_there_are_two_attempts_at_most(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each finds the straight line, through a zone or a missile; without zones there are three attempts."""
+    monkeypatch.setattr(plan_path_module, "may_try_again", lambda _: True)
+    monkeypatch.setattr(plan_path_module, "is_closed", lambda _: False)
+    monkeypatch.setattr(plan_path_module, "may_turn_back", lambda *_: False)
+    made: list[int] = []
+
+    def attempt(search: Search, number: int, _: object) -> None:
+        made.append(number)
+        search.evaluate(search.straight_vectors())
+
+    monkeypatch.setattr(plan_path_module, "_attempt", attempt)
+    zone = {"name": "it", "kind": "exclusion", "east_m": 3000, "north_m": 0, "radius_m": 500}
+    missile = {"east_m": 3000, "north_m": 0, "kill_radius_m": 500, "kill_scale_m": 100}
+    for obstacles, attempts in (({"zones": [zone], "threats": []}, 2), ({"threats": [missile]}, 3)):
+        made.clear()
+        scenario = small(terrain=FLAT, **obstacles)
+        assert not plan_path(scenario, make_limits(scenario), seed=1).safe
+        assert made == list(range(attempts))
 
 
 @pytest.mark.parametrize("name", ["fda-seeded", "fda", "umda-smooth", "umda"])

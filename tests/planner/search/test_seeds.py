@@ -12,6 +12,7 @@ import planner.search.seeds as seeds_module
 import planner.seeding.lattice as lattice_module
 from aircraft.path_limits import Limits
 from benchmarks.planning.wild_instances import wild_scenario
+from planfly.airframe import load_airframe
 from planner.evaluation.encoding import ENCODINGS, RotatedFrame, rotated_frame
 from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.plan import Certificate
@@ -19,6 +20,7 @@ from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search
 from planner.search.seeds import MIN_DETOUR, search_other_sides, search_turning_back, starting_vectors, straight_line
+from planner.seeding.grids import GridRoute
 from tests.instances import random_scenario
 from tests.soak import some
 from world.geometry import leg_courses, leg_runs
@@ -74,6 +76,40 @@ def test_a_lattice_that_memory_makes_the_same_is_searched_once(
     search.evaluate(search.straight_vectors())
     search_turning_back(search, search.best_path())
     assert len(steps) == searched
+
+
+def test_among_zones_a_later_attempt_follows_the_best_routes_alone(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seven routes that lead straight through a zone: none is safe, and each that is followed is improved."""
+    zone = {"name": "it", "kind": "exclusion", "east_m": 3000, "north_m": 0, "radius_m": 500}
+    scenario = small(terrain=FLAT, zones=[zone])
+    followed: list[int] = []
+    for again in (False, True):
+        search = search_of(scenario, make_limits(scenario))
+        route = GridRoute(np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]]), 6000.0)
+        monkeypatch.setattr(seeds_module, "_routes", lambda *_, route=route: [route] * 7)
+        improved: list[int] = []
+        monkeypatch.setattr(
+            Search,
+            "improve",
+            lambda self, *_, improved=improved: improved.append(0) or self.evaluate(straight(self))[0],
+        )
+        starting_vectors(search, GRIDS, None, again=again)
+        followed.append(len(improved))
+    assert followed == [7, 3]
+
+
+def straight(search: Search) -> Floats:
+    return search.straight_vectors()
+
+
+def test_a_path_that_fails_by_its_slopes_alone_is_shortened_with_gentler_ones() -> None:
+    """The climb at the start of the shortest way is as steep as may be; its length is that of the lattice search."""
+    scenario = wild_scenario(169, "ideal")
+    plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    assert plan.safe
+    assert plan.objectives[0] < 1.005 * 1.04238
 
 
 def test_an_older_path_is_started_from_too(scenario: Scenario, limits: Limits) -> None:
