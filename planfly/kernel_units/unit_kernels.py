@@ -129,6 +129,6 @@ def kernels_of(units: tuple[str, ...]) -> frozenset[str]:
     """All kernels of units, each once.
 
     >>> len(kernels_of(("scores", "paper")))
-    12
+    13
     """
     return frozenset(name for unit in units for name in UNIT_KERNELS[unit])

@@ -244,6 +244,7 @@ def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
         legs += chains.legs
         if chains.cost[1:-1].min() <= bound * straight < math.inf or legs >= left:
             break
+        search.pause()
     return chains._replace(legs=legs)
 
 
