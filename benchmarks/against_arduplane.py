@@ -28,7 +28,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
 from planfly.airframe import Airframe, load_airframe
-from planfly.pipeline import make_plan, make_setup
+from planfly.make_plan import make_plan, make_setup
 from planner.evaluation.problem import TURBULENCE_SHARE
 from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario

@@ -25,7 +25,8 @@ from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import Airframe, load_airframe
-from planfly.pipeline import BATCH, make_plan, make_setup
+from planfly.make_plan import make_plan, make_setup
+from planfly.pipeline import BATCH
 from world.scenario import load_scenario
 
 ROUNDS = 5

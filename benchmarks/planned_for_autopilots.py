@@ -15,7 +15,8 @@ from flight.mission.from_plan import plan_mission
 from planfly.airframe import load_airframe
 from planfly.api.planning import flight_entries
 from planfly.arguments import CHOICES
-from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from planfly.make_plan import make_plan, make_setup
+from planfly.pipeline import fly_and_judge
 from tests.autopilot_plans import CLEARANCE, Harm, harm_of, plan_scenario
 from world.scenario import with_flight
 

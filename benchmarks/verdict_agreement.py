@@ -22,7 +22,8 @@ from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import Airframe, load_airframe
 from planfly.api.planning import flight_entries
 from planfly.arguments import CHOICES
-from planfly.pipeline import fly_and_judge, make_setup
+from planfly.make_plan import make_setup
+from planfly.pipeline import fly_and_judge
 from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
 
 # By so much at least clearance is lost, or a sphere entered, to count as grave, m.

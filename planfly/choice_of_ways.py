@@ -3,7 +3,7 @@
 from planfly.airframe import Airframe
 from planfly.gust_circles import waypoints_in_gusts
 from planfly.gust_heights import limits_of_others
-from planfly.pipeline import Advance, finish_plan, make_plan
+from planfly.make_plan import Advance, finish_plan, make_plan
 from planner.plan import Plan
 from planner.search.plan_front import Front, plan_front
 from planner.search.search_state import StopCondition
@@ -20,7 +20,7 @@ def make_front(
     stop: StopCondition | None = None,
     onward: bool = False,
 ) -> Front:
-    """Up to `count` plans of a front, each of which is safe by all that `planfly.pipeline.make_plan` looks at.
+    """Up to `count` plans of a front, each of which is safe by all that `planfly.make_plan.make_plan` looks at.
 
     The default plan is that of `make_plan`, and where it is not safe there is no front. Others that are not safe once
     they are finished are left out; where gusts make the autopilot circle, they have no more waypoints than gusts allow.

@@ -31,8 +31,8 @@ from logs.verdict.imported.judge_imported_flight import missing_text
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import find_airframe
+from planfly.make_plan import Advance
 from planfly.open_mission import NamedFences, ScenarioChange, open_plan
-from planfly.pipeline import Advance
 from world.errors import LogError, MissionError
 from world.scenario import Scenario, load_scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable

@@ -16,7 +16,7 @@ from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.rules.fence_rule import zone_test
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.pipeline import make_setup
+from planfly.make_plan import make_setup
 from planner.plan import Plan, parse_plan, plan_json, read_plan
 from world.airspace.zone_files import FileZones, is_zone_file, read_zone_file
 from world.errors import MissionError, PlanflyError
@@ -250,7 +250,7 @@ def open_planned(
 ) -> OpenedMission:
     """A plan that is at hand, opened as `open_mission` opens the file of one; its mission's source is plan.json.
 
-    >>> from planfly.pipeline import make_plan
+    >>> from planfly.make_plan import make_plan
     >>> scenario = load_scenario("paper-07")
     >>> opened = open_planned(make_plan(scenario, load_airframe(scenario), 1))
     >>> opened.name, opened.setup.mission.source

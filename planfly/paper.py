@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from planfly.airframe import load_airframe
 from planfly.arguments import check_arguments
-from planfly.pipeline import Advance, make_plan
+from planfly.make_plan import Advance, make_plan
 from planfly.stages import stage
 from planfly.targets import prepare_folder, refuse_folder
 from planner.plan import Objective, Violation

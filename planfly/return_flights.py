@@ -15,7 +15,7 @@ from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import ReturnWorld
 from planfly.airframe import Airframe, load_airframe
-from planfly.pipeline import make_setup
+from planfly.make_plan import make_setup
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.kernels import Record

@@ -48,8 +48,8 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.registry import rule_word
 from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.make_plan import make_setup
 from planfly.open_mission import NamedFences, open_mission
-from planfly.pipeline import make_setup
 from planfly.reference_flights import judge_with_reference_flights
 from world.errors import PlanflyError
 from world.frames import to_geo

@@ -16,7 +16,8 @@ from logs.verdict.findings import Verdict
 from logs.verdict.measures.route_requirements import surveys_of
 from logs.verdict.rules.registry import RULES
 from planfly.airframe import Airframe, load_airframe
-from planfly.pipeline import fly_and_judge, make_setup
+from planfly.make_plan import make_setup
+from planfly.pipeline import fly_and_judge
 from planfly.reference_flights import deciding_parameter
 from world.errors import PlanflyError
 from world.scenario import with_flight

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.airspace.scenarios import HALF, SEED, star
 from planfly.airframe import load_airframe
-from planfly.pipeline import make_plan
+from planfly.make_plan import make_plan
 from world.scenario import Scenario, from_spec
 
 

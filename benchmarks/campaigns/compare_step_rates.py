@@ -18,7 +18,7 @@ from flight.simulation.simulate import SimulatedFlight, simulate
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import Airframe, load_airframe
-from planfly.pipeline import make_setup
+from planfly.make_plan import make_setup
 from tests.field_missions import FieldMission, close_mission, ordinary_mission
 from world.scenario import Scenario
 from world.wind import Wind

@@ -12,7 +12,7 @@ from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, load_a
 from planfly.arguments import check_arguments, is_wind
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import PLANNING
-from planfly.pipeline import make_plan
+from planfly.make_plan import make_plan
 from planfly.stages import stage
 from planfly.targets import file_target
 from planner.plan import Plan, plan_json, read_plan

@@ -22,7 +22,8 @@ from planfly.arguments import check_arguments
 from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, flight_kind, flight_text
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING
-from planfly.pipeline import autopilot_log, fly_and_judge, make_plan, make_setup, planned_for
+from planfly.make_plan import make_plan, make_setup, planned_for
+from planfly.pipeline import autopilot_log, fly_and_judge
 from planfly.refine import refine as refine_rounds
 from planfly.returns_beside import returns_beside
 from planfly.stages import say_replaced, stage

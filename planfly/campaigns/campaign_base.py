@@ -22,8 +22,9 @@ from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, setup_conditions
 from planfly.airframe import Airframe, bank_limit, choose_seed, load_airframe, with_tracking
 from planfly.campaigns.dispersions import DEFAULT, DRAWN, Dispersions, Draw, SpreadError
+from planfly.make_plan import Advance, make_plan, make_setup
 from planfly.open_mission import NamedFences, OpenedMission, ScenarioChange, open_mission, open_planned
-from planfly.pipeline import Advance, OffNominal, make_plan, make_setup
+from planfly.pipeline import OffNominal
 from planner.plan import Plan, plan_json, read_plan
 from world.errors import FlightError, MissionError
 from world.files import write_whole

@@ -33,7 +33,7 @@ from planfly import __version__
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.private_cluster import keep_steady_time, private_security
-from planfly.pipeline import Advance
+from planfly.make_plan import Advance
 from planfly.process_setup import PARENT
 from world.errors import PlanflyError
 from world.files import temporary_folder

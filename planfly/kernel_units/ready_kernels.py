@@ -19,7 +19,8 @@ from flight.simulation.setup import make_limits
 from logs.recording.recorder import Recorder
 from planfly.airframe import Airframe, find_airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
-from planfly.pipeline import fly_and_judge, make_setup
+from planfly.make_plan import make_setup
+from planfly.pipeline import fly_and_judge
 from planfly.returns_beside import returns_beside, returns_line
 from planner.evaluation.problem import make_problem
 from planner.search.kernel_calls import FEW, FRONT, PARTS, call_kernels

@@ -19,8 +19,8 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import Airframe
+from planfly.make_plan import make_setup
 from planfly.open_mission import NamedFences, OpenedMission
-from planfly.pipeline import make_setup
 from planfly.studio.edits import places
 from planfly.studio.settings import SetParameters
 from planner.plan import Plan

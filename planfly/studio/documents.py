@@ -22,8 +22,8 @@ from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.api.flying import opened_mission
 from planfly.api.imported import read_imported
 from planfly.imported_flights import ImportedFlight
+from planfly.make_plan import make_setup
 from planfly.open_mission import MCAP_MAGIC, OpenedMission, ScenarioChange, is_log
-from planfly.pipeline import make_setup
 from planfly.studio.desk import Desk, Judged
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores

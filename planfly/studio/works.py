@@ -19,7 +19,8 @@ from logs.verdict.measures.route_requirements import route_requirements
 from logs.views.failures import track_distance
 from planfly.airframe import Airframe
 from planfly.choice_of_ways import make_front
-from planfly.pipeline import fly_and_judge, make_plan
+from planfly.make_plan import make_plan
+from planfly.pipeline import fly_and_judge
 from planfly.studio.changes import flight_figures
 from planfly.studio.desk import Desk
 from planfly.studio.pilot import Advance

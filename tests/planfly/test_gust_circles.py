@@ -11,7 +11,7 @@ import pytest
 from flight.autopilots.px4.autopilot import Px4
 from planfly.airframe import Airframe, load_airframe
 from planfly.gust_circles import MOST_CIRCLES, expected_circles, settle_in_gusts
-from planfly.pipeline import make_plan
+from planfly.make_plan import make_plan
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from tests.setups import spec_around

@@ -43,7 +43,7 @@ STAGES = (
     "flight.mission.itinerary:make_itinerary",
     "flight.mission.placing:place_stops",
     "flight.mission.route:lay_route",
-    "planfly.pipeline:make_setup",
+    "planfly.make_plan:make_setup",
     "flight.guidance.path:fly_by_path",
     "flight.simulation.local_map:LocalMap.around",
     "flight.simulation.simulate:fly_to_end",

@@ -12,7 +12,8 @@ from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import load_airframe
 from planfly.cli import main
-from planfly.pipeline import fly_and_judge, make_setup
+from planfly.make_plan import make_setup
+from planfly.pipeline import fly_and_judge
 from tests.mission_lines import ORIGIN, mission, wp
 from tests.setups import spec_around
 from tests.soak import some

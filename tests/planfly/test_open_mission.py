@@ -16,8 +16,8 @@ from logs.recording.reader import read_log
 from logs.verdict.judge_flight import judge_geometry
 from planfly.airframe import load_airframe
 from planfly.cli import main
+from planfly.make_plan import make_plan
 from planfly.open_mission import fence_of_plan, is_log, open_mission, open_plan, read_named_fences
-from planfly.pipeline import make_plan
 from planfly.served_flights import ServeOptions, open_served
 from planner.plan import plan_json
 from tests.mission_lines import a_plan, setup_of, wp

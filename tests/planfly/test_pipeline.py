@@ -9,7 +9,8 @@ import pytest
 from logs.recording.reader import read_log
 from logs.verdict.findings import verdict_json
 from planfly.airframe import load_airframe
-from planfly.pipeline import fly_and_judge, make_setup, plan_then_fly
+from planfly.make_plan import make_setup
+from planfly.pipeline import fly_and_judge, plan_then_fly
 from tests.setups import small_scenario, waypoint_mission
 
 POINTS = np.array([[0.0, 0.0, 300.0], [900.0, 0.0, 300.0], [1500.0, 300.0, 320.0]])

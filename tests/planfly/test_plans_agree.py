@@ -11,7 +11,7 @@ import planfly
 from planfly import choice_of_ways
 from planfly.airframe import load_airframe
 from planfly.gust_circles import MOST_CIRCLES, expected_circles, waypoints_in_gusts
-from planfly.pipeline import make_plan
+from planfly.make_plan import make_plan
 from planfly.studio import works
 from planner.plan import Plan
 from tests.planfly.test_gust_circles import SEED, scenario_of

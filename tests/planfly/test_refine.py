@@ -13,7 +13,7 @@ from logs.verdict.judge_flight import judge_flight
 from logs.verdict.places import FLIGHT, Place
 from planfly.airframe import load_airframe
 from planfly.cli import main
-from planfly.pipeline import make_plan, make_setup
+from planfly.make_plan import make_plan, make_setup
 from planfly.refine import GO_ON, refine, tighten_limits
 from tests.planfly.conftest import FIELD
 from tests.synthetic import fly_path

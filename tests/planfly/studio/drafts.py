@@ -7,8 +7,8 @@ import numpy as np
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from planfly.airframe import Airframe, load_airframe
+from planfly.make_plan import make_setup
 from planfly.open_mission import OpenedMission
-from planfly.pipeline import make_setup
 from planfly.studio.documents import Document, World
 from planfly.studio.session import Session
 from world.errors import MissionError

@@ -19,7 +19,7 @@ from tests.soak import SOAK
 ROOT = Path(__file__).parents[3]
 SCRIPT = """
 import hashlib
-from planfly.pipeline import make_plan
+from planfly.make_plan import make_plan
 from planfly.airframe import load_airframe
 from planner.plan import plan_json
 from world.scenario import load_scenario

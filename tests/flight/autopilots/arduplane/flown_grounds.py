@@ -20,7 +20,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import SimulatedFlight, simulate
 from flight.simulation.track import Track
 from planfly.airframe import load_airframe
-from planfly.pipeline import make_setup
+from planfly.make_plan import make_setup
 from tests.setups import spec_around
 from world.airfield import LandingStrip, Launch
 from world.frames import to_geo

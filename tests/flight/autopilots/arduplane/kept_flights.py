@@ -17,7 +17,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
 from planfly.airframe import load_airframe
-from planfly.pipeline import make_setup
+from planfly.make_plan import make_setup
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
 from world.wind import Wind

@@ -17,7 +17,7 @@ from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import SimulatedFlight, simulate
 from planfly.airframe import load_airframe
-from planfly.pipeline import make_setup
+from planfly.make_plan import make_setup
 from world.frames import GeoOrigin, to_map
 from world.scenario import from_spec
 

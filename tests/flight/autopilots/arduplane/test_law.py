@@ -30,7 +30,7 @@ from flight.guidance.navigation_error import MOTION
 from flight.mission_files.formats import parse_mission
 from flight.simulation.simulate import Flight, simulate
 from planfly.airframe import load_airframe
-from planfly.pipeline import make_setup as setup_of
+from planfly.make_plan import make_setup as setup_of
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record, state, waypoints
 from tests.setups import MakeSetup
 from tests.soak import SOAK

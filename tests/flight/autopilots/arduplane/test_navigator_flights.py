@@ -11,7 +11,7 @@ from flight.autopilots.arduplane.parameters import load_parameters
 from flight.simulation.simulate import simulate
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly.airframe import load_airframe
-from planfly.pipeline import make_setup
+from planfly.make_plan import make_setup
 from tests.flight.autopilots.arduplane.kept_missions import (
     CIRCLES,
     CORNERS,

@@ -18,7 +18,7 @@ from flight.simulation.simulate import simulate
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly.airframe import bank_limit, load_airframe
-from planfly.pipeline import make_setup
+from planfly.make_plan import make_setup
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
 from tests.soak import some

@@ -1,0 +1,143 @@
+"""A plan of a scenario for whoever flies it, as every command makes it, and what decides the flight of its mission."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
+
+from aircraft.path_limits import Limits
+from flight.mission.fences import fence_zones
+from flight.mission.field_notes import field_notes
+from flight.mission.from_plan import plan_mission
+from flight.mission.items import Mission
+from flight.mission.placing import PlacedMission
+from flight.mission.route import lay_route, make_route, with_end_courses
+from flight.mission_files.formats import mission_text
+from flight.simulation.setup import FDM_HZ, FlightSetup
+from logs.verdict.conditions import Conditions, conditions_of
+from logs.verdict.measures.circle_reach import beside_end
+from logs.verdict.measures.route_requirements import route_requirements
+from planfly.airframe import Airframe, laid_from_the_ground
+from planfly.gust_circles import settle_in_gusts
+from planfly.gust_heights import keep_height
+from planner.plan import Plan
+from planner.search.plan_path import plan_path
+from planner.search.replan import Search, replan
+from planner.search.search_state import StopCondition
+from world.scenario import Scenario
+
+# Takes how far a stage is: done, total, a remark.
+Advance = Callable[[float, float, str], None]
+
+
+def planned_for(scenario: Scenario, airframe: Airframe) -> Conditions:
+    """What a plan of a scenario is for."""
+    return conditions_of(scenario, airframe.aircraft.name, airframe.airspeed, airframe.autopilot)
+
+
+def make_plan(
+    scenario: Scenario,
+    airframe: Airframe,
+    seed: int,
+    algorithm: str | None = None,
+    advance: Advance | None = None,
+    *,
+    stop: StopCondition | None = None,
+    flown: tuple[Plan, int] | None = None,
+    onward: bool = False,
+) -> Plan:
+    """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
+
+    All commands plan by this, so that what one calls safe no other calls unsafe. Where gusts make the autopilot circle
+    at waypoints, the plan has as few of them as it can do with (`planfly.gust_circles`); where downdrafts take it down,
+    it keeps as much height (`planfly.gust_heights`); the ways from and to the ground are laid; and where the autopilot
+    circles at the mission's end, the certificate names what that may come too near to.
+
+    stop: as of `planner.search.plan_path.plan_path`.
+    flown: the plan that is being flown, and the leg to plan again from; None for a new plan.
+    onward: whether the mission that it becomes a part of goes on from its destination.
+    """
+    limits = airframe.limits.surely()
+
+    def settle(plan: Plan, search: Search) -> Plan:
+        few = settle_in_gusts(plan, airframe, lambda asked: search(asked, limits))
+        return keep_height(few, airframe, lambda kept: search(plan.scenario, kept))
+
+    if flown is not None:
+        old, leg = flown
+        again = replan(
+            scenario, limits, old, leg, seed=seed, algorithm=algorithm, progress=advance, stop=stop, settle=settle
+        )
+        return _completed(again, airframe, old, onward=onward)
+
+    def search(world: Scenario, within: Limits) -> Plan:
+        return plan_path(world, within, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
+
+    return _completed(settle(search(scenario, limits), search), airframe, onward=onward)
+
+
+def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
+    """A path that was found, with all that `make_plan` does after its search; nothing else is searched for."""
+    return _completed(keep_height(settle_in_gusts(plan, airframe), airframe), airframe, onward=onward)
+
+
+def _completed(plan: Plan, airframe: Airframe, old: Plan | None = None, *, onward: bool) -> Plan:
+    """The plan with its ways from and to the ground, and with what the circles at its end may come too near to.
+
+    old: the plan that is being flown.
+    """
+    plan = laid_from_the_ground(plan, airframe, old)
+    if onward or not airframe.autopilot.loiter_rules.ends_in_circle:
+        return plan
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+    setup = make_setup(plan.scenario, airframe, mission, plan.seed, plan=plan)
+    beside = beside_end(route_requirements(setup))
+    if beside is None or not beside[1]:
+        return plan
+    circles = f"{airframe.autopilot.title} circles about the destination, up to {beside[0]:.0f} m from it"
+    problems = (*plan.certificate.problems, f"{circles}: {', '.join(beside[1])}")
+    return replace(plan, certificate=replace(plan.certificate, problems=problems))
+
+
+def make_setup(
+    scenario: Scenario,
+    airframe: Airframe,
+    mission: Mission,
+    seed: int,
+    *,
+    plan: Plan | None = None,
+    placed: PlacedMission | None = None,
+    fdm_hz: Literal[60, 120] = FDM_HZ,
+) -> FlightSetup:
+    """Everything that decides the flight of a mission in a scenario.
+
+    placed: the mission's places on the scenario's map where they are known already.  fdm_hz: JSBSim's steps a second.
+    Raises MissionError for a mission that cannot be laid out, and for a fence whose shapes are none.
+    """
+    # A fence that makes no zones is bad input, and the verdict could not judge it.
+    fence_zones(mission.fences, scenario.origin, mission.source)
+    limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
+    autopilot = airframe.autopilot
+    laws = autopilot.return_rules, autopilot.loiter_rules, autopilot.reads_as_px4
+    if placed is None:
+        route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits, *laws)
+    else:
+        route = lay_route(placed, airspeed, fly_over, limits, *laws)
+    route = with_end_courses(route, scenario, limits)
+    stated = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
+    notes = field_notes(mission, route, scenario, autopilot.return_rules, stated)
+    route = replace(route, notes=(*route.notes, *notes)) if notes else route
+    return FlightSetup(
+        scenario=scenario,
+        mission=mission,
+        mission_text=mission_text(mission, "waypoints"),
+        route=route,
+        limits=limits,
+        aircraft=airframe.aircraft.name,
+        battery=airframe.battery,
+        seed=seed,
+        plan=plan,
+        autopilot=autopilot,
+        nav=scenario.flight.steering.nav,
+        guidance_hz=scenario.flight.guidance_hz,
+        fdm_hz=fdm_hz,
+    )
