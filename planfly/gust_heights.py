@@ -7,8 +7,10 @@ clearance than a downdraft may take on a leg, another is searched for that keeps
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, ground_speed_on
 from flight.autopilots.autopilot import Autopilot
@@ -20,9 +22,13 @@ from planner.plan import Plan
 from world.geometry import leg_courses, leg_slopes
 from world.wind import W20
 
+Floats = NDArray[np.float64]
+
 # Climb that a plan which keeps height for downdrafts keeps in hand: so many standard deviations of theirs, and at most
 # this share of what the aircraft can.
 _IN_HAND, _SHARE = 1.2, 0.6
+# Length of the parts of a leg that are looked at, m.
+_PART = 250.0
 # Tolerance for rounding, m.
 _EPSILON = 1e-6
 
@@ -81,9 +87,12 @@ def _lacking(plan: Plan, airframe: Airframe, kept: Limits) -> list[str]:
     data = make_problem(plan.scenario, kept).certified
     needs = _needs(plan, airframe.autopilot, kept)
     low, leg = 0.0, 0
-    for piece in heights_above_ground(data, np.array(plan.waypoints, dtype=np.float64)):
-        number = int(piece["number"])
-        need = max(needs[number - 1 : number + 1]) if piece["of_arc"] else needs[number]
+    parts, legs = _in_parts(plan.waypoints)
+    for piece in heights_above_ground(data, parts):
+        k = int(piece["number"])
+        number = legs[k]
+        # An arc lies between two parts.
+        need = max(needs[number], needs[legs[k - 1]]) if piece["of_arc"] else needs[number]
         left = float(piece["height"]) - data.clearance - need * float(piece["buffer"]) / data.buffer
         low, leg = min((low, leg), (left, number))
     lowered = np.array(plan.waypoints, dtype=np.float64)
@@ -97,6 +106,16 @@ def _lacking(plan: Plan, airframe: Airframe, kept: Limits) -> list[str]:
     gusts = f"in {plan.scenario.wind.turbulence} turbulence downdrafts may take it"
     helps = "less turbulence, or an aircraft that climbs better, would help"
     return [f"{gusts} {depth:.0f} m into {what}; {helps}" for what, depth in into.items() if depth > _EPSILON]
+
+
+def _in_parts(waypoints: Floats) -> tuple[Floats, list[int]]:
+    """A path (w, 3) with points in between, and the leg of each part: what an end needs is not the whole leg's need."""
+    points, legs = [waypoints[0]], list[int]()
+    for leg, (a, b) in enumerate(pairwise(waypoints)):
+        count = math.ceil(float(np.linalg.norm(b - a)) / _PART)
+        points += [a + (b - a) * k / count for k in range(1, count + 1)]
+        legs += [leg] * count
+    return np.array(points), legs
 
 
 def _needs(plan: Plan, autopilot: Autopilot, limits: Limits) -> list[float]:

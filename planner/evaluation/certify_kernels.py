@@ -24,7 +24,7 @@ from planner.evaluation.corners import (
     turn_length,
 )
 from planner.evaluation.leg_constraints import slope_limits
-from planner.evaluation.problem import BUFFER_GROWTH, ProblemArrays
+from planner.evaluation.problem import ProblemArrays
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags
 from world.kernels import Record, Records, compiled, copy_into, inner, sort_few
 from world.terrain import segment_clearance
@@ -311,5 +311,5 @@ def required_buffer(
             run2 = dx * dx + dy * dy
             f = min(1.0, max(0.0, -(dx * x + dy * y) / run2)) if run2 > 0.0 else 0.0
             away = math.sqrt((x + f * dx) ** 2 + (y + f * dy) ** 2)
-            buffer = min(buffer, end_buffer + 0.5 * BUFFER_GROWTH * away)
+            buffer = min(buffer, end_buffer + 0.5 * data.buffer_growth * away)
     return buffer

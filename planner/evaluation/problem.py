@@ -85,6 +85,7 @@ class ProblemArrays(NamedTuple):
     max_climb, max_dive: NaN where the aircraft limits them.
     angle_margin: margin to slope limits.
     clearance: required above ground. buffer: additional height, and start_buffer and destination_buffer at the ends.
+    buffer_growth: away from an end that has less than the buffer, m per m.
     kill_margin: required between the path and missile spheres.
     sample_pitch: between samples of the terrain along a leg, in the graded scores.
     start_course, destination_course: NaN where none is prescribed.
@@ -123,6 +124,7 @@ class ProblemArrays(NamedTuple):
     destination_course: float
     start_buffer: float
     destination_buffer: float
+    buffer_growth: float
     threat_cells: ThreatCells
     missiles: MissileIndex
     slope_bounds: SlopeBounds
@@ -163,10 +165,9 @@ def as_columns(records: Records) -> Floats:
 
 # --- Required clearance ---
 
-# Growth of the buffer away from an end without it, m per m.
-
-# Growth of the clearance buffer away from an end that starts without it, m per m.
-BUFFER_GROWTH = 0.05
+# Growth of the clearance buffer away from an end that starts without it, m per m; and at most this share of the slopes
+# that are left to an aircraft whose climb is kept in reserve.
+BUFFER_GROWTH, GROWTH_SHARE = 0.05, 0.5
 
 
 class RequiredClearance(NamedTuple):
@@ -213,7 +214,7 @@ def _required(
     data: ProblemArrays, clearance: float, buffer: float, start_buffer: float, destination_buffer: float
 ) -> RequiredClearance:  # pragma: no cover - compiled
     same_everywhere = min(start_buffer, destination_buffer) >= buffer
-    growth = 0.0 if same_everywhere else BUFFER_GROWTH
+    growth = 0.0 if same_everywhere else data.buffer_growth
     return RequiredClearance(
         clearance,
         buffer,
@@ -236,9 +237,9 @@ def clearance_at(required: RequiredClearance, east: float, north: float) -> floa
     # Without branches, so that loops over many points become vector instructions: an end with the full buffer never
     # reduces it.
     dx, dy = east - required.start_east, north - required.start_north
-    keep = required.start_buffer + BUFFER_GROWTH * math.sqrt(dx * dx + dy * dy)
+    keep = required.start_buffer + required.growth * math.sqrt(dx * dx + dy * dy)
     dx, dy = east - required.destination_east, north - required.destination_north
-    other = required.destination_buffer + BUFFER_GROWTH * math.sqrt(dx * dx + dy * dy)
+    other = required.destination_buffer + required.growth * math.sqrt(dx * dx + dy * dy)
     keep = other if other < keep else keep
     keep = keep if keep < required.buffer else required.buffer
     need: float = required.clearance + keep
@@ -333,12 +334,13 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     vertical, share = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
     # Downdrafts take an aircraft down, and from no height limit above it.
     buffer = vertical + limits.reserve_height
+    aircraft = _performance(scenario, limits)
     arrays = ProblemArrays(
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.record,
         threats=units,
         spheres=sphere_records(units),
-        aircraft=_performance(scenario, limits),
+        aircraft=aircraft,
         **_edges(scenario.bounds),
         start=scenario.start,
         destination=scenario.destination,
@@ -358,6 +360,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         destination_course=_or_nan(scenario.destination_course),
         start_buffer=_end_buffer(terrain, limits, scenario.start, buffer, share),
         destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer, share),
+        buffer_growth=_buffer_growth(scenario, limits, aircraft),
         threat_cells=make_threat_cells(scenario.threats.position, radius, scenario.bounds),
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
@@ -399,6 +402,18 @@ def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
     climb_share, sink_share = (min(share, own) for own in (tracking.own_climb_share, tracking.own_sink_share))
     table = derated(limits.performance(), climb_share, sink_share, limits.reserve_climb)
     return within_rates(table, tracking.climb_rate, tracking.sink_rate)
+
+
+def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
+    """Growth of the buffer away from an end without it, m per m, that the aircraft can follow in still air."""
+    if not limits.reserve_height:
+        return BUFFER_GROWTH
+    slopes = [
+        float(np.interp(point[2], aircraft.amsl, angles))
+        for point in (scenario.start, scenario.destination)
+        for angles in (aircraft.climb, aircraft.descent)
+    ]
+    return min(BUFFER_GROWTH, GROWTH_SHARE * max(0.0, math.tan(min(slopes))))
 
 
 def _edges(bounds: Floats) -> dict[str, float]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import rotated_frame
-from planner.evaluation.problem import BUFFER_GROWTH, Problem, make_problem
+from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS, limits_for
 from planner.search.closed_ways import closing_missiles, highest_level_flight
@@ -299,7 +299,7 @@ def _margin_walls(problem: Problem) -> list[str]:
     length = math.dist(scenario.start[:2], scenario.destination[:2])
     for along, points in _lines_across(scenario):
         # Near the ends the margins are reduced.
-        if min(along, length - along) < reserve / BUFFER_GROWTH:
+        if min(along, length - along) < reserve / max(1e-9, data.buffer_growth):
             continue
         lowest = float(np.nanmin(scenario.terrain.height(points[:, 0], points[:, 1]))) + data.clearance
         if lowest + reserve > top:

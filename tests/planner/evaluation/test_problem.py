@@ -130,20 +130,22 @@ def test_turbulence_leaves_a_share_of_climb_and_descent(
 
 
 @pytest.mark.parametrize(
-    ("turbulence", "asked", "share"), [("none", 0.7, 0.7), ("light", 0.95, 0.9), ("light", 0.7, 0.7)]
+    ("turbulence", "asked", "shares"),
+    [("none", (0.7, 0.6), (0.7, 0.6)), ("light", (0.95, 0.8), (0.9, 0.8)), ("light", (0.7, 1.0), (0.7, 0.9))],
 )
 def test_an_autopilot_leaves_a_share_of_climb_and_descent(
-    make_limits: Make, small: Small, turbulence: str, asked: float, share: float
+    make_limits: Make, small: Small, turbulence: str, asked: tuple[float, float], shares: tuple[float, float]
 ) -> None:
     """The smaller of its own and that of the turbulence, not their product."""
     scenario = small(wind={"speed_mps": 0, "from_deg": 0, "turbulence": turbulence})
     limits = make_limits(scenario)
     tables = {name: np.zeros((11, 4)) for name in ("acceptance", "excursion", "before", "after")}
-    tracking = TrackingError(airspeed=25.0, **tables, across=0.0, up=0.0, lag=0.0, step=0.0, slope_share=asked)
+    own = {"own_climb_share": asked[0], "own_sink_share": asked[1]}
+    tracking = TrackingError(airspeed=25.0, **tables, across=0.0, up=0.0, lag=0.0, step=0.0, **own)
     made = make_problem(scenario, replace(limits, tracking=tracking)).certified.aircraft
     # At sea level true and equivalent airspeed are the same.
     assert (made.climb[0], made.descent[0]) == pytest.approx(
-        tuple(share * angle for angle in limits.envelope.air_angles(25.0, 0.0))
+        tuple(share * angle for share, angle in zip(shares, limits.envelope.air_angles(25.0, 0.0), strict=True))
     )
 
 
@@ -160,3 +162,26 @@ def test_a_search_leaves_half_of_a_narrow_band_to_the_path(
     problem = make_problem(scenario, make_limits(scenario))
     assert problem.certified.airspace.buffer == problem.certified.buffer == CERTIFIED_BUFFER
     assert (problem.search.buffer, problem.search.airspace.buffer) == pytest.approx((kept, kept))
+
+
+def test_what_is_kept_for_downdrafts(make_limits: Make, small: Small) -> None:
+    """30 m more from ground and missiles, 1 m/s less climb; from a low end it grows no faster than half the climb."""
+    flat = {"kind": "flat", "amsl_m": 0}
+    ends = {
+        name: {"east_m": east, "north_m": 0, "height_m": 64} for name, east in (("start", 0), ("destination", 6000))
+    }
+    scenario = small(terrain=flat, limits={"min_clearance_m": 60, "max_height_m": 400}, **ends)
+    limits = make_limits(scenario)
+    usual, kept = (
+        make_problem(scenario, one).certified
+        for one in (limits, replace(limits, reserve_height=30.0, reserve_climb=1.0))
+    )
+    assert (kept.buffer - usual.buffer, kept.kill_margin - usual.kill_margin) == pytest.approx((30.0, 30.0))
+    assert kept.airspace.buffer == usual.airspace.buffer
+    climbs = [float(table.airspeed * np.sin(table.climb[0])) for table in (usual.aircraft, kept.aircraft)]
+    assert climbs[0] - climbs[1] == pytest.approx(1.0)
+    assert kept.aircraft.descent.tolist() == usual.aircraft.descent.tolist()
+    slow = make_problem(scenario, replace(limits, reserve_height=30.0, reserve_climb=climbs[0] - 0.5)).certified
+    climb = float(np.interp(64.0, slow.aircraft.amsl, slow.aircraft.climb))
+    assert slow.buffer_growth == pytest.approx(0.5 * math.tan(climb))
+    assert usual.buffer_growth == kept.buffer_growth == 0.05
