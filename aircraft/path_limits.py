@@ -68,8 +68,8 @@ class Limits:
     max_bank: rad, the tighter of scenario and aircraft.
     wind: over the whole area.
     tracking: tracking error of the autopilot, None if it follows its path exactly.
-    reserve_height, reserve_climb: distance from the ground and from threats (m), and climb rate (m/s), kept for
-    downdrafts.
+    reserve_height, reserve_threats, reserve_climb: distance from the ground, and from threats and zones (m), and climb
+    rate (m/s), kept for downdrafts.
     """
 
     max_turn: float | None
@@ -82,6 +82,7 @@ class Limits:
     wind: Wind
     tracking: TrackingError | None = None
     reserve_height: float = 0.0
+    reserve_threats: float = 0.0
     reserve_climb: float = 0.0
     # Each is made once: a route asks for the same few speeds again and again.
     _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)

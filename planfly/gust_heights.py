@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 
 # Climb that a plan which keeps height for downdrafts keeps in hand: so many standard deviations of theirs, and at most
 # this share of what the aircraft can.
-_IN_HAND, _SHARE = 1.2, 0.6
+_IN_HAND, _SHARE = 1.2, 0.25
 # Length of the parts of a leg that are looked at, m.
 _PART = 250.0
 # Tolerance for rounding, m.
@@ -53,8 +53,11 @@ def keep_height(plan: Plan, airframe: Airframe, search: Callable[[Limits], Plan]
     problems = _lacking(plan, airframe, kept)
     if not problems:
         return plan
-    if search is not None:
-        other = search(kept)
+    # Most ways lie beside missiles and zones: only where one leads above them is it kept from them, too.
+    for within in (kept, replace(kept, reserve_threats=kept.reserve_height)):
+        if search is None:
+            break
+        other = search(within)
         if other.safe and not _lacking(other, airframe, kept):
             return other
     certificate = plan.certificate
@@ -62,7 +65,7 @@ def keep_height(plan: Plan, airframe: Airframe, search: Callable[[Limits], Plan]
 
 
 def limits_in_gusts(plan: Plan, airframe: Airframe) -> Limits:
-    """The limits of a search, at the heights of a plan, that keeps what downdrafts may take."""
+    """The limits of a search, at the heights of a plan, that keeps above ground what downdrafts may take."""
     limits, turbulence = airframe.limits.surely(), plan.scenario.wind.turbulence
     climb, _ = limits.rates(float(plan.waypoints[:, 2].max()))
     reserve = max(0.0, min(_IN_HAND * 0.1 * W20[turbulence], _SHARE * climb))

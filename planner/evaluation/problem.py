@@ -309,14 +309,14 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     # Plus the rise of the ground across the tracking error; the certificate measures the ground there.
     more = limits.reserve_height + up + across * certified.slope_bounds.steepest
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + more
-    airspace = _search_airspace(scenario, certified, attempt, up, limits.reserve_height)
+    airspace = _search_airspace(scenario, certified, attempt, up, limits.reserve_threats)
     if airspace.max_height < math.inf:
         buffer = min(buffer, _max_buffer(certified))
     search = _inset(
         certified._replace(
             buffer=buffer,
             airspace=airspace,
-            kill_margin=SEARCH_KILL_MARGIN + limits.reserve_height + across,
+            kill_margin=SEARCH_KILL_MARGIN + limits.reserve_threats + across,
             start_buffer=_end_buffer(terrain, limits, scenario.start, buffer),
             destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer),
         ),
@@ -333,7 +333,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     tracking = no_tracking() if limits.tracking is None else limits.tracking.record
     vertical, share = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
     # Downdrafts take an aircraft down, and from no height limit above it.
-    buffer = vertical + limits.reserve_height
+    buffer, beside = vertical + limits.reserve_height, vertical + limits.reserve_threats
     aircraft = _performance(scenario, limits)
     arrays = ProblemArrays(
         heights=terrain.heights,
@@ -354,7 +354,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         angle_margin=ANGLE_MARGIN,
         clearance=float(limits.min_clearance),
         buffer=buffer,
-        kill_margin=CERTIFIED_KILL_MARGIN + limits.reserve_height,
+        kill_margin=CERTIFIED_KILL_MARGIN + limits.reserve_threats,
         sample_pitch=min(50.0, max(15.0, 0.4 * terrain.spacing)),
         start_course=_or_nan(scenario.start_course),
         destination_course=_or_nan(scenario.destination_course),
@@ -365,7 +365,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
         tracking=tracking,
-        airspace=make_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, buffer, share), vertical),
+        airspace=make_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, beside, share), vertical),
         travel=LENGTH,
     )
     return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays

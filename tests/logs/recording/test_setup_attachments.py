@@ -130,7 +130,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     kinds = (FlightSetup, Limits, Mission, Route, Envelope)
     names = {kind: [item.name for item in dataclasses.fields(kind) if item.init] for kind in kinds}
     assert len(names[FlightSetup]) == 14
-    assert len(names[Limits]) == 11
+    assert len(names[Limits]) == 12
     assert len(names[Mission]) == 8
     assert len(names[Route]) == 16
     assert len(names[Envelope]) == 20
