@@ -164,6 +164,7 @@ def test_every_command_keeps_it_and_a_front_is_not_left_with_one() -> None:
     airframe = load_airframe(scenario)
     front = planfly.plan_front(scenario, 4, seed=SEED)
     assert len(front.plans) >= 3
+    assert limits_of_others(front.default.plan, airframe).reserve_height > 30.0
     for one in [*(found.plan for found in front.plans), planfly.plan(scenario, seed=SEED)]:
         assert one.safe
         assert keep_height(one, airframe) is one
