@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
 from aircraft.tracking import TrackingError, air_density_factor, density_factor
 from world.by_reference import by_reference
-from world.geometry import wrap
+from world.geometry import leg_courses, leg_slopes, wrap
 from world.kernels import compiled, compiled_inline, inlined
 from world.wind import W20, Wind, mean_wind_speed
 
@@ -68,8 +68,9 @@ class Limits:
     max_bank: rad, the tighter of scenario and aircraft.
     wind: over the whole area.
     tracking: tracking error of the autopilot, None if it follows its path exactly.
-    reserve_height, reserve_threats, reserve_climb: distance from the ground, and from threats and zones (m), and climb
-    rate (m/s), kept for downdrafts.
+    reserve_height: height above ground that is kept for downdrafts beside the clearance, m.
+    reserve_threats: the same around missiles' spheres, in all directions, and above and below zones, m.
+    reserve_climb: rate of climb that legs leave unused for downdrafts, m/s.
     """
 
     max_turn: float | None
@@ -109,6 +110,22 @@ class Limits:
         speed = float(true_airspeed(table, amsl))
         climb, sink = (speed * math.sin(np.interp(amsl, table.amsl, angles)) for angles in (table.climb, table.descent))
         return climb, sink
+
+    def climb_rates(self, waypoints: Floats) -> Floats:
+        """Rate of climb (legs, 2) of each leg of a path (w, 3) at its beginning and at its end, m/s.
+
+        Negative where it sinks; NaN where the wind does not let the aircraft hold the leg.
+        """
+        legs, table = zip(leg_courses(waypoints), leg_slopes(waypoints), strict=True), self.performance()
+        return np.array(
+            [
+                [
+                    ground_speed_on(table, float(course), float(amsl)) * math.tan(slope)
+                    for amsl in waypoints[k : k + 2, 2]
+                ]
+                for k, (course, slope) in enumerate(legs)
+            ]
+        )
 
     def performance(self, airspeed: float | None = None) -> PerformanceTable:
         """Performance at a true airspeed (m/s), for compiled functions.

@@ -1,11 +1,10 @@
-"""Waypoints at which gusts make an autopilot circle: as few of them as a plan can do with, or a plan that is not safe.
+"""Waypoints at which gusts make an autopilot circle: a plan has as few of them as it can, or is not safe.
 
 PX4 flies on at a waypoint only within NAV_FW_ALT_RAD of its height.  Moderate turbulence throws light aircraft further
 than that now and then, and a circle leads away from all that a plan keeps clear of.  So a plan has as many waypoints
 as leave less than `MOST_CIRCLES` circles to a flight, and says so where it needs more.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -16,7 +15,7 @@ from flight.mission.from_plan import corner_speeds
 from planfly.airframe import Airframe
 from planner.plan import Plan
 from planner.search.fewer_waypoints import drop_waypoints
-from world.geometry import leg_slopes, turning_angles
+from world.geometry import turning_angles
 from world.scenario import Scenario
 
 # Circles that a flight may expect; about every second one leaves the corridor (of 186 flights, with 58 waypoints passed
@@ -29,7 +28,9 @@ _HELPFUL = range(5, 105, 5)
 
 
 def settle_in_gusts(plan: Plan, airframe: Airframe, search: Callable[[Scenario], Plan] | None = None) -> Plan:
-    """A safe plan with few enough waypoints for its turbulence; as it is where it has, or with what is wrong.
+    """The plan if it has few enough waypoints for its turbulence; otherwise one with fewer.
+
+    Where none with fewer is found, the plan is returned with the reason in its certificate, and is not safe.
 
     search: plans a scenario as the plan was planned; None not to look for another path.
 
@@ -42,7 +43,7 @@ def settle_in_gusts(plan: Plan, airframe: Airframe, search: Callable[[Scenario],
     >>> settle_in_gusts(plan, airframe) is plan
     True
     """
-    autopilot, limits = airframe.autopilot, airframe.limits
+    autopilot, limits = airframe.autopilot, airframe.limits.surely()
     expected = expected_circles(plan, autopilot, limits)
     if not plan.safe or expected == 0.0:
         return plan
@@ -50,7 +51,7 @@ def settle_in_gusts(plan: Plan, airframe: Airframe, search: Callable[[Scenario],
         # With as many waypoints as plans have where nobody circles, no corner is too sharp.
         has_all = len(plan.waypoints) >= plan.scenario.planner.waypoints
         return plan if has_all or _is_settled(plan, airframe) else _refused(plan, _what_is_wide(plan, airframe))
-    fewer = drop_waypoints(plan, limits.surely())
+    fewer = drop_waypoints(plan, limits)
     if _is_settled(fewer, airframe):
         return fewer
     circles, count = expected_circles(fewer, autopilot, limits), len(fewer.waypoints) - 2
@@ -71,7 +72,7 @@ def _refused(plan: Plan, problem: str) -> Plan:
 
 def _is_settled(plan: Plan, airframe: Airframe) -> bool:
     """Whether a plan expects few enough circles, and no corner, sharper for being one of few, leaves its corridor."""
-    if expected_circles(plan, airframe.autopilot, airframe.limits) > MOST_CIRCLES:
+    if expected_circles(plan, airframe.autopilot, airframe.limits.surely()) > MOST_CIRCLES:
         return False
     return max(_excursions(plan, airframe), default=0.0) <= _corridor(plan, airframe)
 
@@ -106,9 +107,8 @@ def expected_circles(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     A leg that climbs or sinks leaves less of what the aircraft can; what is left counts against the gusts.
     """
     turbulence, expected = plan.scenario.wind.turbulence, 0.0
-    for slope, waypoint in zip(leg_slopes(plan.waypoints), plan.waypoints[1:-1], strict=False):
+    for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
         climb, sink = limits.rates(float(waypoint[2]))
-        rate = limits.airspeed * math.sin(slope)
         expected += autopilot.off_height_chance(climb - max(0.0, rate), sink - max(0.0, -rate), turbulence)
     return expected
 
@@ -125,7 +125,7 @@ def waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     22
     """
     scenario, count = plan.scenario, len(plan.waypoints)
-    climb, sink = airframe.limits.rates(float(plan.waypoints[:, 2].max()))
+    climb, sink = airframe.limits.surely().rates(float(plan.waypoints[:, 2].max()))
     chance = airframe.autopilot.off_height_chance(climb, sink, scenario.wind.turbulence)
     if chance == 0.0:
         return count

@@ -21,8 +21,9 @@ from planfly.gust_circles import settle_in_gusts
 from planfly.gust_heights import keep_height
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
-from planner.search.replan import Search, replan
+from planner.search.replan import replan
 from planner.search.search_state import StopCondition
+from planner.search.shared_budget import Search, SharedBudget
 from world.scenario import Scenario
 
 # Takes how far a stage is: done, total, a remark.
@@ -48,9 +49,11 @@ def make_plan(
     """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
 
     All commands plan by this, so that what one calls safe no other calls unsafe. Where gusts make the autopilot circle
-    at waypoints, the plan has as few of them as it can do with (`planfly.gust_circles`); where downdrafts take it down,
-    it keeps as much height (`planfly.gust_heights`); the ways from and to the ground are laid; and where the autopilot
-    circles at the mission's end, the certificate names what that may come too near to.
+    at waypoints, the plan has as few of them as it can (`planfly.gust_circles`); where downdrafts take the aircraft
+    down, the plan keeps that much height (`planfly.gust_heights`); the ways from and to the ground are laid; and where
+    the autopilot circles at the mission's end, the certificate names what the circles may come too near to.
+
+    A plan may take several searches, which share the scenario's budget of evaluations.
 
     stop: as of `planner.search.plan_path.plan_path`.
     flown: the plan that is being flown, and the leg to plan again from; None for a new plan.
@@ -72,7 +75,9 @@ def make_plan(
     def search(world: Scenario, within: Limits) -> Plan:
         return plan_path(world, within, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
-    return _completed(settle(search(scenario, limits), search), airframe, onward=onward)
+    searches = SharedBudget(search)
+    plan = searches.total(settle(searches(scenario, limits), searches))
+    return _completed(plan, airframe, onward=onward)
 
 
 def finish_plan(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:

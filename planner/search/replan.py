@@ -15,14 +15,13 @@ from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.explain_failure import violated_zones
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
+from planner.search.shared_budget import Search, SharedBudget
 from world.errors import MissionError
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-# Plans a scenario within limits.
-Search = Callable[[Scenario, Limits], Plan]
 # Completes a plan, with a search that plans a changed scenario, or within other limits, as the plan was planned.
 Settle = Callable[[Plan, Search], Plan]
 
@@ -80,9 +79,10 @@ def replan(
         previous = rest if asked.planner.waypoints == len(rest) else None
         return plan_path(asked, within, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=previous)
 
-    made = search(ahead, limits)
+    searches = SharedBudget(search)
+    made = searches(ahead, limits)
     if settle is not None:
-        made = settle(made, search)
+        made = searches.total(settle(made, searches))
     waypoints = np.concatenate([old.waypoints[:leg], made.waypoints])
     within = limits_for(find_algorithm(made.algorithm, scenario.name), limits)
     counts, objectives = paper_scores(make_problem(scenario, within).certified, waypoints[None])

@@ -70,20 +70,29 @@ def test_a_way_round_has_as_many_waypoints_as_gusts_allow() -> None:
 
 
 def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: Airframe) -> None:
-    """A climb takes its rate from what the aircraft can climb, and leaves what it can sink."""
-    limits = airframe_of_x8.limits
-    up, along = 0.05, math.sqrt(1.0 - 0.05**2)
-    way = np.array([[0.0, 0.0, 150.0], [2000.0 * along, 0.0, 150.0 + 2000.0 * up], [6000.0, 0.0, 250.0]])
+    """A climb takes its rate from what the aircraft can climb, and leaves what it can sink.
+
+    The slope is one over the ground, and the wind carries the aircraft along: 4 m/s from 200 degrees, and eastwards.
+    """
+    limits, slope = airframe_of_x8.limits, 0.05
+    way = np.array([[0.0, 0.0, 150.0], [2000.0, 0.0, 150.0 + 2000.0 * slope], [6000.0, 0.0, 250.0]])
     plan = plan_of(airframe_of_x8, way)
     climb, sink = limits.rates(250.0)
-    climbing = airframe_of_x8.autopilot.off_height_chance(climb - 0.05 * limits.airspeed, sink, "moderate")
-    assert expected_circles(plan, airframe_of_x8.autopilot, limits) == pytest.approx(climbing)
+    # Speeds are equivalent ones for PX4; the standard atmosphere at 250 m.
+    true_airspeed = limits.airspeed / math.sqrt((1.0 - 2.25577e-5 * 250.0) ** 4.2559)
+    aside, along = 4.0 * math.cos(math.radians(20.0)), 4.0 * math.sin(math.radians(20.0))
+    rate = slope * (math.sqrt(true_airspeed**2 - aside**2) + along)
+    climbing = airframe_of_x8.autopilot.off_height_chance(climb - rate, sink, "moderate")
+    assert expected_circles(plan, airframe_of_x8.autopilot, limits) == pytest.approx(climbing, rel=1e-3)
     down = plan_of(airframe_of_x8, way * [1.0, 1.0, -1.0] + [0.0, 0.0, 500.0])
-    sinking = airframe_of_x8.autopilot.off_height_chance(climb, sink - 0.05 * limits.airspeed, "moderate")
-    assert expected_circles(down, airframe_of_x8.autopilot, limits) == pytest.approx(sinking)
+    sinking = airframe_of_x8.autopilot.off_height_chance(climb, sink - rate, "moderate")
+    assert expected_circles(down, airframe_of_x8.autopilot, limits) == pytest.approx(sinking, rel=1e-3)
     both = plan_of(airframe_of_x8, np.concatenate([way, [[8000.0, 0.0, 250.0]]]))
     level = airframe_of_x8.autopilot.off_height_chance(climb, sink, "moderate")
-    assert expected_circles(both, airframe_of_x8.autopilot, limits) == pytest.approx(climbing + level)
+    assert expected_circles(both, airframe_of_x8.autopilot, limits) == pytest.approx(climbing + level, rel=1e-3)
+    # As a share of all, the wind is much more than that.
+    calm = airframe_of_x8.autopilot.off_height_chance(climb - slope * true_airspeed, sink, "moderate")
+    assert abs(climbing / calm - 1.0) > 3e-3
 
 
 def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -> None:

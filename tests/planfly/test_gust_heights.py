@@ -10,12 +10,13 @@ import planfly
 from aircraft.path_limits import Limits
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from planfly.airframe import Airframe, load_airframe
-from planfly.gust_heights import keep_height, limits_of_others
-from planfly.make_plan import make_plan
+from planfly.gust_heights import find_shortfalls, keep_height, limits_of_others
+from planfly.make_plan import finish_plan, make_plan
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import CERTIFIED_BUFFER, make_problem
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
+from planner.search.shared_budget import SharedBudget
 from tests.setups import spec_around
 from world.scenario import Scenario, from_spec
 from world.wind import Turbulence
@@ -109,8 +110,8 @@ def test_a_climb_leaves_less_and_the_plan_says_how_much_it_lacks() -> None:
     assert f"downdrafts may take it {lacks:.0f} m into the clearance of 50 m on leg 1; less turbulence" in problem
 
 
-def test_near_a_low_end_the_same_share_is_kept() -> None:
-    """15 m above the clearance at both ends no plan keeps 30 m there, and one that climbs from them is taken."""
+def test_near_a_low_end_half_is_kept() -> None:
+    """15 m above the clearance at both ends no plan keeps 28 m there, and one that climbs from them is taken."""
     scenario = scenario_of("moderate", height=65.0)
     airframe = load_airframe(scenario)
     asked = list[Limits]()
@@ -132,6 +133,87 @@ def test_near_a_low_end_the_same_share_is_kept() -> None:
     assert middle >= asked[0].reserve_height + CERTIFIED_BUFFER
 
 
+@pytest.mark.parametrize("over", [0.5, -0.5])
+def test_an_end_that_lies_too_low_is_named_and_nothing_is_searched_for(over: float) -> None:
+    airframe = load_airframe(scenario_of("moderate"))
+    half = 0.5 * 12.0 * (2.33 * GUST - airframe.limits.rates(GROUND + 64.0)[0])
+    scenario = scenario_of("moderate", height=50.0 + half + over)
+    found = plan_path(scenario, airframe.limits, seed=SEED)
+    assert found.safe
+    plan = keep_height(found, airframe, None if over > 0.0 else lambda limits: pytest.fail("searched for another"))
+    (problem,) = plan.certificate.problems
+    assert ("at its start; less turbulence" in problem) is (over < 0.0)
+    assert ("a start that is 1 m higher would help" in problem) is (over < 0.0)
+
+
+@pytest.mark.parametrize(("away", "safe"), [(1700.0, False), (400.0, True)])
+def test_the_whole_is_kept_1500_m_from_an_end(away: float, safe: bool) -> None:
+    """A path that sinks to 20 m above its clearance, 8 m less than level flight takes and 6 m more than half of it."""
+    airframe = load_airframe(scenario_of("moderate"))
+    scenario = scenario_of("moderate", height=100.0)
+    low = [[0, 0, 100], [away, 0, 70], [away + 50, 0, 70], [away + 1550, 0, 100], [8000, 0, 100]]
+    plan = plan_along(airframe, scenario, np.array(low) + np.array([0.0, 0.0, GROUND]))
+    shortfalls = find_shortfalls(plan, airframe)
+    assert bool(shortfalls) is not safe
+    assert {one.into for one in shortfalls} <= {"into the clearance of 50 m"}
+
+
+def test_below_a_height_limit_more_climb_is_left_in_place_of_height() -> None:
+    """97 m above ground leave 47 m: less than 39 m and the margins of a search, and more than level flight takes."""
+    scenario = scenario_of("moderate", height=65.0, limits={"min_clearance_m": 50.0, "max_height_m": 97.0})
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, SEED)
+    assert plan.safe
+    assert not find_shortfalls(plan, airframe)
+    low = scenario_of("moderate", height=65.0, limits={"min_clearance_m": 50.0, "max_height_m": 80.0})
+    (problem,) = make_plan(low, airframe, SEED).certificate.problems
+    assert "or a higher limit on its height would help" in problem
+
+
+@pytest.mark.parametrize(("ground", "enough"), [(3000.0, True), (4600.0, False)])
+def test_an_aircraft_that_hardly_climbs_is_not_sent_into_gusts(ground: float, enough: bool) -> None:
+    """No height makes up for it where it climbs less than 0.6 standard deviations, 0.92 m/s."""
+    far = {
+        "terrain": {"kind": "flat", "amsl_m": ground},
+        "start": {"east_m": 0, "north_m": 0, "height_m": 300},
+        "destination": {"east_m": 8000, "north_m": 0, "height_m": 300},
+        "area": {"east_m": [-3000, 11000], "north_m": [-3000, 3000], "ceiling_amsl_m": ground + 800},
+    }
+    scenario = from_spec(scenario_of("moderate").to_json() | far, "gusts")
+    airframe = load_airframe(scenario)
+    assert (airframe.limits.rates(ground + 300.0)[0] > 0.6 * GUST) is enough
+    plan = make_plan(scenario, airframe, SEED)
+    assert plan.safe is enough
+    assert any("with less than 0.92 m/s downdrafts" in one for one in plan.certificate.problems) is not enough
+
+
+def test_a_leg_counts_with_the_least_climb_that_it_leaves() -> None:
+    """A leg that sinks begins where the air is thinner: it leaves less there than at its end, where it is lowest."""
+    scenario = scenario_of("moderate", height=100.0)
+    airframe = load_airframe(scenario)
+    way = np.array([[0, 0, 780], [6000, 0, 79], [8000, 0, 79]]) + np.array([0.0, 0.0, GROUND])
+    (lacks,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
+    assert lacks.where == "on leg 0"
+    assert lacks.depth == pytest.approx(12.0 * (2.33 * GUST - airframe.limits.rates(GROUND + 780.0)[0]) - 29.0, abs=0.3)
+
+
+@pytest.mark.parametrize(("from_deg", "sign"), [(270.0, 1.0), (90.0, -1.0)])
+def test_a_tailwind_makes_a_climb_faster(from_deg: float, sign: float) -> None:
+    """The same slope over the ground takes more climb with the wind, and leaves less against downdrafts."""
+    wind = {"speed_mps": 5.0, "from_deg": from_deg, "turbulence": "moderate"}
+    scenario = scenario_of("moderate", height=150.0, wind=wind)
+    airframe = load_airframe(scenario)
+    slope = 0.03
+    way = np.array([[0, 0, 150], [2000, 0, 80], [2000 + 70 / slope, 0, 150], [8000, 0, 150]])
+    plan = plan_along(airframe, scenario, way + np.array([0.0, 0.0, GROUND]))
+    # The guidance keeps the true airspeed, and the wind is the same at every height.
+    climbs = slope * (airframe.airspeed + sign * 5.0)
+    left = min(airframe.limits.rates(GROUND + up)[0] for up in (80.0, 150.0)) - climbs
+    (lacks,) = find_shortfalls(plan, airframe)
+    assert lacks.where == "on leg 1"
+    assert lacks.depth == pytest.approx(12.0 * (2.33 * GUST - left) - 30.0, abs=0.5)
+
+
 SAM = {"name": "sam", "east_m": 4000.0, "north_m": 0.0, "amsl_m": GROUND, "kill_radius_m": 100.0, "kill_scale_m": 50.0}
 MAST = {"name": "mast", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 300.0}
 
@@ -139,8 +221,8 @@ MAST = {"name": "mast", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "
 @pytest.mark.parametrize(
     ("tables", "into"),
     [
-        ({"threats": [SAM]}, "a missile's reach"),
-        ({"zones": [MAST | {"ceiling_amsl_m": GROUND + 100.0}]}, "a zone"),
+        ({"threats": [SAM]}, "the reach of sam"),
+        ({"zones": [MAST | {"ceiling_amsl_m": GROUND + 100.0}]}, "mast"),
     ],
     ids=["missile", "zone"],
 )
@@ -151,10 +233,84 @@ def test_what_lies_below_counts(tables: dict[str, Any], into: str) -> None:
     plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
     assert plan.safe
     (problem,) = keep_height(plan, airframe).certificate.problems
-    assert f"downdrafts may take it {needed(airframe) - 20.0:.0f} m into {into}" in problem
+    assert f"downdrafts may take it {needed(airframe) - 20.0:.0f} m into {into} on leg 0;" in problem
     made = make_plan(scenario, airframe, SEED)
     assert made.safe
     assert keep_height(made, airframe) is made
+
+
+@pytest.mark.parametrize("tables", [{"zones": [MAST]}, {"threats": [SAM]}], ids=["zone", "missile"])
+def test_what_is_thinner_than_the_height_is_not_jumped_over(tables: dict[str, Any]) -> None:
+    """8 m thick and 12 m below a path that may come down by 28 m."""
+    zone = {"floor_amsl_m": GROUND + 92.0, "ceiling_amsl_m": GROUND + 100.0}
+    sphere = {"amsl_m": GROUND + 96.0, "kill_radius_m": 4.0, "kill_scale_m": 2.0}
+    thin = {name: [entries[0] | (zone if name == "zones" else sphere)] for name, entries in tables.items()}
+    scenario = scenario_of("moderate", height=112.0, **thin)
+    airframe = load_airframe(scenario)
+    plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+    assert plan.safe
+    (shortfall,) = find_shortfalls(plan, airframe)
+    assert shortfall.below
+    assert 1.0 < shortfall.depth <= 4.1
+
+
+def test_near_a_low_end_a_zone_needs_as_little_as_the_ground() -> None:
+    """The zone's top is 25 m below the start, and half of what level flight takes is 14 m."""
+    mast = {"name": "shed", "kind": "exclusion", "east_m": 0.0, "north_m": 0.0, "radius_m": 100.0}
+    zones = [mast | {"ceiling_amsl_m": GROUND + 40.0}]
+    scenario = scenario_of("moderate", height=65.0, zones=zones)
+    assert make_plan(scenario, load_airframe(scenario), SEED).safe
+
+
+def test_a_search_that_was_cut_short_is_not_taken_for_proof() -> None:
+    """Without its end a higher plan would have been found, as it is without a budget."""
+    scenario = scenario_of("moderate", height=65.0)
+    airframe = load_airframe(scenario)
+    first = plan_path(scenario, airframe.limits, seed=SEED)
+    whole = make_plan(scenario, airframe, SEED)
+    assert whole.safe
+    assert whole.ended == "completed"
+    assert whole.evaluations > first.evaluations
+    # A straight line is found at once, and what is left then is less than a population.
+    budget = first.evaluations + scenario.planner.population - 1
+    table = scenario.planner.model_copy(update={"budget": budget})
+    cut = make_plan(replace(scenario, planner=table), airframe, SEED)
+    assert not cut.safe
+    assert cut.ended == "budget"
+    assert cut.evaluations == first.evaluations
+    searches = iter(["completed", "interrupted"])
+
+    def search(asked: Scenario, limits: Limits) -> Plan:
+        found = plan_path(asked, limits, seed=SEED)
+        return replace(found, ended=next(searches), certificate=first.certificate, waypoints=first.waypoints)
+
+    shared = SharedBudget(search)
+    low = shared(scenario, airframe.limits)
+    refused = keep_height(low, airframe, lambda limits: shared(scenario, limits))
+    assert not refused.safe
+    assert shared.total(refused).ended == "interrupted"
+    assert shared.total(refused).evaluations > 2 * first.evaluations
+
+
+def test_no_other_plan_of_a_front_is_lower() -> None:
+    """A path that was found is refused where it lacks height, and nothing is searched for."""
+    scenario = scenario_of("moderate", height=70.0)
+    airframe = load_airframe(scenario)
+    low = plan_path(scenario, airframe.limits, seed=SEED)
+    assert low.safe
+    assert not finish_plan(low, airframe).safe
+
+
+def test_plans_beside_one_that_leads_above_a_missile_keep_above_it_too() -> None:
+    wall = [SAM | {"name": f"sam {k}", "north_m": 150.0 * k} for k in range(-19, 20)]
+    scenario = scenario_of("moderate", height=120.0, threats=wall)
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, SEED)
+    assert plan.safe
+    kept = limits_of_others(plan, airframe)
+    assert kept.reserve_threats == kept.reserve_height > 30.0
+    beside = replace(scenario, threats=scenario_of("moderate").threats)
+    assert limits_of_others(make_plan(beside, airframe, SEED), airframe).reserve_height > 30.0
 
 
 def test_every_command_keeps_it_and_a_front_is_not_left_with_one() -> None:
