@@ -44,8 +44,12 @@ _AIRSPEED_LAG = 2.0
 SAFE_SPEED = 1.2
 # Time in which the ceiling brings an airspeed back, s.
 _SPEED_BACK = 3.0
-# How far from the course the nose may point against the wind, rad.
+# Angle between the nose and the course at which the guidance no longer banks to turn the nose further away, rad.
 _NOSE_OFF = math.radians(80.0)
+# Bank allowed for each rad that the nose is short of that angle, rad/rad; beyond it, bank back for each rad too many.
+# With a bank of at most 40 degrees all of it is allowed until 70 degrees, and all of it is asked for back from 90.
+# The nose settles there with a time constant of V / (4 g), 0.4 s for the Zagi at 15 m/s, which rolls within 0.25 s.
+_BANK_PER_NOSE = 4.0
 # Of the lateral acceleration at the greatest bank, what an arc may take before the aircraft slows down for it.
 ARC_SHARE = 0.95
 # Longest tick that the whole lead of a correction is for, s.
@@ -132,10 +136,7 @@ def _along_path(
     push += home + gains.push_lead * min(1.0, (LEAD_TICK / dt) ** 2) * change
     lift = GRAVITY + memory.bend_acceleration
     wanted = math.atan((turn + push) / (lift * crab))
-    # A nose that far off the course gives nothing more against the wind: turning on would take it all the way round.
-    nose = wrap(state.yaw - course)
-    if abs(nose) > _NOSE_OFF and wanted * nose > 0.0:
-        wanted = math.copysign(abs(nose) - _NOSE_OFF, -nose)
+    wanted = _within_nose_limit(wanted, wrap(state.yaw - course), memory.max_bank)
     bank: float = min(memory.max_bank, max(-memory.max_bank, wanted))
     sharpest = max_curvature(pieces, k, s, s + speed * gains.arc_slowing_time)
     memory.arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, sharpest))
@@ -146,6 +147,21 @@ def _along_path(
     if bank == wanted and abs(memory.cross_track) < 20.0:
         memory.cross_track_sum = min(40.0, max(-40.0, memory.cross_track_sum + memory.cross_track * dt))
     return bank
+
+
+@inner
+def _within_nose_limit(wanted: float, nose: float, max_bank: float) -> float:  # pragma: no cover - compiled
+    """The wanted bank, or less of it where it would turn the nose too far from the course, rad.
+
+    At `_NOSE_OFF` the nose is almost square to the course. Turning further would gain nothing against a wind from the
+    side and would take the aircraft all the way round. The result is continuous in both angles except where the nose
+    points straight back. A bank that already turns the nose back towards the course fast enough is left as it is.
+
+    nose: from the course to the nose, positive clockwise, within +-pi rad.  max_bank: rad.
+    """
+    away = math.copysign(1.0, nose)
+    limit = max(-max_bank, _BANK_PER_NOSE * (_NOSE_OFF - abs(nose)))
+    return away * min(away * wanted, limit)
 
 
 @inner

@@ -1,6 +1,7 @@
 """The guidance core in one tick: signs of the commands, limits, and the end of the path."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -115,11 +116,72 @@ def test_end_of_the_path(tick: Tick) -> None:
     assert [tick.memory.leg, tick.memory.done] == [1, True]
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_the_nose_is_not_turned_past_the_wind(tick: Tick, side: float) -> None:
+# ----------------------------------------------------------------------
+# How far the nose may be turned from the course.
+
+SIDES = pytest.mark.parametrize("side", [1.0, -1.0])
+
+
+class Nose:
+    """The bank and the sideslip, deg, that one tick asks for with the nose so many degrees to the right of the course.
+
+    The roll model has no limits here, so that a tick takes it from rest by frequency^2 x bank x dt^2.
+    """
+
+    def __init__(self, setup: FlightSetup, gains: Gains) -> None:
+        self.setup = setup
+        self.gains = replace(gains, roll_rate_max=1e6, roll_acceleration_max=1e6)
+
+    def __call__(self, nose: float, east: float, course: float) -> tuple[float, float]:
+        one = Tick(self.setup, self.gains)
+        one(east=east, course=math.radians(course), yaw=math.radians(nose))
+        bank = one.memory.bank / (self.gains.roll_frequency / 60.0) ** 2
+        return math.degrees(bank), math.degrees(one.memory.sideslip)
+
+
+@pytest.fixture
+def asked(make_setup: MakeSetup, aerosonde: Aircraft) -> Nose:
+    return Nose(make_setup([[0, 0, 500], [0, 3000, 500], [3000, 3000, 500]]), load_gains(aerosonde))
+
+
+@SIDES
+@pytest.mark.parametrize(
+    ("nose", "bank"),
+    [
+        # All of the 33 degrees against the wind until the nose is 33 / 4 = 8.25 degrees short of 80...
+        (60.0, 33.0),
+        (71.0, 33.0),
+        # ... then 4 degrees of bank for each degree, and as much back beyond it...
+        (75.0, 20.0),
+        (80.0, 0.0),
+        (85.0, -20.0),
+        # ... as far as 33 degrees, and the same where the nose is almost straight back.
+        (89.0, -33.0),
+        (169.0, -33.0),
+        (175.0, -33.0),
+    ],
+)
+def test_the_nose_is_not_turned_past_the_wind(asked: Nose, side: float, nose: float, bank: float) -> None:
     """Blown aside and back, 20 m from the path, it points into the wind and waits, and does not go round."""
-    blown = {"east": side * 20.0, "course": side * math.radians(100.0)}
-    assert side * tick(**blown, yaw=-side * math.radians(75.0)).aileron < 0.0
-    assert side * tick(**blown, yaw=-side * math.radians(95.0)).aileron > 0.0
-    # With its nose the other way, too far as well, it turns back over the course.
-    assert side * tick(**blown, yaw=side * math.radians(95.0)).aileron < 0.0
+    assert asked(-side * nose, side * 20.0, side * 100.0)[0] == pytest.approx(-side * bank, abs=1e-9)
+
+
+@SIDES
+@pytest.mark.parametrize("nose", [75.0, 82.0, 88.0, 95.0])
+def test_a_nose_that_is_turned_back_is_turned_back_with_all_the_bank(asked: Nose, side: float, nose: float) -> None:
+    # The path is to the left, and the nose is too far to the right.
+    assert asked(side * nose, side * 20.0, side * 100.0)[0] == pytest.approx(-side * 33.0)
+
+
+@SIDES
+def test_bank_and_skid_change_smoothly_as_the_nose_turns_away(asked: Nose, side: float) -> None:
+    step = 0.1
+    way = np.array([asked(-side * nose, side * 20.0, side * 100.0) for nose in np.arange(40.0, 179.0, step)])
+    # From all the bank and the whole skid of 3 degrees to one side to all the bank to the other, without a skid.
+    assert way[0] == pytest.approx([-side * 33.0, side * 3.0])
+    assert way[-1] == pytest.approx([side * 33.0, 0.0])
+    bank, skid = np.abs(np.diff(way, axis=0)).max(axis=0)
+    assert bank == pytest.approx(4.0 * step)
+    # The skid is worth 17.87 m/s^2 a rad. Where it is less than whole, the tangent of the wanted bank is at most tan 33
+    # + 3 degrees x 17.87 / 9.81 = 0.745, and its square plus 1 is 1.555: 9.81 / 17.87 x 1.555 x 0.4 degrees = 0.3415.
+    assert skid < 0.342
