@@ -63,8 +63,10 @@ class Channel:
         self.memory = record(GUIDANCE_MEMORY, last_airspeed=-1.0, speed_command=self.speed, **TRIM)
         self.commands = record(COMMANDS)
 
-    def height(self, *, up: float = 500.0, climb: float = 0.0, airspeed: float | None = None) -> Record:
-        state = record(STATE, airspeed=self.speed if airspeed is None else airspeed)
+    def height(
+        self, *, up: float = 500.0, climb: float = 0.0, airspeed: float | None = None, roll: float = 0.0
+    ) -> Record:
+        state = record(STATE, airspeed=self.speed if airspeed is None else airspeed, roll=roll)
         estimated = record(MOTION, up=up, velocity_north=self.speed, velocity_up=climb)
         steer_height(state, estimated, self.nodes, self.gains, self.memory, self.commands, 0.0, DT)
         return self.commands
@@ -132,17 +134,17 @@ SLOWEST = GAINS.reference_airspeed - GAINS.slow_margin
 @pytest.mark.parametrize(
     ("throttle", "airspeed", "stall", "climbs"),
     [
-        # At the slowest airspeed that is let, steady, an aircraft gains nothing with all its throttle...
+        # At the slowest airspeed allowed, steady, an aircraft gains nothing with all its throttle...
         (1.0, SLOWEST, 0.0, 0.0),
         # ... and with a tenth of it left climbs by that: throttle_per_slope is throttle for a climb of one rad.
         (0.9, SLOWEST, 0.0, 0.1 / GAINS.throttle_per_slope * SLOWEST),
         # An airspeed that is too fast by 2 m/s or too slow by one is brought back in 3 s: v dv / (g t).
         (1.0, SLOWEST + 2.0, 0.0, 2.0 * (SLOWEST + 2.0) / (GRAVITY * 3.0)),
         (1.0, SLOWEST - 1.0, 0.0, -(SLOWEST - 1.0) / (GRAVITY * 3.0)),
-        # 1.2 times the stall, at 500 m where true airspeeds are 1.02445 times equivalent ones, is slower than it is...
-        (1.0, SLOWEST, 0.9 * SLOWEST / (1.2 * 1.02445), 0.0),
-        # ... or faster, by 2 m/s: then that counts.
-        (1.0, SLOWEST, (SLOWEST + 2.0) / (1.2 * 1.02445), -2.0 * SLOWEST / (GRAVITY * 3.0)),
+        # 1.2 times the stall, at 400 m where true airspeeds are 1.019488 times equivalent ones, is slower than it is...
+        (1.0, SLOWEST, 0.9 * SLOWEST / (1.2 * 1.019488), 0.0),
+        # ... or faster, by 1 m/s: then that counts.
+        (1.0, SLOWEST, (SLOWEST + 1.0) / (1.2 * 1.019488), -SLOWEST / (GRAVITY * 3.0)),
         # Never faster than what is flown: with nothing in hand it would sink all the way.
         (1.0, GAINS.reference_airspeed, GAINS.reference_airspeed, 0.0),
     ],
@@ -154,6 +156,29 @@ def test_far_below_the_path_it_climbs_by_what_it_gains(
     held.memory.stall_speed, held.commands.throttle = stall, throttle
     # The same pull as on a path of this climb, a little below it and far.
     assert held.height(up=400.0, airspeed=airspeed).elevator == pytest.approx(free.height(airspeed=airspeed).elevator)
+
+
+@pytest.mark.parametrize(
+    ("bank", "multiple"),
+    [
+        (0.0, 1.2),
+        # 1.1 / sqrt(cos 30 degrees) = 1.182 is less than 1.2...
+        (30.0, 1.2),
+        # ... at 45 degrees it is 1.3081, to either side, at 60 degrees 1.5556...
+        (45.0, 1.3081),
+        (-45.0, 1.3081),
+        (60.0, 1.5556),
+        # ... and beyond a cosine of 0.4, or on its back, 1.1 / sqrt 0.4 = 1.7393.
+        (75.0, 1.7393),
+        (150.0, 1.7393),
+    ],
+)
+def test_in_a_steep_turn_the_stall_is_kept_off_at_a_higher_airspeed(bank: float, multiple: float) -> None:
+    """At 1 m/s below this multiple of the stall speed the aircraft must sink by v dv / (g t)."""
+    held, free = Channel(), Channel(slope=-SLOWEST / (GRAVITY * 3.0) / GAINS.reference_airspeed)
+    held.memory.stall_speed, held.commands.throttle = (SLOWEST + 1.0) / (multiple * 1.019488), 1.0
+    flown = {"airspeed": SLOWEST, "roll": math.radians(bank)}
+    assert held.height(up=400.0, **flown).elevator == pytest.approx(free.height(**flown).elevator, abs=1e-3)
 
 
 def test_near_the_stall_a_gust_counts_at_once() -> None:
