@@ -27,7 +27,7 @@ from planner.plan import Certificate
 from planner.search.search_state import Search, SearchEnded, best_first, safe, with_narrow_margins
 from planner.seeding.airspace_grids import airspace_routes
 from planner.seeding.grids import GridRoute, grid_routes
-from planner.seeding.lattice import ceiling_route, lattice_route, make_lattice, turning_step
+from planner.seeding.lattice import MAX_EXPANDED, ceiling_route, lattice_route, make_lattice, turning_step
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import CLOSE_FIT, QUICK_FIT, fit_points, fit_waypoints
@@ -262,15 +262,16 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
     """The path (w, 3) along a route that may turn back and its certificate, if better than `found`; else `found`."""
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
-    lattices = [make_lattice(data, frame, share * step) for share in STEPS]
+    lattices, left = [make_lattice(data, frame, share * step) for share in STEPS], MAX_EXPANDED
     for number, share in enumerate(STEPS):
         # Where memory sets the step, a smaller one makes the same lattice again.
-        if search.must_end() or lattices[number] in lattices[:number]:
+        if left <= 0 or search.must_end() or lattices[number] in lattices[:number]:
             break
         try:
-            route = lattice_route(data, frame, share * step, search.pause)
+            route, seen = lattice_route(data, frame, share * step, search.pause, left)
         except SearchEnded:
             break
+        left -= seen
         if not len(route):
             continue
         already_safe = search.finished(found[1])

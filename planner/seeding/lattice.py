@@ -292,7 +292,8 @@ def simplify_route(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no
 MIN_STEP, MAX_STEP = 100.0, 2000.0
 # Layers that the gentler slope limit climbs or descends in a step along.
 LAYERS_PER_STEP = 2
-# Maximum number of states of a lattice, and of expanded states.
+# Maximum number of states of a lattice, and of expanded states of all lattices of a search together: of 600 scenarios
+# none had a route over a finer lattice where the first had taken them all.
 MAX_LATTICE_STATES, MAX_EXPANDED = 4_000_000, 60_000
 # States expanded between two calls of `pause`: some 10 ms.
 STATES_AT_ONCE = 2000
@@ -343,8 +344,8 @@ def cheapest_lattice_route(
     courses: int,
     max_states: int,
     pause: Callable[[], None] = lambda: None,
-) -> Records:
-    """`LATTICE_CELL` records of the cheapest route from start to destination; empty if there is none.
+) -> tuple[Records, int]:
+    """`LATTICE_CELL` records of the cheapest route from start to destination, empty if there is none, and states seen.
 
     courses: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
     """
@@ -355,28 +356,33 @@ def cheapest_lattice_route(
         )
         pause()
     if search.found < 0:
-        return np.zeros(0, dtype=LATTICE_CELL)
-    return trace_route(search.table.parents, search.found, lattice)
+        return np.zeros(0, dtype=LATTICE_CELL), search.seen
+    return trace_route(search.table.parents, search.found, lattice), search.seen
 
 
 def lattice_route(
-    data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None] = lambda: None
-) -> Floats:
-    """World points (k, 3) of a route from start to destination over a lattice of this step (m); (0, 3) if none.
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    step: float,
+    pause: Callable[[], None] = lambda: None,
+    max_states: int = MAX_EXPANDED,
+) -> tuple[Floats, int]:
+    """World points (k, 3) of a route from start to destination over a lattice of this step (m), and states expanded.
 
-    pause: called after every `STATES_AT_ONCE` states; an exception raised there stops the search.
+    (0, 3) if there is none. pause: called after every `STATES_AT_ONCE` states; an exception raised there stops the
+    search. max_states: maximum number of expanded states.
     """
     lattice = make_lattice(data, frame, step)
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
     courses = 2 if data.max_turn >= math.radians(90.0) else 1
-    cells = cheapest_lattice_route(data, frame, lattice, courses, MAX_EXPANDED, pause)
+    cells, seen = cheapest_lattice_route(data, frame, lattice, courses, max_states, pause)
     if not len(cells):
-        return np.empty((0, 3))
+        return np.empty((0, 3)), seen
     places = np.column_stack([cells["along"], cells["across"]]) * lattice.step
     up = lattice.low + cells["layer"] * lattice.pitch
     points = frame.restore(np.column_stack([places, up]))
     points[0], points[-1] = data.start, data.destination
-    return np.asarray(simplify_route(data, np.ascontiguousarray(points)))
+    return np.asarray(simplify_route(data, np.ascontiguousarray(points))), seen
 
 
 def ceiling_route(
@@ -393,4 +399,4 @@ def ceiling_route(
         # As those of a scenario: to compiled code, arrays that are not locked are of another type.
         end.setflags(write=False)
     level = data._replace(start=start, destination=destination, floor=data.ceiling, kill_margin=-closer)
-    return lattice_route(level, frame, step, pause)
+    return lattice_route(level, frame, step, pause)[0]

@@ -67,15 +67,37 @@ def test_a_lattice_that_memory_makes_the_same_is_searched_once(
         monkeypatch.setattr(lattice_module, "MAX_LATTICE_STATES", states)
     steps: list[float] = []
 
-    def find_none(data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None]) -> Floats:
+    def find_none(
+        data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None], max_states: int
+    ) -> tuple[Floats, int]:
         steps.append(step)
-        return np.empty((0, 3))
+        return np.empty((0, 3)), 0
 
     monkeypatch.setattr(seeds_module, "lattice_route", find_none)
     search = search_of(scenario, limits)
     search.evaluate(search.straight_vectors())
     search_turning_back(search, search.best_path())
     assert len(steps) == searched
+
+
+@pytest.mark.parametrize(("seen", "allowed"), [(25_000, [60_000, 35_000]), (60_000, [60_000])])
+def test_a_second_lattice_expands_no_more_states_than_the_first_has_left(
+    scenario: Scenario, limits: Limits, monkeypatch: pytest.MonkeyPatch, seen: int, allowed: list[int]
+) -> None:
+    """Neither finds a route, and 60,000 states are for both."""
+    asked: list[int] = []
+
+    def find_none(
+        data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None], max_states: int
+    ) -> tuple[Floats, int]:
+        asked.append(max_states)
+        return np.empty((0, 3)), seen
+
+    monkeypatch.setattr(seeds_module, "lattice_route", find_none)
+    search = search_of(scenario, limits)
+    search.evaluate(search.straight_vectors())
+    search_turning_back(search, search.best_path())
+    assert asked == allowed
 
 
 def test_among_zones_a_later_attempt_follows_the_best_routes_alone(

@@ -48,7 +48,7 @@ def lattice(layers: int = 1, goal_layer: int = 0, pitch: float = 100.0) -> Latti
 
 
 def route_of(data: ProblemArrays, made: Lattice, courses: int = 2) -> Records:
-    return cheapest_lattice_route(data, rotated_frame(data.start, data.destination), made, courses, 100_000)
+    return cheapest_lattice_route(data, rotated_frame(data.start, data.destination), made, courses, 100_000)[0]
 
 
 def test_in_the_open_the_way_is_straight(make_data: MakeData) -> None:
@@ -184,7 +184,7 @@ def test_a_step_holds_two_right_angles(pocket: Problem) -> None:
 
 def test_a_route_leaves_a_pocket_and_passes_no_missile(pocket: Problem) -> None:
     data = pocket.search
-    route = lattice_route(data, rotated_frame(data.start, data.destination), 400.0)
+    route, _ = lattice_route(data, rotated_frame(data.start, data.destination), 400.0)
     np.testing.assert_array_equal(route[[0, -1]], [data.start, data.destination])
     # Not through the missiles ahead: the way is much longer than the straight line.
     assert np.linalg.norm(np.diff(route, axis=0), axis=1).sum() > 1.08 * math.dist(data.start, data.destination)
@@ -199,17 +199,19 @@ def test_a_search_in_slices_finds_the_same_route(pocket: Problem, monkeypatch: p
     data = pocket.search
     frame = rotated_frame(data.start, data.destination)
     made = make_lattice(data, frame, 500.0)
-    whole = cheapest_lattice_route(data, frame, made, 2, 1_000_000)
+    whole, seen = cheapest_lattice_route(data, frame, made, 2, 1_000_000)
     asked: list[int] = []
     monkeypatch.setattr(lattice_module, "STATES_AT_ONCE", 7)
-    sliced = cheapest_lattice_route(data, frame, made, 2, 1_000_000, lambda: asked.append(0))
+    sliced, same = cheapest_lattice_route(data, frame, made, 2, 1_000_000, lambda: asked.append(0))
     assert len(whole) > 0
     assert len(asked) > 10
     np.testing.assert_array_equal(whole, sliced)
-    # Not one state more than is allowed: the slices that find it are as many as are needed.
-    needed = 7 * (len(asked) - 1)
-    assert len(cheapest_lattice_route(data, frame, made, 2, needed)) == 0
-    assert len(cheapest_lattice_route(data, frame, made, 2, needed + 7)) == len(whole)
+    # Not one state more than is allowed.
+    assert seen == same
+    assert math.ceil(seen / 7) == len(asked)
+    none, all_allowed = cheapest_lattice_route(data, frame, made, 2, seen - 1)
+    assert (len(none), all_allowed) == (0, seen - 1)
+    assert len(cheapest_lattice_route(data, frame, made, 2, seen)[0]) == len(whole)
 
 
 def test_what_a_pause_raises_ends_the_search(pocket: Problem) -> None:
