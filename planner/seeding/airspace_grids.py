@@ -147,8 +147,15 @@ def _set_cell_costs(
     price: Floats,
 ) -> None:  # pragma: no cover - compiled
     """Fill the cost per m of a stage's cells (low..high, layers); inf where a path is not allowed."""
+    near, aside2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(low, high + 1):
-        column = columns[y]
+        column, count = columns[y], 0
+        for k in range(obstacles.shape[0]):
+            obstacle = obstacles[k]
+            aside2[count] = (along - obstacle.along) ** 2 + (grid.across[y] - obstacle.across) ** 2
+            if aside2[count] < obstacle.radius * obstacle.radius:
+                near[count] = k
+                count += 1
         first = column.lowest if grid.follows else grid.floor
         middle, half = 0.5 * (column.lowest + column.highest), 0.5 * (column.highest - column.lowest)
         for z in range(grid.layers):
@@ -159,10 +166,9 @@ def _set_cell_costs(
             price[y, z] = 1.0 + extra[y]
             if grid.follows:
                 price[y, z] += EDGE_COST * ((up - middle) / max(half, 1e-6)) ** 2
-            for k in range(obstacles.shape[0]):
-                obstacle = obstacles[k]
-                away2 = (along - obstacle.along) ** 2 + (grid.across[y] - obstacle.across) ** 2
-                away2 += (up - obstacle.up) ** 2
+            for n in range(count):
+                obstacle = obstacles[near[n]]
+                away2 = aside2[n] + (up - obstacle.up) ** 2
                 if away2 < obstacle.radius * obstacle.radius:
                     price[y, z] += KILL_COST * (3.0 - 2.0 * math.sqrt(away2) / obstacle.radius)
 
@@ -217,6 +223,9 @@ def _relax_stage(
                 lowest = max(0, math.ceil((up - dive - to_first) / grid.pitch))
                 highest = min(grid.layers - 1, math.floor((up + climb - to_first) / grid.pitch))
                 for z2 in range(lowest, highest + 1):
+                    # A step is no shorter than a level one: most cost too much even so, and need no root.
+                    if here + run * price[to, z2] >= after[to, z2]:
+                        continue
                     rise = to_first + z2 * grid.pitch - up
                     if max(up, up + rise) > closed.low and min(up, up + rise) < closed.high:
                         continue
