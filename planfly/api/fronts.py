@@ -110,6 +110,7 @@ def _write(front: Front, world: Scenario, folder: Path) -> None:
             "clearance_m",
             f"{front.fourth}_{'s' if front.fourth == 'time' else 'wh'}",
         ],
+        "asked": front.asked,
         "default": {key: value for key, value in _row(0, front.default).items() if key != "plan"},
         "plans": [row | {"file": f"plan-{row['plan']}.json"} for row in rows],
     }

@@ -62,6 +62,8 @@ class FrontAnswer:
     folder: str
     fourth: Literal["energy", "time"]
     """What they are compared by beside length, exposure and clearance."""
+    asked: int
+    """How many plans were asked for; there may be fewer."""
     plans: list[FrontEntry]
     problems: list[str]
     """Why there is no plan."""
@@ -89,6 +91,7 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
         seed=default.seed,
         folder=str(folder),
         fourth="time" if front.fourth == "time" else "energy",
+        asked=front.asked,
         plans=entries,
         problems=[] if front.plans else list(default.certificate.problems),
         conditions=conditions_document(conditions_of_plan(default)),

@@ -33,6 +33,7 @@ def test_a_front_is_a_folder_of_plans_with_their_table(
     table = json.loads((folder / "front.json").read_text(encoding="utf-8"))
     with (folder / "front.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
+    assert table["asked"] == made["asked"] == 3
     assert [row["file"] for row in table["plans"]] == [f"plan-{row['plan']}.json" for row in rows]
     for row, entry, one, plan in zip(rows, table["plans"], made["plans"], plans, strict=True):
         for name in ("length_m", "exposure_s", "clearance_m", "energy_wh", "time_s"):
@@ -47,14 +48,18 @@ def test_a_front_without_choices_says_so(
     """Level ground without radars, between ends at 75 m: all there is to choose is how short it is."""
     if not SOAK:
         monkeypatch.setattr(choice_of_ways, "plan_front", partial(choice_of_ways.plan_front, generations=20))
-    assert main(["plan", "tight", "--front", "10", "--seed", "1", "--out", str(tmp_path / "front")]) == 0
+    folder, answer = tmp_path / "front", tmp_path / "answer.json"
+    assert main(["plan", "tight", "--front", "10", "--seed", "1", "--out", str(folder), "--json", str(answer)]) == 0
     text = capsys.readouterr().out
     assert text.startswith("front of 1 safe plan\n")
     assert (
         "  note    1 of the 10 asked for: no other that was found gains more than 0.1% in length or energy, 1% in "
         "exposure or 1 m in height\n"
     ) in text
-    assert [file.name for file in (tmp_path / "front").glob("plan-*")] == ["plan-1.json"]
+    assert [file.name for file in folder.glob("plan-*")] == ["plan-1.json"]
+    for written in (answer, folder / "front.json"):
+        document = json.loads(written.read_text(encoding="utf-8"))
+        assert (document["asked"], len(document["plans"])) == (10, 1)
 
 
 @pytest.mark.parametrize(
