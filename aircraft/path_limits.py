@@ -71,6 +71,8 @@ class Limits:
     reserve_height: height above ground that is kept for downdrafts beside the clearance, m.
     reserve_threats: the same around missiles' spheres, in all directions, and above and below zones, m.
     reserve_climb: rate of climb that legs leave unused for downdrafts, m/s.
+    reserve_above: distance below a maximum height above ground that is kept for updrafts, m.
+    reserve_sink: rate of sink that legs leave unused for updrafts, m/s.
     """
 
     max_turn: float | None
@@ -85,6 +87,8 @@ class Limits:
     reserve_height: float = 0.0
     reserve_threats: float = 0.0
     reserve_climb: float = 0.0
+    reserve_above: float = 0.0
+    reserve_sink: float = 0.0
     # Each is made once: a route asks for the same few speeds again and again.
     _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)
 
@@ -161,23 +165,30 @@ class Limits:
         )
 
 
-def derated(table: PerformanceTable, climb_share: float, sink_share: float, reserve: float = 0.0) -> PerformanceTable:
-    """The same aircraft with shares (0..1) of its climb and descent, and at least a climb rate (m/s) kept in reserve.
+def derated(
+    table: PerformanceTable, climb_share: float, sink_share: float, unused_climb: float = 0.0, unused_sink: float = 0.0
+) -> PerformanceTable:
+    """The same aircraft with shares (0..1) of its climb and descent, of which it leaves these rates (m/s) unused.
 
-    Negative angles, a loss of height, are unchanged; level flight is left to all that do not lose height.
+    Negative angles, a loss of height, are unchanged. Where the aircraft has no more than the unused rate, level flight
+    is left.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
-    >>> derated(table, 0.5, 1.0).climb.tolist(), derated(table, 0.9, 0.9, reserve=3.0).climb.round(3).tolist()
+    >>> derated(table, 0.5, 1.0).climb.tolist(), derated(table, 0.9, 0.9, unused_climb=3.0).climb.round(3).tolist()
     ([0.1, -0.1], [0.079, -0.1])
     """
-    shares = (climb_share, table.climb), (sink_share, table.descent)
-    climb, descent = (np.where(angles > 0.0, share * angles, angles) for share, angles in shares)
-    if reserve > 0.0:
-        speeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
-        left = np.arcsin(np.maximum(0.0, np.sin(table.climb) - reserve / speeds))
-        climb = np.where(climb > 0.0, np.minimum(climb, left), climb)
-    return table._replace(climb=_read_only(climb), descent=_read_only(descent))
+    speeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
+
+    def left(angles: Floats, share: float, unused: float) -> Floats:
+        reduced = np.where(angles > 0.0, share * angles, angles)
+        if unused <= 0.0:
+            return _read_only(reduced)
+        most = np.arcsin(np.maximum(0.0, np.sin(angles) - unused / speeds))
+        return _read_only(np.where(reduced > 0.0, np.minimum(reduced, most), reduced))
+
+    climb, descent = left(table.climb, climb_share, unused_climb), left(table.descent, sink_share, unused_sink)
+    return table._replace(climb=climb, descent=descent)
 
 
 def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:

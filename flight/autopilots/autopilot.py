@@ -447,9 +447,16 @@ class Autopilot(ABC):
         return 0.0
 
     def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
-        """How far (m) below its path downdrafts may take it; 0 where its tracking error has all that is kept for them.
+        """How far (m) below its path downdrafts of one in a hundred take it; 0 if its tracking error allows for them.
 
-        climb: what the aircraft has in hand against them, m/s.
+        climb: rate of climb that the aircraft has unused against them, m/s.
+        """
+        return 0.0
+
+    def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
+        """How far (m) above its path updrafts of one in a hundred lift it; 0 if it holds its height against them.
+
+        sink: rate of sink that the aircraft has unused against them, m/s.
         """
         return 0.0
 

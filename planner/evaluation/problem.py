@@ -309,9 +309,9 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     # Plus the rise of the ground across the tracking error; the certificate measures the ground there.
     more = limits.reserve_height + up + across * certified.slope_bounds.steepest
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + more
-    airspace = _search_airspace(scenario, certified, attempt, up, limits.reserve_threats)
+    airspace = _search_airspace(scenario, certified, attempt, up, limits)
     if airspace.max_height < math.inf:
-        buffer = min(buffer, _max_buffer(certified))
+        buffer = min(buffer, _max_buffer(certified, certified.buffer))
     search = _inset(
         certified._replace(
             buffer=buffer,
@@ -332,7 +332,6 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
     tracking = no_tracking() if limits.tracking is None else limits.tracking.record
     vertical, share = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
-    # Downdrafts take an aircraft down, and from no height limit above it.
     buffer, beside = vertical + limits.reserve_height, vertical + limits.reserve_threats
     aircraft = _performance(scenario, limits)
     arrays = ProblemArrays(
@@ -365,19 +364,25 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
         tracking=tracking,
-        airspace=make_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, beside, share), vertical),
+        airspace=make_airspace(
+            scenario,
+            _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, beside, share),
+            vertical + limits.reserve_above,
+        ),
         travel=LENGTH,
     )
     return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.has_error else arrays
 
 
 def _search_airspace(
-    scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, reserve: float
+    scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, limits: Limits
 ) -> PlannerAirspace:
     """Airspace with the margins of a search."""
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
-    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer + reserve, 1.0)
-    return make_airspace(scenario, margins, min(buffer, _max_buffer(certified)))
+    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer + limits.reserve_threats, 1.0)
+    return make_airspace(
+        scenario, margins, min(buffer + limits.reserve_above, _max_buffer(certified, certified.airspace.buffer))
+    )
 
 
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, share: float) -> ZoneMargins:
@@ -387,20 +392,23 @@ def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, share:
     return ZoneMargins(horizontal + more, vertical + max(0.0, more), share)
 
 
-def _max_buffer(certified: ProblemArrays) -> float:
-    """Largest margin of a search to either edge of a band of heights above ground, m; inf without a maximum height."""
+def _max_buffer(certified: ProblemArrays, at_edge: float) -> float:
+    """Largest margin of a search to an edge of a band of heights above ground, m; inf without a maximum height.
+
+    at_edge: that of the certificate, m.
+    """
     space = certified.airspace
     between = space.max_height - certified.clearance - certified.buffer - space.buffer
-    return certified.buffer + BAND_SHARE * max(0.0, between)
+    return at_edge + BAND_SHARE * max(0.0, between)
 
 
 def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
     """Performance of the aircraft, reduced in turbulence and for its autopilot, within the rates that this demands."""
     share, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
-        return derated(limits.performance(), share, share, limits.reserve_climb)
+        return derated(limits.performance(), share, share, limits.reserve_climb, limits.reserve_sink)
     climb_share, sink_share = (min(share, own) for own in (tracking.own_climb_share, tracking.own_sink_share))
-    table = derated(limits.performance(), climb_share, sink_share, limits.reserve_climb)
+    table = derated(limits.performance(), climb_share, sink_share, limits.reserve_climb, limits.reserve_sink)
     return within_rates(table, tracking.climb_rate, tracking.sink_rate)
 
 

@@ -1,4 +1,4 @@
-"""How much height downdrafts may take, and what a plan does about it."""
+"""How much height gusts may take or give, and what a plan does about it."""
 
 from dataclasses import replace
 from typing import Any
@@ -10,7 +10,7 @@ import planfly
 from aircraft.path_limits import Limits
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from planfly.airframe import Airframe, load_airframe
-from planfly.gust_heights import find_shortfalls, keep_height, limits_of_others
+from planfly.gust_heights import find_shortfalls, keep_height, limits_in_gusts, limits_of_others
 from planfly.make_plan import finish_plan, make_plan
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import CERTIFIED_BUFFER, make_problem
@@ -250,7 +250,7 @@ def test_what_is_thinner_than_the_height_is_not_jumped_over(tables: dict[str, An
     plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
     assert plan.safe
     (shortfall,) = find_shortfalls(plan, airframe)
-    assert shortfall.below
+    assert shortfall.of_threats
     assert 1.0 < shortfall.depth <= 4.1
 
 
@@ -324,3 +324,115 @@ def test_every_command_keeps_it_and_a_front_is_not_left_with_one() -> None:
     for one in [*(found.plan for found in front.plans), planfly.plan(scenario, seed=SEED)]:
         assert one.safe
         assert keep_height(one, airframe) is one
+
+
+# --- Updrafts ---
+
+
+def band_of(most: float, autopilot: str = "ardupilot", **tables: Any) -> Scenario:
+    """8 km for the X8 over level ground at sea level, at 150 m, below a maximum height, in moderate turbulence."""
+    made: dict[str, Any] = {
+        "terrain": {"kind": "flat", "amsl_m": 0.0},
+        "flight": {"aircraft": "x8", "autopilot": autopilot},
+        "limits": {"min_clearance_m": 50.0, "max_height_m": most},
+        "wind": {"speed_mps": 0.0, "from_deg": 0.0, "turbulence": "moderate"},
+    }
+    ends = [[0.0, 0.0, 150.0], [8000.0, 0.0, 150.0]]
+    return from_spec(spec_around(ends, buffer=3000.0, ceiling=800.0) | made | tables, "band")
+
+
+@pytest.mark.parametrize(
+    ("sink", "turbulence", "rise"),
+    [
+        (2.0, "moderate", 12.0 * (2.33 * GUST - 2.0)),
+        (4.0, "moderate", 0.0),
+        # With less than 0.6 standard deviations, what one of them makes in a minute.
+        (0.9, "moderate", 60.0 * GUST),
+        (1.5, "light", 12.0 * (2.33 * 0.5 * GUST - 1.5)),
+        (0.0, "none", 0.0),
+    ],
+)
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4", "ideal"])
+def test_an_updraft_lifts_those_who_keep_their_airspeed(
+    sink: float, turbulence: Turbulence, rise: float, autopilot: str
+) -> None:
+    expected = 0.0 if autopilot == "ideal" else rise
+    found = load_airframe(band_of(300.0, autopilot)).autopilot.gust_rise(sink, turbulence)
+    assert found == pytest.approx(expected, abs=0.3)
+
+
+@pytest.mark.parametrize("over", [0.5, -0.5])
+def test_a_level_path_leaves_what_an_updraft_may_give(over: float) -> None:
+    """Below the maximum height: the rise, and ArduPlane's own error of height."""
+    airframe = load_airframe(band_of(300.0))
+    error = airframe.limits.tracking
+    assert error is not None
+    rise = 12.0 * (2.33 * GUST - airframe.limits.rates(150.0)[1])
+    assert rise > 5.0
+    scenario = band_of(150.0 + rise + error.up + over)
+    plan = plan_along(airframe, scenario, [scenario.start, [4000.0, 0.0, 150.0], scenario.destination])
+    shortfalls = find_shortfalls(plan, airframe)
+    assert bool(shortfalls) is (over < 0.0)
+    assert {one.gust for one in shortfalls} <= {"updrafts"}
+    assert keep_height(plan, airframe).safe is (over > 0.0)
+
+
+def test_a_leg_that_sinks_leaves_less() -> None:
+    """It begins 40 m below the maximum height, and its sink of 1.4 m/s leaves less than 0.6 standard deviations."""
+    scenario = band_of(230.0)
+    airframe = load_airframe(scenario)
+    way = np.array([[0, 0, 190], [2000, 0, 190], [3500, 0, 80], [8000, 0, 80]], dtype=np.float64)
+    sinks = 110.0 / 1500.0 * airframe.limits.performance().airspeed
+    assert airframe.limits.rates(190.0)[1] - sinks < 0.6 * GUST
+    (shortfall,) = find_shortfalls(plan_along(airframe, scenario, way), airframe)
+    assert shortfall.into == "above the 230 m over ground that are allowed"
+    assert shortfall.where in {"on leg 0", "on leg 1"}
+    assert shortfall.depth == pytest.approx(60.0 * GUST - 40.0 + airframe.limits.tracking.up, abs=5.0)  # type: ignore[union-attr]
+    # Without a limit above it nothing is wrong.
+    free = from_spec(band_of(230.0).to_json() | {"limits": {"min_clearance_m": 50.0}}, "free")
+    assert not find_shortfalls(plan_along(airframe, free, way), airframe)
+
+
+def test_a_zone_above_counts() -> None:
+    """1 m less above the path than an updraft gives is too little, 1 m more is enough."""
+    over = {"name": "corridor", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 500.0}
+    free = {"limits": {"min_clearance_m": 50.0}}
+    airframe = load_airframe(band_of(300.0))
+    rise = 12.0 * (2.33 * GUST - airframe.limits.rates(150.0)[1])
+    for above, wrong in ((rise - 1.0, True), (rise + 1.0, False)):
+        scenario = band_of(300.0, zones=[over | {"floor_amsl_m": 150.0 + above}], **free)
+        plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+        assert bool(find_shortfalls(plan, airframe)) is wrong
+
+
+@pytest.mark.parametrize("aircraft", ["x8", "zagi", "aerosonde"])
+def test_a_search_below_a_maximum_height_leaves_sink_unused(aircraft: str) -> None:
+    """At most one standard deviation and 0.6 of the sink that there is, but 0.6 standard deviations at least."""
+    scenario = band_of(300.0, flight={"aircraft": aircraft, "autopilot": "ardupilot"})
+    airframe = load_airframe(scenario)
+    sink = airframe.limits.rates(150.0)[1]
+    plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+    least, share, most = 0.6 * GUST, 0.6 * sink, GUST
+    kept = limits_in_gusts(plan, airframe).reserve_sink
+    assert kept == pytest.approx({"zagi": least, "x8": share, "aerosonde": most}[aircraft], rel=3e-3)
+    assert (share < least, share > most) == (aircraft == "zagi", aircraft == "aerosonde")
+
+
+def test_a_plan_below_a_maximum_height_is_made_anew() -> None:
+    """20 m below it at both ends the straight line lacks some metres in the middle, and a plan that sinks is taken.
+
+    11 m below, half of the rise and ArduPlane's error of height are more than there is at the ends.
+    """
+    scenario = band_of(170.0)
+    airframe = load_airframe(scenario)
+    first = plan_path(scenario, airframe.limits, seed=SEED)
+    assert first.safe
+    assert find_shortfalls(first, airframe)
+    plan = make_plan(scenario, airframe, SEED)
+    assert plan.safe
+    assert not find_shortfalls(plan, airframe)
+    assert np.interp(4000.0, plan.waypoints[:, 0], plan.waypoints[:, 2]) < 145.0
+    (problem,) = make_plan(band_of(161.0), airframe, SEED).certificate.problems
+    assert "in moderate turbulence updrafts may take it" in problem
+    assert "above the 161 m over ground that are allowed" in problem
+    assert "less turbulence, or an aircraft that sinks faster, would help" in problem

@@ -37,6 +37,7 @@ from flight.autopilots.autopilot import (
     StoredParameters,
     Tick,
 )
+from flight.autopilots.gust_height import height_in_updrafts
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.ground_ways import Approach, GroundWays, TakeOff
 from flight.mission.itinerary import Loiter
@@ -261,6 +262,10 @@ class ArduPlane(Autopilot):
     ) -> TrackingError | None:
         """How far its law strays with these parameters."""
         return tracking_error(self.parameters, airspeed, nav, fly_over=fly_over, turbulence=turbulence)
+
+    def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
+        """It keeps its airspeed, and cannot sink faster than the aircraft does so."""
+        return height_in_updrafts(sink, turbulence)
 
     def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "ArduPlaneFromGround":
         """The same law with its take-off and its landing."""

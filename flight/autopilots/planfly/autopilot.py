@@ -5,16 +5,12 @@ from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot, Level, StoredAutopilot, Tick
+from flight.autopilots.gust_height import height_in_gusts
 from flight.autopilots.planfly.law import LAWS, planfly_tick
 from flight.guidance.gains import GAINS_FILE, load_gains
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Guidance
-from world.wind import W20, Turbulence
-
-# Standard deviations of a downdraft that one in a hundred exceeds, and how long it is taken to last, s.  Of 303 flights
-# in moderate turbulence (scenarios 4000 to 4599 and 12000 to 12299 of `benchmarks.plans_and_verdicts`, three streams
-# each) one leg in a hundred came down by 34 m with 0.3 to 1.2 m/s in hand, 28 with 1.4, 21 with 1.8 and 9 with 3.5.
-_SIGMAS, _DOWNDRAFT_LASTS = 2.33, 12.0
+from world.wind import Turbulence
 
 _DESCRIBED = {
     "path": "planfly's guidance on the fly-by path",
@@ -67,8 +63,8 @@ class PlanflyGuidance(Autopilot):
         memory.law = LAWS[self.guidance]
 
     def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
-        """By the downdraft that one in a hundred exceeds, less what the aircraft climbs, for as long as one lasts."""
-        return _DOWNDRAFT_LASTS * max(0.0, _SIGMAS * 0.1 * W20[turbulence] - climb)
+        """By the downdraft that one in a hundred exceeds. Updrafts do not lift it: it dives and flies faster."""
+        return height_in_gusts(climb, turbulence)
 
     def described(self, aircraft: str) -> str:
         """The lateral law in words."""

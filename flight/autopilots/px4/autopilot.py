@@ -17,6 +17,7 @@ from flight.autopilots.autopilot import (
     StoredParameters,
     Tick,
 )
+from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_tick
 from flight.autopilots.px4.parameters import (
@@ -236,6 +237,10 @@ class Px4(Autopilot):
     def off_height_chance(self, climb: float, sink: float, turbulence: Turbulence) -> float:
         """More than NAV_FW_ALT_RAD, in moderate turbulence."""
         return off_height_chance(self.parameters["NAV_FW_ALT_RAD"], climb, sink, turbulence)
+
+    def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
+        """It keeps its airspeed, and cannot sink faster than the aircraft does so."""
+        return height_in_updrafts(sink, turbulence)
 
     def as_asked(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0

@@ -164,6 +164,23 @@ def test_a_search_leaves_half_of_a_narrow_band_to_the_path(
     assert (problem.search.buffer, problem.search.airspace.buffer) == pytest.approx((kept, kept))
 
 
+def test_what_is_kept_for_updrafts(make_limits: Make, small: Small) -> None:
+    """30 m more below the maximum height and 1 m/s less sink; nothing else."""
+    flat = {"kind": "flat", "amsl_m": 0}
+    scenario = small(terrain=flat, limits={"min_clearance_m": 60, "max_height_m": 400})
+    limits = make_limits(scenario)
+    usual, kept = (
+        make_problem(scenario, one) for one in (limits, replace(limits, reserve_above=30.0, reserve_sink=1.0))
+    )
+    assert kept.certified.airspace.buffer - usual.certified.airspace.buffer == pytest.approx(30.0)
+    assert kept.search.airspace.buffer - usual.search.airspace.buffer == pytest.approx(30.0)
+    assert (kept.certified.buffer, kept.search.buffer) == (usual.certified.buffer, usual.search.buffer)
+    tables = usual.certified.aircraft, kept.certified.aircraft
+    sinks = [float(table.airspeed * np.sin(table.descent[0])) for table in tables]
+    assert sinks[0] - sinks[1] == pytest.approx(1.0)
+    assert tables[0].climb.tolist() == tables[1].climb.tolist()
+
+
 def test_what_is_kept_for_downdrafts(make_limits: Make, small: Small) -> None:
     """30 m more from the ground, 20 m from missiles, 1 m/s less climb; from a low end no faster than half the climb."""
     flat = {"kind": "flat", "amsl_m": 0}
