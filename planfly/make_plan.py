@@ -62,8 +62,13 @@ def make_plan(
     limits = airframe.limits.surely()
 
     def settle(plan: Plan, search: Search) -> Plan:
-        few = settle_in_gusts(plan, airframe, lambda asked: search(asked, limits))
-        return keep_height(few, airframe, lambda kept: search(plan.scenario, kept))
+        def few_waypoints(found: Plan, within: Limits) -> Plan:
+            return settle_in_gusts(found, airframe, lambda asked: search(asked, within))
+
+        def search_within(kept: Limits) -> Plan:
+            return few_waypoints(search(plan.scenario, kept), kept)
+
+        return keep_height(few_waypoints(plan, limits), airframe, search_within)
 
     if flown is not None:
         old, leg = flown

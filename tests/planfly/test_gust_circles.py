@@ -11,6 +11,7 @@ import pytest
 from flight.autopilots.px4.autopilot import Px4
 from planfly.airframe import Airframe, load_airframe
 from planfly.gust_circles import MOST_CIRCLES, expected_circles, settle_in_gusts
+from planfly.gust_heights import find_shortfalls
 from planfly.make_plan import make_plan
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
@@ -93,6 +94,19 @@ def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: A
     # As a share of all, the wind is much more than that.
     calm = airframe_of_x8.autopilot.off_height_chance(climb - slope * true_airspeed, sink, "moderate")
     assert abs(climbing / calm - 1.0) > 3e-3
+
+
+def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
+    """22 m below the maximum height a level way has too little against updrafts; what is found then circles as little."""
+    scenario = scenario_of("moderate", limits={"min_clearance_m": 50.0, "max_height_m": 172.0})
+    airframe = load_airframe(scenario)
+    limits = airframe.limits.surely()
+    first = settle_in_gusts(plan_path(scenario, limits, seed=SEED), airframe, searching(airframe, []))
+    assert first.safe
+    assert find_shortfalls(first, airframe)
+    plan = make_plan(scenario, airframe, SEED)
+    assert expected_circles(plan, airframe.autopilot, limits) <= MOST_CIRCLES
+    assert plan.safe or "updrafts may take it" in plan.certificate.problems[0]
 
 
 def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -> None:
