@@ -97,7 +97,7 @@ def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: A
 
 
 def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
-    """22 m below the maximum height a level way has too little against updrafts; what is found then circles as little."""
+    """22 m below the maximum height a level way has too little against updrafts; what is found then is settled too."""
     scenario = scenario_of("moderate", limits={"min_clearance_m": 50.0, "max_height_m": 172.0})
     airframe = load_airframe(scenario)
     limits = airframe.limits.surely()
