@@ -27,12 +27,18 @@ GUSTS_ASIDE = 8.0
 _HELPFUL = range(5, 105, 5)
 
 
-def settle_in_gusts(plan: Plan, airframe: Airframe, search: Callable[[Scenario], Plan] | None = None) -> Plan:
+def settle_in_gusts(
+    plan: Plan,
+    airframe: Airframe,
+    search: Callable[[Scenario], Plan] | None = None,
+    within: Limits | None = None,
+) -> Plan:
     """The plan if it has few enough waypoints for its turbulence; otherwise one with fewer.
 
     Where none with fewer is found, the plan is returned with the reason in its certificate, and is not safe.
 
     search: plans a scenario as the plan was planned; None not to look for another path.
+    within: limits that the plan was planned in; None for the aircraft's.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -51,7 +57,7 @@ def settle_in_gusts(plan: Plan, airframe: Airframe, search: Callable[[Scenario],
         # With as many waypoints as plans have where nobody circles, no corner is too sharp.
         has_all = len(plan.waypoints) >= plan.scenario.planner.waypoints
         return plan if has_all or _is_settled(plan, airframe) else _refused(plan, _what_is_wide(plan, airframe))
-    fewer = drop_waypoints(plan, limits)
+    fewer = drop_waypoints(plan, limits if within is None else within)
     if _is_settled(fewer, airframe):
         return fewer
     circles, count = expected_circles(fewer, autopilot, limits), len(fewer.waypoints) - 2

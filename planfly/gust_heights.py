@@ -60,7 +60,7 @@ class Shortfall(NamedTuple):
     depth: m.
     into: "into" a clearance, a missile's reach or a zone, "out of" one, or "above" a height, with its name.
     where: on which leg, or at which end.
-    at_end: "start" or "destination" if no other path helps, because the end itself lies too low; otherwise "".
+    at_end: "start" or "destination" if no other path helps, because of the height of the end itself; otherwise "".
     of_threats: whether it is a missile or a zone.
     """
 
@@ -149,6 +149,10 @@ def _other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list
         if from_threats and not any(one.of_threats for one in seen):
             continue
         within = limits_in_gusts(plan, airframe, unused)
+        # Without a maximum height the first of the two keeps nothing for updrafts but sink.
+        from_zones_alone = all(one.of_threats for one in shortfalls) and plan.scenario.limits.max_height_m is None
+        if not from_threats and from_zones_alone and not within.reserve_height:
+            continue
         other = search(_from_threats(within) if from_threats else within)
         if not other.safe:
             continue
@@ -192,8 +196,9 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused: float = _UNUSED_SHAR
             left = max(0.0, min(_UNUSED_SIGMAS * deviation, unused * climb))
             limits = replace(limits, reserve_height=moves(left, turbulence), reserve_climb=left)
         else:
-            left = min(_UNUSED_SINK_SIGMAS * deviation, _UNUSED_SINK_SHARE * sink)
-            left = max(LEAST_SIGMAS * deviation, left)
+            left = max(LEAST_SIGMAS * deviation, min(_UNUSED_SINK_SIGMAS * deviation, _UNUSED_SINK_SHARE * sink))
+            if sink < LEAST_SIGMAS * deviation:
+                left = 0.0
             limits = replace(limits, reserve_above=moves(left, turbulence), reserve_sink=left)
     return limits
 
@@ -242,8 +247,10 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
         able, used = (rates[:, 0], np.maximum(0.0, climbs)) if down else (rates[:, 1], np.maximum(0.0, -climbs))
         # The least that a leg leaves, at its beginning or at its end.
         left = np.minimum(able[:-1] - used[:, 0], able[1:] - used[:, 1])
-        needs = np.array([moves(float(one), turbulence) for one in left])
-        at_ends = _SHARE_AT_ENDS * np.array([moves(float(able[k]), turbulence) for k in (0, -1)])
+        # ArduPlane and PX4 stray in height even without such a gust; planfly's guidance does not.
+        strays = 0.0 if down else float(problem.certified.tracking.up)
+        needs = np.array([moves(float(one), turbulence) + strays for one in left])
+        at_ends = _SHARE_AT_ENDS * np.array([moves(float(able[k]), turbulence) + strays for k in (0, -1)])
         parts = _cut(problem, plan.waypoints, gust, needs, at_ends)
         found += [
             _into_clearance(problem, parts) if down else _above_maximum(problem, parts),
@@ -279,16 +286,21 @@ def _cut(problem: Problem, waypoints: Floats, gust: Gust, needs: Floats, at_ends
     return _Parts(gust, path, legs, before, after)
 
 
+def _at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
+    """Name, height above ground (m) and index of the points at both ends."""
+    terrain = problem.scenario.terrain
+    if terrain is None:  # pragma: no cover - a problem has one
+        return []
+    over = parts.points[:, 2] - terrain.height(parts.points[:, 0], parts.points[:, 1])
+    return [("start", float(over[0]), 0), ("destination", float(over[-1]), -1)]
+
+
 def _into_clearance(problem: Problem, parts: _Parts) -> Shortfall | None:
     """How far a downdraft may take a path below its clearance, where that is deepest; None if nowhere."""
-    data, terrain = problem.certified, problem.scenario.terrain
-    if terrain is None:  # pragma: no cover - a problem has one
-        return None
+    data = problem.certified
     into = f"into the clearance of {data.clearance:g} m"
-    for name, k in (("start", 0), ("destination", -1)):
-        east, north, up = parts.points[k].tolist()
-        depth = float(parts.after[k]) + data.clearance - (up - float(terrain.height(east, north)))
-        if depth > _EPSILON:
+    for name, over, k in _at_ends(problem, parts):
+        if (depth := float(parts.after[k]) + data.clearance - over) > _EPSILON:
             return Shortfall(parts.gust, depth, into, f"at its {name}", at_end=name)
     lowest = Shortfall(parts.gust, 0.0, into, "")
     for piece in heights_above_ground(data, parts.points):
@@ -306,11 +318,14 @@ def _above_maximum(problem: Problem, parts: _Parts) -> Shortfall | None:
     data, most = problem.certified, problem.certified.airspace.max_height
     if most == math.inf:
         return None
+    above = f"above the {most:.0f} m over ground that are allowed"
+    for name, over, k in _at_ends(problem, parts):
+        if (depth := over + float(parts.after[k]) - most) > _EPSILON:
+            return Shortfall(parts.gust, depth, above, f"at its {name}", at_end=name)
     pieces = airspace_pieces(data, _moved(parts)[-1])
     highest = max(pieces, key=lambda piece: float(piece["height"]))
-    above = float(highest["height"]) + float(data.tracking.up) - most
     where = f"on leg {parts.legs[min(int(highest['number']), len(parts.legs) - 1)]}"
-    return Shortfall(parts.gust, above, f"above the {most:.0f} m over ground that are allowed", where)
+    return Shortfall(parts.gust, float(highest["height"]) - most, above, where)
 
 
 def _into_missile(problem: Problem, parts: _Parts) -> Shortfall | None:
@@ -360,9 +375,11 @@ def _in_words(one: Shortfall, plan: Plan, airframe: Airframe) -> str:
     """One line for a person, with what would help."""
     better = "climbs better" if one.gust == "downdrafts" else "sinks faster"
     helps = f"less turbulence, an aircraft that {better}"
+    is_held_down = one.gust == "updrafts" and not one.of_threats
     if one.at_end:
-        helps += f" or a {one.at_end} that is {math.ceil(one.depth)} m higher"
-    elif _is_below_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
+        lies = "higher" if one.gust == "downdrafts" else "lower"
+        helps += f" or a {one.at_end} that is {math.ceil(one.depth)} m {lies}"
+    elif is_held_down or _is_below_a_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
         helps += " or a higher limit on its height"
     else:
         helps = f"less turbulence, or an aircraft that {better},"

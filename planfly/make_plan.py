@@ -63,7 +63,7 @@ def make_plan(
 
     def settle(plan: Plan, search: Search) -> Plan:
         def few_waypoints(found: Plan, within: Limits) -> Plan:
-            return settle_in_gusts(found, airframe, lambda asked: search(asked, within))
+            return settle_in_gusts(found, airframe, lambda asked: search(asked, within), within)
 
         def search_within(kept: Limits) -> Plan:
             return few_waypoints(search(plan.scenario, kept), kept)

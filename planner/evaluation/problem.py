@@ -414,7 +414,7 @@ def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
 
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
     """Growth of the buffer away from an end without it, m per m, that the aircraft can follow in still air."""
-    if not limits.reserve_height:
+    if not (limits.reserve_height or limits.reserve_above):
         return BUFFER_GROWTH
     slopes = [
         float(np.interp(point[2], aircraft.amsl, angles))

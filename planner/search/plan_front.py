@@ -86,6 +86,7 @@ class Front:
     default: the shortest plan that the planner finds alone, and its values.
     reference: (4,) values beyond which a plan does not count, clearance negated.
     evaluations: paths evaluated, beside the default plan's.
+    refused: how many others were found that were not safe once they were completed.
     """
 
     plans: tuple[FrontPlan, ...]
@@ -94,6 +95,7 @@ class Front:
     default: FrontPlan
     reference: Floats
     evaluations: int
+    refused: int = 0
 
     def objectives(self) -> Floats:
         """Objectives (n, 4) of the plans, all smaller is better."""
@@ -146,8 +148,9 @@ def plan_front(
     size = max(ARCHIVE, KEPT * count)
     search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
     evaluations = _search(task, search, path, progress, stop, generations)
-    chosen = _certified(task, search, count, first, replace(default, evaluations=evaluations), finish)
-    return Front(tuple(sorted(chosen, key=lambda one: one.length)), count, task.fourth, first, reference, evaluations)
+    chosen, refused = _certified(task, search, count, first, replace(default, evaluations=evaluations), finish)
+    plans = tuple(sorted(chosen, key=lambda one: one.length))
+    return Front(plans, count, task.fourth, first, reference, evaluations, refused)
 
 
 # --- The problem ---
@@ -391,10 +394,10 @@ def _certified(
     first: FrontPlan,
     template: Plan,
     finish: Callable[[Plan], Plan],
-) -> list[FrontPlan]:
-    """Up to `count` distinct plans that cover most of those that are safe, each certified and completed.
+) -> tuple[list[FrontPlan], int]:
+    """Up to `count` distinct plans that cover most of those that are safe, and how many others are not safe.
 
-    first: the default plan, complete; it is among them where nothing is better.
+    Each is certified and completed. first: the default plan, complete; it is among them where nothing is better.
     """
     amounts, found = noticed_amounts(first, task.fourth), dict[int, FrontPlan]()
     left = np.arange(len(search.vectors))
@@ -411,7 +414,7 @@ def _certified(
             chosen = _choices([*(found[row] for row in order), first], task.fourth, amounts)
             refused = [row for row in order if not any(one is found[row] for one in chosen)]
         if not refused:
-            return chosen[:count]
+            return chosen[:count], sum(not one.plan.safe for one in found.values())
         left = np.setdiff1d(left, refused)
 
 

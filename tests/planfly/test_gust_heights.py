@@ -394,11 +394,12 @@ def test_a_leg_that_sinks_leaves_less() -> None:
 
 
 def test_a_zone_above_counts() -> None:
-    """1 m less above the path than an updraft gives is too little, 1 m more is enough."""
+    """1 m less above the path than an updraft gives and ArduPlane strays is too little, 1 m more is enough."""
     over = {"name": "corridor", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 500.0}
     free = {"limits": {"min_clearance_m": 50.0}}
     airframe = load_airframe(band_of(300.0))
-    rise = 12.0 * (2.33 * GUST - airframe.limits.rates(150.0)[1])
+    assert airframe.limits.tracking is not None
+    rise = 12.0 * (2.33 * GUST - airframe.limits.rates(150.0)[1]) + airframe.limits.tracking.up
     for above, wrong in ((rise - 1.0, True), (rise + 1.0, False)):
         scenario = band_of(300.0, zones=[over | {"floor_amsl_m": 150.0 + above}], **free)
         plan = plan_along(airframe, scenario, [scenario.start, scenario.destination])
@@ -418,6 +419,21 @@ def test_a_search_below_a_maximum_height_leaves_sink_unused(aircraft: str) -> No
     assert (share < least, share > most) == (aircraft == "zagi", aircraft == "aerosonde")
 
 
+def test_below_a_zone_alone_the_first_search_keeps_from_it() -> None:
+    over = {"name": "corridor", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 500.0}
+    scenario = band_of(300.0, zones=[over | {"floor_amsl_m": 165.0}], limits={"min_clearance_m": 50.0})
+    airframe, asked = load_airframe(scenario), list[Limits]()
+
+    def search(limits: Limits) -> Plan:
+        asked.append(limits)
+        return plan_path(scenario, limits, seed=SEED)
+
+    found = plan_along(airframe, scenario, [scenario.start, scenario.destination])
+    assert found.safe
+    assert keep_height(found, airframe, search).safe
+    assert [one.reserve_threats > 20.0 for one in asked] == [True]
+
+
 def test_a_plan_below_a_maximum_height_is_made_anew() -> None:
     """20 m below it at both ends the straight line lacks some metres in the middle, and a plan that sinks is taken.
 
@@ -434,5 +450,28 @@ def test_a_plan_below_a_maximum_height_is_made_anew() -> None:
     assert np.interp(4000.0, plan.waypoints[:, 0], plan.waypoints[:, 2]) < 145.0
     (problem,) = make_plan(band_of(161.0), airframe, SEED).certificate.problems
     assert "in moderate turbulence updrafts may take it" in problem
-    assert "above the 161 m over ground that are allowed" in problem
-    assert "less turbulence, or an aircraft that sinks faster, would help" in problem
+    assert "above the 161 m over ground that are allowed at its start" in problem
+    assert "an aircraft that sinks faster or a start that is 2 m lower would help" in problem
+    held = band_of(164.0)
+    (problem,) = keep_height(plan_path(held, airframe.limits, seed=SEED), load_airframe(held)).certificate.problems
+    assert "on leg " in problem
+    assert "an aircraft that sinks faster or a higher limit on its height would help" in problem
+
+
+def test_an_end_too_near_the_maximum_height_is_not_searched_for() -> None:
+    scenario = band_of(161.0)
+    airframe = load_airframe(scenario)
+    found = plan_path(scenario, airframe.limits, seed=SEED)
+    assert found.safe
+    assert not keep_height(found, airframe, lambda limits: pytest.fail("searched for another")).safe
+
+
+def test_with_a_low_maximum_height_a_gentle_way_down_from_the_ends_is_found() -> None:
+    """The Zagi is left 0.7 degrees of sink, and what is kept for updrafts grows no faster from the ends."""
+    scenario = band_of(160.0, flight={"aircraft": "zagi", "autopilot": "ardupilot"})
+    ends = {name: scenario.to_json()[name] | {"height_m": 134.0} for name in ("start", "destination")}
+    for end in ends.values():
+        end.pop("amsl_m", None)
+    low = from_spec(scenario.to_json() | ends, "low")
+    plan = make_plan(low, load_airframe(low), SEED)
+    assert plan.safe
