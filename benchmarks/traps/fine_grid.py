@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from aircraft.path_limits import Limits
 from planfly.airframe import load_airframe
+from planner.evaluation.leg_constraints import slope_limits
+from planner.evaluation.problem import make_problem
 from planner.search.plan_path import plan_path
 from world.scenario import Scenario, embedded_names, load_scenario
 
@@ -111,10 +114,11 @@ def map_length(points: Floats) -> float:
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
-def climbing_length(scenario: Scenario, way: Floats, climb: float) -> float:
+def climbing_length(scenario: Scenario, way: Floats, climb: float, margin: float = 0.0) -> float:
     """Length on the map that a way (k, 2) has at least, if no m of it climbs more than `climb` (a tangent).
 
     The ground at each place is to be cleared when it is reached; what is missing is gone round for before.
+    margin: height above the scenario's clearance, m.
     """
     terrain = scenario.terrain
     assert terrain is not None
@@ -122,13 +126,32 @@ def climbing_length(scenario: Scenario, way: Floats, climb: float) -> float:
     runs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
     at = np.linspace(0.0, runs[-1], count)
     places = np.column_stack([np.interp(at, runs, way[:, axis]) for axis in range(2)])
-    lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m
+    lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m + margin
     need = (lowest - scenario.start[2]) / climb
     return map_length(way) + max(0.0, float((need - at).max()))
 
 
+def length_within(scenario: Scenario, limits: Limits, way: Floats) -> float:
+    """Length on the map that a way (k, 2) has at least within the slopes and the clearance of certificates.
+
+    The slope is the harmonic mean of those from the start's height to the highest place that is to be cleared.
+    """
+    terrain, data = scenario.terrain, make_problem(scenario, limits).certified
+    assert terrain is not None
+    places = np.concatenate([np.linspace(a, b, 100) for a, b in pairwise(way)])
+    highest = float(terrain.height(places[:, 0], places[:, 1]).max()) + data.clearance + data.buffer
+    level, ahead = np.array([0.0, 0.0, 0.0]), np.array([1000.0, 0.0, 0.0])
+    slopes = []
+    for amsl in np.linspace(scenario.start[2], max(highest, scenario.start[2]), 50):
+        level[2] = ahead[2] = amsl
+        slopes.append(math.tan(slope_limits(data, level, ahead)[0]))
+    return climbing_length(scenario, way, 1.0 / float(np.mean(1.0 / np.array(slopes))), data.buffer)
+
+
 def measure(autopilot: str, seed: int = 1) -> dict[str, float]:
     """Lengths of default plans of the ``trap-*`` scenarios over those that the grid finds; prints them.
+
+    The last column is the length over that of the same way within what certificates want (`length_within`).
 
     autopilot: that they are planned for, as a scenario's ``[flight] autopilot`` names it.
     """
@@ -145,9 +168,10 @@ def measure(autopilot: str, seed: int = 1) -> dict[str, float]:
         climb = max(limits.slopes(course, level)[0] for course in np.linspace(0.0, 2.0 * math.pi, 16))
         reference = climbing_length(scenario, way, math.tan(climb))
         ratios[name] = map_length(plan.waypoints) / reference
+        length, within = map_length(plan.waypoints), length_within(scenario, limits, way)
         print(
-            f"  {autopilot:<11}{name:<13}{'safe' if plan.safe else 'NOT SAFE':<9}{map_length(plan.waypoints):8.0f} m"
-            f"{reference:8.0f} m  {ratios[name]:.3f}"
+            f"  {autopilot:<11}{name:<13}{'safe' if plan.safe else 'NOT SAFE':<9}{length:8.0f} m"
+            f"{reference:8.0f} m  {ratios[name]:.3f}  {length / within:.3f}"
         )
     return ratios
 
