@@ -126,11 +126,11 @@ def test_the_real_autopilot_that_flew_comes_back(tmp_path: Path, track: Track) -
 
 def test_no_field_of_a_setup_is_left_behind() -> None:
     # A field with a default could be forgotten in silence: these are all that the log knows of.  What a setup works
-    # out of its other fields, it works out again; what plans keep for an autopilot and downdrafts is no flight's.
+    # out of its other fields, it works out again; what plans keep for an autopilot and gusts is no flight's.
     kinds = (FlightSetup, Limits, Mission, Route, Envelope)
     names = {kind: [item.name for item in dataclasses.fields(kind) if item.init] for kind in kinds}
     assert len(names[FlightSetup]) == 14
-    assert len(names[Limits]) == 12
+    assert len(names[Limits]) == 14
     assert len(names[Mission]) == 8
     assert len(names[Route]) == 16
     assert len(names[Envelope]) == 20
