@@ -9,11 +9,10 @@ import pytest
 
 import planfly
 from planfly import choice_of_ways
-from planfly.airframe import Airframe, load_airframe
+from planfly.airframe import load_airframe
 from planfly.gust_circles import MOST_CIRCLES, expected_circles, waypoints_in_gusts
 from planfly.make_plan import make_plan
 from planfly.studio import works
-from planfly.terminal.plan_answers import fewer_line
 from planner.plan import Plan
 from tests.planfly.test_gust_circles import SEED, scenario_of
 from world.scenario import Scenario
@@ -128,20 +127,3 @@ def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
     assert waypoints_in_gusts(plan, wider) == 5
     calm = scenario_of("none")
     assert waypoints_in_gusts(replace(plan, scenario=calm), load_airframe(calm)) == len(plan.waypoints)
-
-
-def test_a_front_says_how_many_are_not_safe_when_completed(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(plan: Plan, airframe: Airframe, *, onward: bool = False) -> Plan:
-        return replace(plan, certificate=replace(plan.certificate, problems=("gusts",)))
-
-    scenario = scenario_of("none", "ideal", threats=[{"name": "r", "east_m": 2000.0, "north_m": 500.0, "amsl_m": 0.0,
-        "detection_radius_m": 1500.0, "detection_scale_m": 800.0}])  # fmt: skip
-    assert planfly.plan_front(scenario, 3, seed=SEED).refused == 0
-    monkeypatch.setattr(choice_of_ways, "finish_plan", refuse)
-    front = planfly.plan_front(scenario, 3, seed=SEED)
-    assert len(front.plans) == 1
-    assert front.refused > 2
-    assert (
-        f"1 of the 3 asked for: {front.refused} that were found are not safe when completed, and no other"
-        in fewer_line(front)
-    )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
+from planfly.terminal.plan_answers import fewer_line
 from planner.plan import Plan, plan_json
 from planner.search import plan_front as fronts
 from planner.search.plan_front import Front, fitted_task, front_task, noticed_amounts, plan_front
@@ -160,3 +161,17 @@ def test_a_front_that_is_to_end_is_begun_from_the_default_plan_alone(
     monkeypatch.setattr(fronts, "shorten_path", shorten)
     made = plan_front(scenario, limits, 6, seed=3, stop=lambda: "interrupted", generations=GENERATIONS)
     assert [one.plan.safe for one in made.plans] == [True]
+
+
+def test_plans_that_are_not_safe_when_completed_are_left_out_and_counted(
+    scenario: Scenario, limits: Limits, front: Front
+) -> None:
+    def refuse(plan: Plan) -> Plan:
+        return replace(plan, certificate=replace(plan.certificate, problems=("gusts",)))
+
+    assert front.refused == 0
+    made = plan_front(scenario, limits, 3, seed=3, default=front.default.plan, finish=refuse, generations=GENERATIONS)
+    assert [one.plan for one in made.plans] == [front.default.plan]
+    assert made.refused > 2
+    note = f"1 of the 3 asked for: {made.refused} that were found are not safe when completed, and no other"
+    assert note in fewer_line(made)
