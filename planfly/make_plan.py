@@ -49,9 +49,10 @@ def make_plan(
     """Plan within the scenario's and the aircraft's limits, as far as these are known for certain.
 
     All commands plan by this, so that what one calls safe no other calls unsafe. Where gusts make the autopilot circle
-    at waypoints, the plan has as few of them as it can (`planfly.gust_circles`); where downdrafts take the aircraft
-    down, the plan keeps that much height (`planfly.gust_heights`); the ways from and to the ground are laid; and where
-    the autopilot circles at the mission's end, the certificate names what the circles may come too near to.
+    at waypoints, the plan has as few of them as it can (`planfly.gust_circles`); where gusts take the aircraft from its
+    height, the plan leaves as much below or above it (`planfly.gust_heights`); the ways from and to the ground are
+    laid; and where the autopilot circles at the mission's end, the certificate names what the circles may come too near
+    to.
 
     A plan may take several searches, which share the scenario's budget of evaluations.
 
