@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from making.commands import command_pages
 from making.extras import extras_table
+from making.mission_commands import command_table
 from making.public_names import public_names
 from making.schemas import answer_table, schema_tables
 from making.state_fields import state_fields
@@ -15,6 +16,7 @@ MAKERS: dict[str, Callable[..., str]] = {
     "answers": answer_table,
     "commands": command_pages,
     "extras": extras_table,
+    "mission_commands": command_table,
     "names": public_names,
     "schema": schema_tables,
     "state": state_fields,

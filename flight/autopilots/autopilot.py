@@ -199,6 +199,7 @@ class Autopilot(ABC):
     equivalent_airspeeds: whether commanded airspeeds count as equivalent ones, which are less than true ones at height;
     it then takes over in level flight.
     refuses: whether it takes no mission that PX4's feasibility checks refuse.
+    refuses_as_arduplane: whether it takes no mission with a command that ArduPlane refuses.
     reads_as_px4: whether it reads nothing but the value of a mission's change of speed, goes back to its own airspeed
         for any that is not positive, and reads gates.
     flies_ground: whether it flies take-offs and landings, see `from_ground`.
@@ -214,6 +215,7 @@ class Autopilot(ABC):
     cruise_parameter: ClassVar[str] = ""
     equivalent_airspeeds: ClassVar[bool] = False
     refuses: ClassVar[bool] = False
+    refuses_as_arduplane: ClassVar[bool] = False
     reads_as_px4: ClassVar[bool] = False
     flies_ground: ClassVar[bool] = False
     flies_both_ends: ClassVar[bool] = False

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, NamedTuple
 
+from flight.mission.commands import Command as Command
+
 # ----------------------------------------------------------------------
 # What is not flown as a mission has it, a note a reason, with the items that it is about.
 
@@ -60,64 +62,6 @@ _INT32 = 2**31 - 1
 _LOWEST, _HIGHEST = -1000.0, 20_000.0
 
 
-class Command(IntEnum):
-    """The MAV_CMD numbers that planfly knows by name (MAVLink common.xml)."""
-
-    NAV_WAYPOINT = 16
-    NAV_LOITER_UNLIM = 17
-    NAV_LOITER_TURNS = 18
-    NAV_LOITER_TIME = 19
-    NAV_RETURN_TO_LAUNCH = 20
-    NAV_LAND = 21
-    NAV_TAKEOFF = 22
-    NAV_CONTINUE_AND_CHANGE_ALT = 30
-    NAV_LOITER_TO_ALT = 31
-    NAV_ROI = 80
-    NAV_SPLINE_WAYPOINT = 82
-    NAV_VTOL_TAKEOFF = 84
-    NAV_VTOL_LAND = 85
-    NAV_GUIDED_ENABLE = 92
-    NAV_DELAY = 93
-    NAV_PAYLOAD_PLACE = 94
-    CONDITION_DELAY = 112
-    CONDITION_DISTANCE = 114
-    CONDITION_YAW = 115
-    DO_SET_MODE = 176
-    DO_JUMP = 177
-    DO_CHANGE_SPEED = 178
-    DO_SET_HOME = 179
-    DO_SET_RELAY = 181
-    DO_SET_SERVO = 183
-    DO_CHANGE_ALTITUDE = 186
-    DO_RETURN_PATH_START = 188
-    DO_LAND_START = 189
-    DO_SET_ROI_LOCATION = 195
-    DO_SET_ROI_NONE = 197
-    DO_SET_ROI = 201
-    DO_DIGICAM_CONTROL = 203
-    DO_MOUNT_CONTROL = 205
-    DO_SET_CAM_TRIGG_DIST = 206
-    DO_FENCE_ENABLE = 207
-    NAV_SET_YAW_SPEED = 213
-    DO_GUIDED_LIMITS = 222
-    SET_CAMERA_MODE = 530
-    JUMP_TAG = 600
-    DO_JUMP_TAG = 601
-    IMAGE_START_CAPTURE = 2000
-    IMAGE_STOP_CAPTURE = 2001
-    VIDEO_START_CAPTURE = 2500
-    VIDEO_STOP_CAPTURE = 2501
-    DO_VTOL_TRANSITION = 3000
-    CONDITION_GATE = 4501
-    NAV_FENCE_POLYGON_VERTEX_INCLUSION = 5001
-    NAV_FENCE_POLYGON_VERTEX_EXCLUSION = 5002
-    NAV_FENCE_CIRCLE_INCLUSION = 5003
-    NAV_FENCE_CIRCLE_EXCLUSION = 5004
-    NAV_RALLY_POINT = 5100
-    DO_WINCH = 42600
-    NAV_ATTITUDE_TIME = 42703
-
-
 C = Command
 # Commands that send the aircraft to a position.
 PLACES = frozenset(
@@ -126,11 +70,7 @@ PLACES = frozenset(
 )
 TAKEOFFS = frozenset({C.NAV_TAKEOFF, C.NAV_VTOL_TAKEOFF})
 LANDINGS = frozenset({C.NAV_LAND, C.NAV_VTOL_LAND})
-# Commands to the camera, which change nothing of how an aircraft flies.
-CAMERA = frozenset(
-    {C.DO_DIGICAM_CONTROL, C.DO_SET_CAM_TRIGG_DIST, C.SET_CAMERA_MODE, C.IMAGE_START_CAPTURE, C.IMAGE_STOP_CAPTURE}
-    | {C.VIDEO_START_CAPTURE, C.VIDEO_STOP_CAPTURE}
-)
+JUMPS = frozenset({C.DO_JUMP, C.DO_JUMP_TAG})
 # Steps of a flight that no fixed wing takes, and whose they are.  ArduPlane goes on to the next command
 # (`Plane::start_command`), so that of the way a piece is missing; but for QuadPlanes, which land to place a payload.
 OTHER_VEHICLES = {
@@ -143,14 +83,14 @@ OTHER_VEHICLES = {
     C.NAV_VTOL_LAND: "a VTOL aircraft",
     C.DO_VTOL_TRANSITION: "a VTOL aircraft",
 }
-# What ArduPlane passes over without a change of its way.
-PASSED_OVER = frozenset({C.CONDITION_YAW, C.DO_GUIDED_LIMITS, C.DO_WINCH})
 FENCES = frozenset(range(5001, 5005))
 # Other commands whose fifth to seventh numbers are latitude, longitude and height.
 _LOCATED_DO = frozenset(
     {C.DO_SET_HOME, C.DO_LAND_START, C.DO_SET_ROI_LOCATION, C.DO_SET_ROI, C.CONDITION_GATE, C.NAV_RALLY_POINT}
 )
 _LAST_NAV = 95
+# Steps of the flight beyond `_LAST_NAV` (`AP_Mission::is_nav_cmd`).
+_NAV_BEYOND = frozenset({C.NAV_SET_YAW_SPEED, C.NAV_SCRIPT_TIME, C.NAV_ATTITUDE_TIME})
 
 
 class Frame(IntEnum):
@@ -177,16 +117,16 @@ def is_located(command: int, frame: int) -> bool:
 
 
 def is_navigation(command: int) -> bool:
-    """Whether a command is a step of the flight, and what stands behind it waits until it is done.
+    """Return True if a command is a step of the flight, so that what stands behind it waits until it is done.
 
     >>> is_navigation(Command.NAV_WAYPOINT), is_navigation(Command.DO_SET_CAM_TRIGG_DIST)
     (True, False)
     """
-    return command <= _LAST_NAV
+    return command <= _LAST_NAV or command in _NAV_BEYOND
 
 
 def command_name(command: int) -> str:
-    """MAVLink name of a command without "MAV_CMD_", or its number where planfly does not know it.
+    """Return the MAVLink name of a command without "MAV_CMD_", or its number where MAVLink has none.
 
     >>> command_name(16), command_name(50_000)
     ('NAV_WAYPOINT', 'command 50000')
@@ -411,9 +351,10 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
 def _count_problem(item: MissionItem) -> ItemProblem | None:
     """Fault of the parameters that count something."""
     p1, p2 = item.params[:2]
-    if item.command == Command.DO_JUMP:
+    if item.command in JUMPS:
         if not (p1 >= 0 and p1 == int(p1)):
-            return ItemProblem("p1", p1, "a jump's target is an item's number")
+            target = "an item's number" if item.command == Command.DO_JUMP else "the number of a tag"
+            return ItemProblem("p1", p1, f"a jump's target is {target}")
         if not (p2 >= -1 and p2 == int(p2)):
             return ItemProblem("p2", p2, "a jump's count is a whole number, or -1 for without end")
     if item.command in (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME) and p1 < 0:

@@ -1,17 +1,26 @@
-"""A mission's items in flying order: jumps unrolled, speeds assigned, a note for all that is not flown as written."""
+"""A mission's items in flying order: jumps unrolled, speeds assigned, a note for all that is not flown as written.
+
+ArduPlane and PX4 reach the same places in the same order, but run the commands between them at different times.  PX4
+runs each where it stands (`MissionBase::advance_mission`).  ArduPlane runs the first before the next place, and the
+others one after another while it flies there, from the first on and through jumps as their counters stand by then
+(`AP_Mission::advance_current_nav_cmd`, `advance_current_do_cmd`): what stands behind a jump that was just taken for
+the last time is run a round early (ArduPilot #30376).
+"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from flight.mission.commands import CAMERA, MARKS, Command, Treatment, support_of
 from flight.mission.items import (
-    CAMERA,
+    AMSL,
+    JUMPS,
     LANDINGS,
+    OVER_HOME,
     OVER_TERRAIN,
     PLACES,
     TAKEOFFS,
-    Command,
     Frame,
     Home,
     ItemProblem,
@@ -19,6 +28,7 @@ from flight.mission.items import (
     MissionItem,
     Notes,
     command_name,
+    is_navigation,
 )
 from world.errors import MissionError
 
@@ -78,6 +88,16 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     return None
 
 
+class OpenItem(NamedTuple):
+    """An item that changes the flight path and is not flown as the autopilot would.
+
+    item: the mission item's seq.  text: its command, and what is not flown.
+    """
+
+    item: int
+    text: str
+
+
 class Gate(NamedTuple):
     """A CONDITION_GATE on the way to a stop: what the mission orders after it counts from when it is passed.
 
@@ -130,6 +150,8 @@ class Itinerary:
     landing: the place to land at, None for none; the flight ends above it.
     notes_by_value: as ``notes`` by an autopilot that reads items as PX4 does: of a change of speed the value alone, and
         gates.
+    open_items, open_by_value: what leaves the verdict open, by an autopilot that reads items as ArduPlane or PX4 does.
+    last_home: home at the mission's end, which a return flies to; another than ``home`` after a DO_SET_HOME.
     """
 
     stops: tuple[ItineraryStop, ...]
@@ -140,6 +162,9 @@ class Itinerary:
     endless: int = -1
     landing: ItineraryStop | None = None
     notes_by_value: tuple[str, ...] = ()
+    open_items: tuple[OpenItem, ...] = ()
+    open_by_value: tuple[OpenItem, ...] = ()
+    last_home: Home | None = None
 
     @property
     def returns(self) -> bool:
@@ -153,67 +178,148 @@ def make_itinerary(mission: Mission) -> Itinerary:
     Raises MissionError for a mission without a position, a jump to an item that is not there, and a mission that
     unrolls to more than `MAX_STOPS` places.
     """
-    walk = _Walk(mission)
-    reached = set()
-    for item in _in_flying_order(mission, walk):
-        reached.add(item.seq)
-        walk.visit(item)
+    walk, steps = _Walk(mission), _Steps(mission)
+    for step in steps:
+        walk.take(step)
         if len(walk.stops) > MAX_STOPS:
+            seq = step.to.seq if step.to is not None else mission.items[-1].seq
             raise MissionError(
-                f"{mission.source}: item {item.seq}: more than {MAX_STOPS:,} places to fly to, jumps unrolled",
+                f"{mission.source}: item {seq}: more than {MAX_STOPS:,} places to fly to, jumps unrolled",
                 file=mission.source,
-                field=f"item {item.seq}",
+                field=f"item {seq}",
             )
         if walk.ended:
             break
+    if steps.endless >= 0:
+        name = command_name(mission.items[steps.index[steps.endless]].command)
+        walk.notes.add(f"{name} without end: taken once; the flight ends there", steps.endless)
     for gate in walk.gates:
         walk.notes.by_value.add("CONDITION_GATE: nothing to fly to comes after it, so it is passed at once", gate.item)
     for item in mission.items:
-        if item.seq not in reached and not (walk.ended and item.command == Command.DO_JUMP):
+        if item.seq not in steps.reached and not (walk.ended and item.command in JUMPS):
             walk.notes.add(NEVER_REACHED, item.seq)
     if not walk.stops:
         raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)
     return Itinerary(
         stops=tuple(walk.stops),
-        home=walk.home,
+        home=walk.first_home,
         has_home=walk.has_home,
         takeoff=walk.takeoff,
         notes=walk.notes.usual.lines(),
-        endless=walk.endless,
+        endless=steps.endless,
         landing=walk.landing,
         notes_by_value=walk.notes.by_value.lines(),
+        open_items=tuple(walk.open),
+        open_by_value=tuple(walk.open_by_value),
+        last_home=walk.home,
     )
 
 
-def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
-    """Items with jumps followed; a jump's counter is never reset, as in ArduPilot.  One without end is taken once."""
-    index = {item.seq: k for k, item in enumerate(mission.items)}
-    jumped: dict[int, int] = {}
-    k = steps = 0
-    while k < len(mission.items):
-        item = mission.items[k]
-        steps += 1
-        if steps > _MAX_STEPS:
+class _Step(NamedTuple):
+    """The way to the next step of the flight.
+
+    between: the commands that stand before it, jumps followed, as PX4 runs them.
+    early: that of them which ArduPlane runs before the step, None for none.
+    late: those that ArduPlane runs on the way.
+    to: the step, None at the mission's end.
+    """
+
+    between: tuple[MissionItem, ...]
+    early: MissionItem | None
+    late: tuple[MissionItem, ...]
+    to: MissionItem | None
+
+
+class _Steps:
+    """The steps of a mission with jumps followed; a jump's counter is never reset, as in ArduPlane 4.6 and in PX4.
+
+    reached: numbers of the items that are come to so far, jumps included.
+    endless: seq of the jump without end that ended it, -1 for none; one is taken once.
+    """
+
+    def __init__(self, mission: Mission) -> None:
+        self.mission, self.items = mission, mission.items
+        self.index = {item.seq: k for k, item in enumerate(mission.items)}
+        self.tags: dict[int, int] = {}
+        for k, item in enumerate(mission.items):
+            if item.command == Command.JUMP_TAG:
+                # The first of a number counts, wherever the jump stands (`AP_Mission::get_index_of_jump_tag`).
+                self.tags.setdefault(int(item.params[0]), k)
+        self.taken: dict[int, int] = {}
+        self.reached: set[int] = set()
+        self.endless, self._walked = -1, 0
+
+    def __iter__(self) -> Iterator[_Step]:
+        """Go from step to step, counting jumps."""
+        k: int | None = 0
+        while k is not None:
+            between: list[int] = []
+            k = self._next(k, counting=True)
+            while k is not None and not is_navigation(self.items[k].command):
+                between.append(k)
+                k = self._next(k + 1, counting=True)
+            late = self._late(between[0]) if between and k is not None else []
+            self.reached |= {self.items[one].seq for one in late}
+            yield _Step(
+                tuple(self.items[one] for one in between),
+                self.items[between[0]] if between else None,
+                tuple(self.items[one] for one in late),
+                None if k is None else self.items[k],
+            )
+            k = None if k is None else k + 1
+
+    def _late(self, first: int) -> list[int]:
+        """Return the places of the commands that ArduPlane runs on the way to a step, after the first of them."""
+        found: list[int] = []
+        k = self._next(first + 1, counting=False)
+        while k is not None and k not in found and not is_navigation(self.items[k].command):
+            found.append(k)
+            k = self._next(k + 1, counting=False)
+        return found
+
+    def _next(self, k: int, *, counting: bool) -> int | None:
+        """Return the place of the next item from a place on, jumps followed; None at the end (`get_next_cmd`)."""
+        first = -1
+        while k < len(self.items):
+            item = self.items[k]
+            if counting:
+                self._count_step(item)
+            if item.command not in JUMPS:
+                return k
+            target, repeats = self._target(item), int(item.params[1])
+            if not counting and k == first:
+                return None
+            first = k if first < 0 else first
+            if counting and repeats < 0 and k in self.taken:
+                self.endless = item.seq
+                return None
+            if repeats < 0 or self.taken.get(k, 0) < repeats:
+                if counting:
+                    self.taken[k] = self.taken.get(k, 0) + 1
+                k = target
+            else:
+                k += 1
+        return None
+
+    def _count_step(self, item: MissionItem) -> None:
+        self.reached.add(item.seq)
+        self._walked += 1
+        if self._walked > _MAX_STEPS:
             raise MissionError(
-                f"{mission.source}: item {item.seq}: jumps lead through more than {_MAX_STEPS:,} items",
-                file=mission.source,
+                f"{self.mission.source}: item {item.seq}: jumps lead through more than {_MAX_STEPS:,} items",
+                file=self.mission.source,
                 field=f"item {item.seq}",
             )
-        k += 1
-        yield item
-        if item.command != Command.DO_JUMP:
-            continue
-        target, repeats = int(item.params[0]), int(item.params[1])
-        if target not in index:
-            problem = ItemProblem("DO_JUMP p1", target, f"the mission has no item {target}")
-            raise MissionError(**problem.at(mission.source, f"{mission.source}: item {item.seq}"))
-        if repeats < 0 and item.seq in jumped:
-            walk.notes.add("DO_JUMP without end: taken once; the flight ends there", item.seq)
-            walk.endless = item.seq
-            return
-        if repeats < 0 or jumped.get(item.seq, 0) < repeats:
-            jumped[item.seq] = jumped.get(item.seq, 0) + 1
-            k = index[target]
+
+    def _target(self, jump: MissionItem) -> int:
+        """Return the place that a jump leads to.  Raises MissionError for one that leads nowhere."""
+        tagged, number = jump.command == Command.DO_JUMP_TAG, int(jump.params[0])
+        places = self.tags if tagged else self.index
+        if number not in places:
+            lack = f"JUMP_TAG {number}" if tagged else f"item {number}"
+            problem = ItemProblem(f"{command_name(jump.command)} p1", number, f"the mission has no {lack}")
+            raise MissionError(**problem.at(self.mission.source, f"{self.mission.source}: item {jump.seq}"))
+        return places[number]
 
 
 class _BothNotes:
@@ -229,24 +335,112 @@ class _BothNotes:
 
 
 class _Walk:
-    """Stops, speed and notes after the items so far."""
+    """Stops, speed, home and notes after the items so far."""
 
     def __init__(self, mission: Mission) -> None:
         self.source = mission.source
+        self.last_seq = mission.items[-1].seq if mission.items else -1
         self.airspeed = self.airspeed_by_value = math.nan
         self.notes = _BothNotes()
+        # Dictionaries for their order; nothing is named twice.
+        self.open: dict[OpenItem, None] = {}
+        self.open_by_value: dict[OpenItem, None] = {}
         self.stops: list[ItineraryStop] = []
         self.takeoff: MissionItem | None = None
         self.gates: list[Gate] = []
-        self.ended, self.endless = False, -1
+        self.ended = False
         self.landing: ItineraryStop | None = None
         self.has_home = mission.home is not None
-        self.home = mission.home or _first_position(mission)
+        self.first_home = self.home = mission.home or _first_position(mission)
 
-    def visit(self, item: MissionItem) -> None:
-        """Take one item into account."""
+    def take(self, step: _Step) -> None:
+        """Take the way to a step of the flight into account, and the step."""
+        for item in step.between:
+            self._run_by_value(item)
+        run = () if step.early is None else (step.early, *step.late)
+        for k, item in enumerate(run):
+            # A home that is set on the way does not move the altitude of the step that is already flown to.
+            if k == 0 or item.command != Command.DO_SET_HOME:
+                self._run(item, run[k + 1 :])
+        for item in step.late:
+            if item not in step.between:
+                self.notes.usual.add(f"{command_name(item.command)}: run a round early, as ArduPlane does", item.seq)
+        if step.to is not None:
+            self._fly(step.to)
+        else:
+            for item in step.between[1:]:
+                text = f"{command_name(item.command)}: not run, for nothing to fly to comes after it"
+                self.notes.usual.add(text, item.seq)
+        for item in run[1:]:
+            if item.command == Command.DO_SET_HOME:
+                self._set_home(item)
+
+    def leave_open(self, text: str, seq: int, *, usual: bool = True, by_value: bool = True) -> None:
+        """Note what is not flown although it changes the path, by ArduPlane's reading, PX4's reading or both."""
+        for counts, notes, left in (
+            (usual, self.notes.usual, self.open),
+            (by_value, self.notes.by_value, self.open_by_value),
+        ):
+            if counts:
+                notes.add(text, seq)
+                left[OpenItem(seq, text)] = None
+
+    def _run(self, item: MissionItem, behind: Sequence[MissionItem]) -> None:
+        """Run a command as ArduPlane does.  behind: what is run after it on the way to the same step."""
+        if item.command == Command.DO_CHANGE_SPEED:
+            self._change_speed(item)
+        elif item.command == Command.DO_SET_HOME:
+            self._set_home(item)
+        elif item.command == Command.CONDITION_GATE:
+            self.leave_open(f"{command_name(item.command)}: not flown", item.seq, by_value=False)
+        elif item.command in (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE):
+            held = [one for one in behind if one.command in (Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)]
+            text = f"{command_name(item.command)}: not flown"
+            if held:
+                delayed = f"; {command_name(held[0].command)} (item {held[0].seq}) is flown without the delay"
+                self.leave_open(text + delayed, item.seq, by_value=False)
+            else:
+                self.notes.usual.add(text, item.seq)
+        else:
+            self._pass_over(item, by_value=False)
+
+    def _run_by_value(self, item: MissionItem) -> None:
+        """Run a command as PX4 does."""
         if not item.autocontinue:
-            self.notes.add("autocontinue is 0, where the mission would wait: flown on", item.seq)
+            self._hold(item)
+        if item.command == Command.DO_CHANGE_SPEED:
+            self._change_by_value(item)
+        elif item.command == Command.CONDITION_GATE:
+            self._gate(item)
+        else:
+            self._pass_over(item, by_value=True)
+
+    def _pass_over(self, item: MissionItem, *, by_value: bool) -> None:
+        """Note what becomes of a command that is not flown."""
+        name, support = command_name(item.command), support_of(item.command)
+        treatment = support.px4 if by_value else support.arduplane
+        notes = self.notes.by_value if by_value else self.notes.usual
+        if treatment == Treatment.OPEN:
+            self.leave_open(f"{name}: not flown; {support.reason}", item.seq, usual=not by_value, by_value=by_value)
+        elif item.command in MARKS:
+            notes.add(f"{name}: a mark, nothing to fly", item.seq)
+        elif support.reason == CAMERA:
+            notes.add(f"{name}: {CAMERA}", item.seq)
+        else:
+            notes.add(f"{name}: not flown", item.seq)
+
+    def _hold(self, item: MissionItem) -> None:
+        """Note an item after which PX4 waits (`MissionBase::on_active`); ArduPlane does not read that."""
+        self.notes.usual.add("autocontinue is 0: flown on, as ArduPlane does", item.seq)
+        if item.seq == self.last_seq:
+            self.notes.by_value.add("autocontinue is 0 at the mission's end: nothing comes after it", item.seq)
+        else:
+            self.leave_open("autocontinue is 0, where PX4 would wait: flown on", item.seq, usual=False)
+
+    def _fly(self, item: MissionItem) -> None:
+        """Take a step of the flight into account."""
+        if not item.autocontinue:
+            self._hold(item)
         if item.command in TAKEOFFS:
             self._take_off(item)
         elif item.command in PLACES:
@@ -255,28 +449,22 @@ class _Walk:
             self._return(item)
         elif item.command in LANDINGS:
             self._land(item)
-        elif item.command == Command.DO_CHANGE_SPEED:
-            self._change_speed(item)
-        elif item.command == Command.DO_LAND_START:
-            self.notes.add("DO_LAND_START: a mark, nothing to fly", item.seq)
-        elif item.command == Command.CONDITION_GATE:
-            self._gate(item)
-        elif item.command in CAMERA:
-            self.notes.add(f"{command_name(item.command)}: the camera's, nothing to fly", item.seq)
-        elif item.command != Command.DO_JUMP:
-            self.notes.add(f"{command_name(item.command)}: not flown", item.seq)
+        else:
+            self._pass_over(item, by_value=False)
+            self._pass_over(item, by_value=True)
 
     def _stop(self, item: MissionItem, acceptance: float = 0.0) -> ItineraryStop:
-        lat, lon, loiter = item.lat_deg, item.lon_deg, loiter_of(item)
+        lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, loiter_of(item), item.alt, item.frame
         gates, self.gates = tuple(self.gates), []
+        if self.home is not self.first_home and frame in OVER_HOME:
+            alt, frame = self.home.alt + alt, int(Frame.GLOBAL)
         return ItineraryStop(
-            *(item.seq, item.command, lat, lon, item.alt, item.frame),
+            *(item.seq, item.command, lat, lon, alt, frame),
             *(self.airspeed, acceptance, loiter, self.airspeed_by_value, gates),
         )
 
     def _gate(self, item: MissionItem) -> None:
-        """Note a gate.  ArduPlane has none; PX4 passes one without a place, or before the start, at once."""
-        self.notes.usual.add(f"{command_name(item.command)}: not flown", item.seq)
+        """Note a gate, as PX4 does; it passes one without a place, or before the start, at once."""
         if item.has_position and self.stops:
             self.gates.append(Gate(item.seq, item.lat_deg, item.lon_deg, self.airspeed_by_value))
         else:
@@ -287,17 +475,20 @@ class _Walk:
         vertical = item.command == Command.NAV_VTOL_TAKEOFF
         if self.stops:
             if item.has_position and not vertical:
-                self.notes.add(f"{name} in the air: flown through as a waypoint", item.seq)
+                self.leave_open(f"{name} in the air: flown through as a waypoint", item.seq)
                 self.stops.append(self._stop(item))
             else:
-                self.notes.add(f"{name} in the air: not flown", item.seq)
+                self.leave_open(f"{name} in the air: not flown", item.seq)
             return
         if math.isnan(item.alt):
             message = f"{self.source}: item {item.seq}: {name} has no altitude: a number is expected"
             raise MissionError(message, file=self.source, field="altitude", allowed="a number is expected")
         self.takeoff = item
-        over_home = replace(self._stop(item), lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg)
-        goes_on = item.has_position and (item.lat_deg, item.lon_deg) != (self.home.lat_deg, self.home.lon_deg)
+        if vertical:
+            self.leave_open(f"{name}: not flown straight up", item.seq)
+        home = self.first_home
+        over_home = replace(self._stop(item), lat_deg=home.lat_deg, lon_deg=home.lon_deg)
+        goes_on = item.has_position and (item.lat_deg, item.lon_deg) != (home.lat_deg, home.lon_deg)
         if goes_on and vertical:
             # ArduPlane climbs where it stands and goes on at the height (QuadPlane::takeoff_controller and
             # verify_vtol_takeoff); a fixed wing of it passes the item over.
@@ -310,24 +501,31 @@ class _Walk:
     def _go(self, item: MissionItem) -> None:
         name = command_name(item.command)
         if not item.has_position and loiter_of(item) is not None and self.stops:
-            self.notes.add(f"{name} without a position: flown about the place before", item.seq)
+            text = f"{name} without a position: flown about the place before"
+            self.notes.usual.add(text, item.seq)
+            # PX4 reads 0, 0 as a place.
+            self.leave_open(text, item.seq, usual=False)
             alt = math.nan if item.frame == Frame.MISSION else item.alt
             item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
-            self.notes.add(
+            self.leave_open(
                 f"{name} without a position, which means the place where the aircraft is: not flown", item.seq
             )
             return
         if item.command == Command.NAV_WAYPOINT:
             if item.params[0] > 0.0:
+                # No fixed wing holds: ArduPlane stores no time, PX4 (`MissionBlock::get_time_inside`) takes none.
                 self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
+            if item.params[2] > 0.0:
+                # `Plane::verify_nav_wp`; PX4 does not read it.
+                self.leave_open(f"{name} with a distance to fly on beyond it: not flown", item.seq, by_value=False)
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
-            self.notes.add(f"{name}: flown as a straight waypoint", item.seq)
+            self.leave_open(f"{name}: flown as a straight waypoint", item.seq)
         elif item.command == Command.NAV_LOITER_UNLIM:
             self.notes.add(f"{name}: flown for {UNLIMITED:.0f} s; the mission ends there", item.seq)
             self.ended = True
         elif loiter_of(item) is None:
-            self.notes.add(f"{name}: flown through as a waypoint", item.seq)
+            self.leave_open(f"{name}: flown through as a waypoint", item.seq)
         if math.isnan(item.alt):
             self.notes.add(f"{name} without an altitude: keeps the last height", item.seq)
         elif item.frame in OVER_TERRAIN:
@@ -336,10 +534,10 @@ class _Walk:
         self.stops.append(self._stop(item, radius if radius > 0.0 else 0.0))
 
     def _return(self, item: MissionItem) -> None:
-        if not self.has_home:
-            self.notes.add("NAV_RETURN_TO_LAUNCH without a home: ignored", item.seq)
+        if not self.has_home and self.home is self.first_home:
+            self.leave_open("NAV_RETURN_TO_LAUNCH without a home: not flown", item.seq)
         elif not self.stops:
-            self.notes.add("NAV_RETURN_TO_LAUNCH before the start: ignored", item.seq)
+            self.leave_open("NAV_RETURN_TO_LAUNCH before the start: not flown", item.seq)
         else:
             # Where to and how high is for who flies: `flight.mission.return_path`.  No speed that was set counts there.
             home = replace(item, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
@@ -349,7 +547,7 @@ class _Walk:
     def _land(self, item: MissionItem) -> None:
         name = command_name(item.command)
         if not self.stops:
-            self.notes.add(f"{name} before the start: ignored", item.seq)
+            self.leave_open(f"{name} before the start: not flown", item.seq)
             return
         self.ended = True
         if item.has_position:
@@ -357,25 +555,50 @@ class _Walk:
             self.landing = self._stop(item)
             self.stops.append(replace(self.landing, alt=math.nan))
         else:
-            self.notes.add(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
+            self.leave_open(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
+        if item.command == Command.NAV_VTOL_LAND:
+            self.leave_open(f"{name}: not flown straight down", item.seq)
+
+    def _set_home(self, item: MissionItem) -> None:
+        """Set another home, as ArduPlane does (`Plane::do_set_home`): altitudes and returns behind it count from it."""
+        name = command_name(item.command)
+        if item.params[0] == 1.0:
+            if self.stops:
+                self.leave_open(f"{name} to where the aircraft is: not flown", item.seq, by_value=False)
+            else:
+                self.notes.usual.add(f"{name} before the start: home is where the aircraft stands", item.seq)
+            return
+        if not item.has_position:
+            self.notes.usual.add(f"{name} without a position: ignored, as ArduPlane does", item.seq)
+            return
+        up = item.alt + self.home.alt if item.frame in OVER_HOME else item.alt if item.frame in AMSL else math.nan
+        if math.isnan(up):
+            self.leave_open(f"{name} to an altitude that is not known: not flown", item.seq, by_value=False)
+            return
+        self.home = Home(item.lat_deg, item.lon_deg, up)
 
     def _change_speed(self, item: MissionItem) -> None:
-        self._change_by_value(item)
+        """Read a change of speed as ArduPlane does (`Plane::do_change_speed`)."""
         kind, speed, throttle = item.params[:3]
         notes = self.notes.usual
+        applies = kind == 1.0 or (kind == 0.0 and (speed > 0.0 or speed == -2.0))
+        if throttle > 0.0 and not applies:
+            # Where no speed is taken, TRIM_THROTTLE is changed.
+            self.leave_open("DO_CHANGE_SPEED's throttle: not flown", item.seq, by_value=False)
+        elif throttle > 0.0:
+            notes.add("DO_CHANGE_SPEED's throttle: ignored", item.seq)
         if kind not in (0.0, 1.0):
             notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
-            return
-        if speed == -2.0:
+        elif kind == 1.0:
+            # It sets the least ground speed (MIN_GROUNDSPEED), and leaves the airspeed.
+            self.leave_open("DO_CHANGE_SPEED of ground speed: flown as airspeed", item.seq, by_value=False)
+            self.airspeed = speed if speed > 0.0 else self.airspeed
+        elif speed == -2.0:
             self.airspeed = math.nan
         elif speed > 0.0:
             self.airspeed = speed
-            if kind == 1.0:
-                notes.add("DO_CHANGE_SPEED of ground speed: flown as airspeed", item.seq)
         elif speed != -1.0:
             notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: ignored", item.seq)
-        if throttle > 0.0:
-            notes.add("DO_CHANGE_SPEED's throttle: ignored", item.seq)
 
     def _change_by_value(self, item: MissionItem) -> None:
         """Read a change of speed as PX4 does (`navigator_main.cpp`, VEHICLE_CMD_DO_CHANGE_SPEED)."""

@@ -20,7 +20,7 @@ from flight.mission.items import (
     MissionItem,
     Notes,
 )
-from flight.mission.itinerary import Itinerary, ItineraryStop, Loiter, loiter_of, make_itinerary
+from flight.mission.itinerary import Itinerary, ItineraryStop, Loiter, OpenItem, loiter_of, make_itinerary
 from flight.mission.loiter_circles import PlacedStop
 from flight.mission.return_path import LandingStart, ReturnPlace
 from world.errors import MissionError
@@ -46,13 +46,14 @@ class PlacedLanding(NamedTuple):
 
     start: where it begins.  stops: in flying order, the landing the last.
     ground: height of the place to land at, m, NaN where it is not known.
-    notes: what of it is not flown as written.
+    notes: what of it is not flown as written.  open_items: what of it leaves the verdict open.
     """
 
     start: LandingStart
     stops: tuple[PlacedStop, ...]
     ground: float
     notes: tuple[str, ...] = ()
+    open_items: tuple[OpenItem, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +113,13 @@ def place_stops(
     stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs)
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
     landing_ground = heights.touchdown(itinerary)
-    places = _return_places(mission, itinerary.home, origin, heights) if itinerary.returns else ()
-    marked = tuple(_marked_starts(mission, origin, heights)) if itinerary.returns else ()
-    landings = _landings(mission, origin, heights, marked)
+    back, heights_back, home = mission, heights, itinerary.last_home or itinerary.home
+    if home is not itinerary.home:
+        # A return, and what it goes on to, counts from the home that a DO_SET_HOME set.
+        back, heights_back = replace(mission, home=home), _Heights(mission.source, home, origin, terrain, notes)
+    places = _return_places(back, home, origin, heights_back) if itinerary.returns else ()
+    marked = tuple(_marked_starts(back, origin, heights_back)) if itinerary.returns else ()
+    landings = _landings(back, origin, heights_back, marked)
     return PlacedMission(
         mission,
         origin,
@@ -198,7 +203,9 @@ def _landings(
         except MissionError:
             continue
         if itinerary.landing is not None and len(stops) > 1:
-            found.append(PlacedLanding(start, tuple(stops), heights.touchdown(itinerary), itinerary.notes))
+            found.append(
+                PlacedLanding(start, tuple(stops), heights.touchdown(itinerary), itinerary.notes, itinerary.open_items)
+            )
     return tuple(found)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, PLACES, Command, Mission, Notes, command_name
-from flight.mission.itinerary import NEVER_REACHED, Itinerary, ItineraryStop, loiter_of
+from flight.mission.itinerary import NEVER_REACHED, Itinerary, ItineraryStop, OpenItem, loiter_of
 from flight.mission.loiter_circles import (
     PLAIN_SLOPE,
     USUAL_LOITERS,
@@ -68,6 +68,7 @@ class Route:
     stops: (w,) number of the stop that the waypoint belongs to, never less than the one before: a jump back leads to
         another stop of the same item.  Where it is not given, waypoints of one item in a row are one.
     unjoined: stops that whoever flies goes to, and that the waypoints lack, for no tangent joins them to a circle.
+    open_items: items that change the flight path, and that are not flown as the autopilot would.
     """
 
     waypoints: Floats
@@ -86,6 +87,7 @@ class Route:
     straight_to: int = -1
     stops: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     unjoined: tuple[Unjoined, ...] = ()
+    open_items: tuple[OpenItem, ...] = ()
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -372,8 +374,8 @@ def lay_route(
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground if landing is None else landing.ground,
-        # Who flies on tangents leaves these out; who flies at the circle's middle does not.
-        unjoined=unjoined if loiters.at_middle else (),
+        unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
+        open_items=_open_of(placed.itinerary, landing, reads_as_px4),
         **back,
     )
 
@@ -387,6 +389,12 @@ def _notes_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4:
     """Notes of an itinerary, and of the landing sequence that its return goes on to, whose items are reached so."""
     notes = itinerary.notes_by_value if reads_as_px4 else itinerary.notes
     return notes if landing is None else (*(note for note in notes if NEVER_REACHED not in note), *landing.notes)
+
+
+def _open_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[OpenItem, ...]:
+    """Return what leaves the verdict open, of an itinerary and of the landing sequence that its return goes on to."""
+    own = itinerary.open_by_value if reads_as_px4 else itinerary.open_items
+    return own if landing is None else own + landing.open_items
 
 
 def _lay_circles(

@@ -19,11 +19,13 @@ UNKNOWN_AIRCRAFT = "unknown aircraft"
 UNKNOWN_WAY = "unknown way"
 # And of a way from the ground or to it that may not be free.
 GROUND_WAY = "ground way"
+# And of an item that changes the flight path and is not flown as the autopilot would.
+NOT_FLOWN = "not flown"
 # And of returns or glides that a scenario requires, which are not known well enough.
 UNKNOWN_RETURN = "unknown return"
 # What stands beside the flight and no flight shows: a flight may go well all the same.
 BESIDE_FLIGHT = (GROUND_WAY, UNKNOWN_RETURN)
-_OPEN = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, *BESIDE_FLIGHT)
+_OPEN = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, NOT_FLOWN, *BESIDE_FLIGHT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,7 @@ class Finding:
     suggestions: of a failed finding, the smallest changes of the plan that would pass it, the least change first.
     brief: the reason in a few words, for a headline.
     placed: whether the reason begins with the place.
-    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `GROUND_WAY` or
+    check: where a rule has several checks, which one; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`, `GROUND_WAY` or
     `UNKNOWN_RETURN` of what those leave open; "" otherwise.
     facts: what was measured beside it and is no fault.
     """

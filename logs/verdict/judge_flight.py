@@ -12,13 +12,13 @@ from logs.verdict.conditions import setup_conditions
 from logs.verdict.findings import Finding, Verdict, left_open
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
+    deciding_items,
     flown_findings,
     flown_level,
     geometric_findings,
     judge_geometry,
     judge_plan_only,
     judge_unflown,
-    unflyable_items,
     with_suggestions,
 )
 from logs.verdict.measures.flown_phases import flown_phases, leg_ends
@@ -100,7 +100,7 @@ def _levels(
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
-        predicted = (*unflyable_items(requirements.setup), *geometric_findings(requirements, flown))
+        predicted = (*deciding_items(requirements.setup), *geometric_findings(requirements, flown))
         fails = any(item.ok is False for item in predicted)
         passes = not fails and not left_open(predicted)
         differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)

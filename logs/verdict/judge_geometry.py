@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, setup_conditions
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Verdict, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Verdict, left_open, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
@@ -24,10 +24,14 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     return [item for rule in RULES.values() if rule.judge_items is not None for item in rule.judge_items(setup)]
 
 
-def unflyable_items(setup: FlightSetup) -> list[Finding]:
-    """What fails of a mission by its items alone; those of a plan are planfly's own, but for what PX4 asks of them."""
+def deciding_items(setup: FlightSetup) -> list[Finding]:
+    """Return what of a mission fails or stays open by its items alone.
+
+    Items of a plan are planfly's own, but for what PX4 asks of them.
+    """
     asked = setup.plan is None or setup.autopilot.refuses
-    return [item for item in mission_findings(setup) if item.ok is False] if asked else []
+    found = mission_findings(setup) if asked else []
+    return [item for item in found if item.ok is False or left_open([item])]
 
 
 def geometric_findings(requirements: RouteRequirements, flown: Sequence[Finding] | None = None) -> tuple[Finding, ...]:
@@ -45,7 +49,7 @@ def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
     """Findings of a flown track against its route and the aircraft's envelope, but for how the flight ended."""
-    return (*unflyable_items(requirements.setup), *_judged(requirements, aligned, (), geometric=False))
+    return (*deciding_items(requirements.setup), *_judged(requirements, aligned, (), geometric=False))
 
 
 def flown_findings(
@@ -57,7 +61,7 @@ def flown_findings(
     """
     ends = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
     at_end = tuple(item for judge in ends for item in judge(requirements, aligned, ended, log_complete))
-    return (*unflyable_items(requirements.setup), *_judged(requirements, aligned, at_end, geometric=False))
+    return (*deciding_items(requirements.setup), *_judged(requirements, aligned, at_end, geometric=False))
 
 
 def _judged(

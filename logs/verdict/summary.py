@@ -5,7 +5,15 @@ from collections.abc import Sequence
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
-from logs.verdict.findings import BESIDE_FLIGHT, UNKNOWN_AIRCRAFT, UNKNOWN_WAY, Finding, Verdict, left_open
+from logs.verdict.findings import (
+    BESIDE_FLIGHT,
+    NOT_FLOWN,
+    UNKNOWN_AIRCRAFT,
+    UNKNOWN_WAY,
+    Finding,
+    Verdict,
+    left_open,
+)
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule import Rule, beyond_limit
 from logs.verdict.rules.mission_rule import lacks_landing
@@ -58,7 +66,9 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     circles = f"where {' and '.join(ways[:_NAMED])} is flown, only a flight tells" if ways else ""
     known = _unknown_of_aircraft([item for item in open_findings if item.check == UNKNOWN_AIRCRAFT])
     beside = [item.brief for item in open_findings if item.check in BESIDE_FLIGHT]
-    return "; ".join(filter(None, [known, circles, *beside]))
+    items = [item.brief for item in open_findings if item.check == NOT_FLOWN]
+    more = [f"{len(items) - _NAMED} more items"] if len(items) > _NAMED else []
+    return "; ".join(filter(None, [known, circles, *items[:_NAMED], *more, *beside]))
 
 
 def _unknown_of_aircraft(every: Sequence[Finding]) -> str:
@@ -184,7 +194,9 @@ def summary_lines(
     lines += [f"Not judged: {RULES[rule].title} ({reason})" for rule, reason in silent.items()]
     # Limits of that autopilot's own, which say nothing of the aircraft.
     lines += [
-        f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None
+        f"PX4 would not take it: {item.reason}"
+        for item in findings
+        if item.rule == "mission" and item.ok is None and item.check != NOT_FLOWN
     ]
     lack = lacks_landing(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
     if lack and not any(item.rule == "mission" for item in findings):

@@ -26,7 +26,9 @@ _NEAR = 2.0
 # Of a place that is reckoned alone, and among others, m: the last digits of a sine differ.
 _ALIKE = 1e-6
 # What may have a mission's places come to other rows than one each, wherever they are.
-_UNLIKE = frozenset({Command.DO_JUMP, Command.CONDITION_GATE, Command.NAV_RETURN_TO_LAUNCH})
+_UNLIKE = frozenset(
+    {Command.DO_JUMP, Command.DO_JUMP_TAG, Command.DO_SET_HOME, Command.CONDITION_GATE, Command.NAV_RETURN_TO_LAUNCH}
+)
 
 
 def moved_route(route: Route, before: Mission, now: Mission, scenario: Scenario, frame: Airframe) -> Route | None:

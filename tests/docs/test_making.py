@@ -4,10 +4,12 @@ import sys
 
 import pytest
 
+from flight.mission.commands import SUPPORT
 from tests.docs.page_blocks import ROOT
 
 sys.path.insert(0, str(ROOT / "docs"))
 from making.docstrings import as_rst
+from making.mission_commands import command_table
 from making.placeholders import filled
 from making.schemas import answer_table, answering_commands
 from making.tolerances import tolerance_list
@@ -41,3 +43,10 @@ def test_angles_are_degrees_and_nothing_else_is() -> None:
 def test_every_command_with_an_answer_has_a_row() -> None:
     table = answer_table()
     assert [name for name in answering_commands() if f"\n| `{name}` | `planfly." not in table] == []
+
+
+def test_every_command_that_an_autopilot_takes_has_a_row() -> None:
+    table = command_table()
+    assert "\n| 601 | DO_JUMP_TAG | flown | refused | a jump to the first JUMP_TAG of its number |" in table
+    assert "\n| 30 | NAV_CONTINUE_AND_CHANGE_ALT | not judged | refused |" in table
+    assert all(f"| {command.name} |" in table for command in SUPPORT)

@@ -68,6 +68,7 @@ class ArduPlane(Autopilot):
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE
     cruise_parameter: ClassVar = "AIRSPEED_CRUISE"
     equivalent_airspeeds: ClassVar = True
+    refuses_as_arduplane: ClassVar = True
     flies_ground: ClassVar[bool] = True
     height_candidates: ClassVar = HEIGHT_CANDIDATES
     side_candidates: ClassVar = SIDE_CANDIDATES

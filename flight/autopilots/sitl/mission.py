@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.ground_ways import GroundWays
-from flight.mission.items import Command, Frame, Home, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, on_grid
 from flight.mission.itinerary import loiter_of
 from flight.mission.route import Route, goes_no_further
 from flight.simulation.setup import FlightSetup
@@ -28,7 +28,7 @@ STRAIGHT_ON = 1000.0
 # Home stands this far (m) below the start where the mission has none, and where its own is nearer than `_NEAR` (m) to
 # the start's height: within 10 m of home ArduPlane holds the throttle back, as before a take-off.
 _BELOW, _NEAR = 100.0, 15.0
-_KEPT = (Command.DO_JUMP, Command.DO_CHANGE_SPEED)
+_KEPT = (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG, Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def _place(
         return _waypoint(item.seq, last, float(route.acceptance[rows[-1]]), origin)
     lat, lon = item.lat_deg, item.lon_deg
     if not item.has_position:
-        centre = next(place for place in reversed(before) if place.has_position)
+        centre = next(place for place in reversed(before) if place.has_position and is_navigation(place.command))
         lat, lon = centre.lat_deg, centre.lon_deg
     p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
     return MissionItem(item.seq, int(item.command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(last[2]))

@@ -17,12 +17,12 @@ from typing import Literal
 import numpy as np
 
 from flight.autopilots.autopilot import MissionChecks
+from flight.mission.commands import Treatment, support_of
 from flight.mission.fences import fence_problem
 from flight.mission.items import (
     LANDINGS,
     OVER_HOME,
     OVER_TERRAIN,
-    PASSED_OVER,
     PLACES,
     TAKEOFFS,
     Command,
@@ -31,7 +31,7 @@ from flight.mission.items import (
     command_name,
 )
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Message, make_finding, message
+from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
@@ -46,14 +46,6 @@ from logs.verdict.tolerances import (
 from world.frames import GeoOrigin, to_map
 
 C = Command
-
-# Commands that PX4 takes in a mission, by number: idle, delay, condition gate, winch, gripper, cameras, gimbals.
-_PX4 = frozenset(
-    {0, 16, 17, 19, 20, 21, 22, 31, 84, 85, 93, 177, 178, 179, 183, 189, 195, 196, 197, 200, 201, 203, 204, 205, 206}
-    | {211, 214, 260, 530, 531, 532, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 4501, 42600}
-)
-# Others that ArduPlane takes.
-_ARDUPLANE = frozenset({18, 30, 83, 94, 112, 114, 181, 182, 184, 186, 207, 208, 210, 212, 216, 218, 223, 600, 601})
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
@@ -72,8 +64,13 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     )
     refuses = setup.autopilot.refuses
     found = [_finding(name, list(remarks), refuses) for name, remarks in checks]
-    # No autopilot has a name for this: it is what of a mission is not judged.
-    return found + ([_unjoined(setup)] if setup.route.unjoined else [])
+    # No autopilot has a name for these: they are what of a mission is not judged.
+    return [
+        *found,
+        *_refused_by_arduplane(setup),
+        *([_unjoined(setup)] if setup.route.unjoined else []),
+        *_not_flown(setup),
+    ]
 
 
 # What a check remarks: the verdict on it, the item (None: the whole mission), and why.  PX4's refusal is a verdict only
@@ -103,6 +100,31 @@ def _finding(check: str, said: list[_Remark], refuses: bool) -> Finding:
     )
 
 
+def _refused_by_arduplane(setup: FlightSetup) -> list[Finding]:
+    """Return a finding of the items that ArduPlane refuses at the upload and PX4 takes, if ArduPlane flies."""
+    refused = [
+        item
+        for item in setup.mission.items
+        if support_of(item.command).arduplane == Treatment.REFUSED != support_of(item.command).px4
+    ]
+    if not refused or not setup.autopilot.refuses_as_arduplane:
+        return []
+    more = f" (+{len(refused) - 1} more)" if len(refused) > 1 else ""
+    fault = message(f"unsupported command {command_name(refused[0].command)}", f"; PX4 takes it{more}")
+    return [
+        make_finding(
+            "mission",
+            Place("mission", item=refused[0].seq),
+            ok=False,
+            reason=f"{fault.text} (ArduPlane mavlink_int_to_mission_cmd)",
+            faults=[fault],
+            source="ArduPlane",
+            method="mission items",
+            check="mavlink_int_to_mission_cmd",
+        )
+    ]
+
+
 def _unjoined(setup: FlightSetup) -> Finding:
     """That an autopilot flies where the route does not: to a place inside a circle, or about another middle.
 
@@ -128,6 +150,29 @@ def _unjoined(setup: FlightSetup) -> Finding:
     )
 
 
+def _not_flown(setup: FlightSetup) -> Iterator[Finding]:
+    """One finding for each item that changes the flight path and is not flown as the autopilot would."""
+    left = [(one.item, one.text) for one in setup.route.open_items]
+    if setup.scenario.returns is not None:
+        # Returns from anywhere on the route are judged to the mission's home alone.
+        left += [
+            (item.seq, f"{command_name(item.command)}: returns are judged to the mission's home alone")
+            for item in setup.mission.items
+            if item.command == C.DO_SET_HOME
+        ]
+    for seq, text in left:
+        yield make_finding(
+            "mission",
+            Place("mission", item=seq),
+            ok=None,
+            reason=text,
+            faults=[message(f"item {seq}: {text}")],
+            source="route",
+            method="mission items",
+            check=NOT_FLOWN,
+        )
+
+
 def _positions(mission: Mission) -> list[MissionItem]:
     """Items that PX4 flies to."""
     return [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
@@ -135,12 +180,11 @@ def _positions(mission: Mission) -> list[MissionItem]:
 
 def _validity(mission: Mission) -> Iterator[_Remark]:
     for item in mission.items:
-        name = command_name(item.command)
-        if item.command not in _PX4:
-            known = item.command in _ARDUPLANE | PASSED_OVER
-            taken = "ArduPlane takes it" if known else "nor does ArduPlane take it"
-            taken = "ArduPlane passes it over" if item.command in PASSED_OVER else taken
-            yield REFUSED if known else False, item.seq, f"unsupported command {name}; {taken}"
+        name, support = command_name(item.command), support_of(item.command)
+        if support.px4 == Treatment.REFUSED:
+            taken = support.arduplane != Treatment.REFUSED
+            who = "ArduPlane takes it" if taken else "nor does ArduPlane take it"
+            yield REFUSED if taken else False, item.seq, f"unsupported command {name}; {who}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (
                 REFUSED,

@@ -35,7 +35,12 @@ REFUSED = {
         3,
         "distance between waypoint and gate too close",
     ),
-    "unsupported": ("checkMissionItemValidity", (*GOOD, "2 5000 0 0 0 0 0 0 0"), 4, "unsupported command command 5000"),
+    "unsupported": (
+        "checkMissionItemValidity",
+        (*GOOD, "2 5000 0 0 0 0 0 0 0"),
+        4,
+        "unsupported command NAV_FENCE_RETURN_POINT",
+    ),
     "spline": ("checkMissionItemValidity", (*GOOD, wp(1500, 0, command=82)), 4, "NAV_SPLINE_WAYPOINT"),
     "servo": (
         "checkMissionItemValidity",

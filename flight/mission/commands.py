@@ -1,0 +1,356 @@
+"""MAVLink's commands, and what ArduPlane and PX4 make of each of them in the mission of a fixed wing.
+
+One table for the itinerary, which flies the items, for the mission rule, which judges them, and for the list in
+docs/your-mission-file.md, which is made of it.  A command that the table lacks is refused by both autopilots.
+
+ArduPlane 4.6: `AP_Mission::mavlink_int_to_mission_cmd` decides what is taken, `AP_Mission::start_command` and
+`Plane::start_command` (ArduPlane/commands_logic.cpp) what is done.  PX4: `parse_mavlink_mission_item`
+(mavlink_mission.cpp) and `FeasibilityChecker::checkMissionItemValidity` decide what is taken, `MissionBlock`
+(mission_block.cpp) what is done.
+"""
+
+from enum import IntEnum, StrEnum
+from typing import NamedTuple
+
+
+class Command(IntEnum):
+    """Every MAV_CMD of MAVLink's dialects common and ardupilotmega, by its name without MAV_CMD_."""
+
+    NAV_WAYPOINT = 16
+    NAV_LOITER_UNLIM = 17
+    NAV_LOITER_TURNS = 18
+    NAV_LOITER_TIME = 19
+    NAV_RETURN_TO_LAUNCH = 20
+    NAV_LAND = 21
+    NAV_TAKEOFF = 22
+    NAV_LAND_LOCAL = 23
+    NAV_TAKEOFF_LOCAL = 24
+    NAV_FOLLOW = 25
+    NAV_CONTINUE_AND_CHANGE_ALT = 30
+    NAV_LOITER_TO_ALT = 31
+    DO_FOLLOW = 32
+    DO_FOLLOW_REPOSITION = 33
+    DO_ORBIT = 34
+    DO_FIGURE_EIGHT = 35
+    NAV_ARC_WAYPOINT = 36
+    NAV_ROI = 80
+    NAV_PATHPLANNING = 81
+    NAV_SPLINE_WAYPOINT = 82
+    NAV_ALTITUDE_WAIT = 83
+    NAV_VTOL_TAKEOFF = 84
+    NAV_VTOL_LAND = 85
+    NAV_GUIDED_ENABLE = 92
+    NAV_DELAY = 93
+    NAV_PAYLOAD_PLACE = 94
+    NAV_LAST = 95
+    CONDITION_DELAY = 112
+    CONDITION_CHANGE_ALT = 113
+    CONDITION_DISTANCE = 114
+    CONDITION_YAW = 115
+    CONDITION_LAST = 159
+    DO_SET_MODE = 176
+    DO_JUMP = 177
+    DO_CHANGE_SPEED = 178
+    DO_SET_HOME = 179
+    DO_SET_PARAMETER = 180
+    DO_SET_RELAY = 181
+    DO_REPEAT_RELAY = 182
+    DO_SET_SERVO = 183
+    DO_REPEAT_SERVO = 184
+    DO_FLIGHTTERMINATION = 185
+    DO_CHANGE_ALTITUDE = 186
+    DO_SET_ACTUATOR = 187
+    DO_RETURN_PATH_START = 188
+    DO_LAND_START = 189
+    DO_RALLY_LAND = 190
+    DO_GO_AROUND = 191
+    DO_REPOSITION = 192
+    DO_PAUSE_CONTINUE = 193
+    DO_SET_REVERSE = 194
+    DO_SET_ROI_LOCATION = 195
+    DO_SET_ROI_WPNEXT_OFFSET = 196
+    DO_SET_ROI_NONE = 197
+    DO_SET_ROI_SYSID = 198
+    DO_CONTROL_VIDEO = 200
+    DO_SET_ROI = 201
+    DO_DIGICAM_CONFIGURE = 202
+    DO_DIGICAM_CONTROL = 203
+    DO_MOUNT_CONFIGURE = 204
+    DO_MOUNT_CONTROL = 205
+    DO_SET_CAM_TRIGG_DIST = 206
+    DO_FENCE_ENABLE = 207
+    DO_PARACHUTE = 208
+    DO_MOTOR_TEST = 209
+    DO_INVERTED_FLIGHT = 210
+    DO_GRIPPER = 211
+    DO_AUTOTUNE_ENABLE = 212
+    NAV_SET_YAW_SPEED = 213
+    DO_SET_CAM_TRIGG_INTERVAL = 214
+    DO_SET_RESUME_REPEAT_DIST = 215
+    DO_SPRAYER = 216
+    DO_SEND_SCRIPT_MESSAGE = 217
+    DO_AUX_FUNCTION = 218
+    DO_MOUNT_CONTROL_QUAT = 220
+    DO_GUIDED_MASTER = 221
+    DO_GUIDED_LIMITS = 222
+    DO_ENGINE_CONTROL = 223
+    DO_SET_MISSION_CURRENT = 224
+    DO_LAST = 240
+    PREFLIGHT_CALIBRATION = 241
+    PREFLIGHT_SET_SENSOR_OFFSETS = 242
+    PREFLIGHT_UAVCAN = 243
+    PREFLIGHT_STORAGE = 245
+    PREFLIGHT_REBOOT_SHUTDOWN = 246
+    OVERRIDE_GOTO = 252
+    OBLIQUE_SURVEY = 260
+    DO_SET_STANDARD_MODE = 262
+    MISSION_START = 300
+    ACTUATOR_TEST = 310
+    CONFIGURE_ACTUATOR = 311
+    COMPONENT_ARM_DISARM = 400
+    RUN_PREARM_CHECKS = 401
+    ILLUMINATOR_ON_OFF = 405
+    DO_ILLUMINATOR_CONFIGURE = 406
+    GET_HOME_POSITION = 410
+    INJECT_FAILURE = 420
+    START_RX_PAIR = 500
+    GET_MESSAGE_INTERVAL = 510
+    SET_MESSAGE_INTERVAL = 511
+    REQUEST_MESSAGE = 512
+    REQUEST_PROTOCOL_VERSION = 519
+    REQUEST_AUTOPILOT_CAPABILITIES = 520
+    REQUEST_CAMERA_INFORMATION = 521
+    REQUEST_CAMERA_SETTINGS = 522
+    REQUEST_STORAGE_INFORMATION = 525
+    STORAGE_FORMAT = 526
+    REQUEST_CAMERA_CAPTURE_STATUS = 527
+    REQUEST_FLIGHT_INFORMATION = 528
+    RESET_CAMERA_SETTINGS = 529
+    SET_CAMERA_MODE = 530
+    SET_CAMERA_ZOOM = 531
+    SET_CAMERA_FOCUS = 532
+    SET_STORAGE_USAGE = 533
+    SET_CAMERA_SOURCE = 534
+    JUMP_TAG = 600
+    DO_JUMP_TAG = 601
+    DO_GIMBAL_MANAGER_PITCHYAW = 1000
+    DO_GIMBAL_MANAGER_CONFIGURE = 1001
+    IMAGE_START_CAPTURE = 2000
+    IMAGE_STOP_CAPTURE = 2001
+    REQUEST_CAMERA_IMAGE_CAPTURE = 2002
+    DO_TRIGGER_CONTROL = 2003
+    CAMERA_TRACK_POINT = 2004
+    CAMERA_TRACK_RECTANGLE = 2005
+    CAMERA_STOP_TRACKING = 2010
+    VIDEO_START_CAPTURE = 2500
+    VIDEO_STOP_CAPTURE = 2501
+    VIDEO_START_STREAMING = 2502
+    VIDEO_STOP_STREAMING = 2503
+    REQUEST_VIDEO_STREAM_INFORMATION = 2504
+    REQUEST_VIDEO_STREAM_STATUS = 2505
+    LOGGING_START = 2510
+    LOGGING_STOP = 2511
+    AIRFRAME_CONFIGURATION = 2520
+    CONTROL_HIGH_LATENCY = 2600
+    PANORAMA_CREATE = 2800
+    DO_VTOL_TRANSITION = 3000
+    ARM_AUTHORIZATION_REQUEST = 3001
+    SET_GUIDED_SUBMODE_STANDARD = 4000
+    SET_GUIDED_SUBMODE_CIRCLE = 4001
+    CONDITION_GATE = 4501
+    NAV_FENCE_RETURN_POINT = 5000
+    NAV_FENCE_POLYGON_VERTEX_INCLUSION = 5001
+    NAV_FENCE_POLYGON_VERTEX_EXCLUSION = 5002
+    NAV_FENCE_CIRCLE_INCLUSION = 5003
+    NAV_FENCE_CIRCLE_EXCLUSION = 5004
+    NAV_RALLY_POINT = 5100
+    UAVCAN_GET_NODE_INFO = 5200
+    DO_SET_SAFETY_SWITCH_STATE = 5300
+    DO_ADSB_OUT_IDENT = 10001
+    LOWEHEISER_SET_STATE = 10151
+    PAYLOAD_PREPARE_DEPLOY = 30001
+    PAYLOAD_CONTROL_DEPLOY = 30002
+    WAYPOINT_USER_1 = 31000
+    WAYPOINT_USER_2 = 31001
+    WAYPOINT_USER_3 = 31002
+    WAYPOINT_USER_4 = 31003
+    WAYPOINT_USER_5 = 31004
+    SPATIAL_USER_1 = 31005
+    SPATIAL_USER_2 = 31006
+    SPATIAL_USER_3 = 31007
+    SPATIAL_USER_4 = 31008
+    SPATIAL_USER_5 = 31009
+    USER_1 = 31010
+    USER_2 = 31011
+    USER_3 = 31012
+    USER_4 = 31013
+    USER_5 = 31014
+    CAN_FORWARD = 32000
+    POWER_OFF_INITIATED = 42000
+    SOLO_BTN_FLY_CLICK = 42001
+    SOLO_BTN_FLY_HOLD = 42002
+    SOLO_BTN_PAUSE_CLICK = 42003
+    FIXED_MAG_CAL = 42004
+    FIXED_MAG_CAL_FIELD = 42005
+    FIXED_MAG_CAL_YAW = 42006
+    SET_EKF_SOURCE_SET = 42007
+    DO_START_MAG_CAL = 42424
+    DO_ACCEPT_MAG_CAL = 42425
+    DO_CANCEL_MAG_CAL = 42426
+    SET_FACTORY_TEST_MODE = 42427
+    DO_SEND_BANNER = 42428
+    ACCELCAL_VEHICLE_POS = 42429
+    GIMBAL_RESET = 42501
+    GIMBAL_AXIS_CALIBRATION_STATUS = 42502
+    GIMBAL_REQUEST_AXIS_CALIBRATION = 42503
+    GIMBAL_FULL_RESET = 42505
+    DO_WINCH = 42600
+    FLASH_BOOTLOADER = 42650
+    BATTERY_RESET = 42651
+    DEBUG_TRAP = 42700
+    SCRIPTING = 42701
+    NAV_SCRIPT_TIME = 42702
+    NAV_ATTITUDE_TIME = 42703
+    GUIDED_CHANGE_SPEED = 43000
+    GUIDED_CHANGE_ALTITUDE = 43001
+    GUIDED_CHANGE_HEADING = 43002
+    EXTERNAL_POSITION_ESTIMATE = 43003
+    SET_HAGL = 43005
+
+
+class Treatment(StrEnum):
+    """Treatment of a command in a mission by one autopilot and by planfly's flight of it."""
+
+    # The flight does what the autopilot does.
+    FLOWN = "flown"
+    # The autopilot takes it, and it changes nothing of the flight path.
+    NO_EFFECT = "no effect on the path"
+    # The autopilot takes it, it may change the flight path, and it is not flown: the verdict is open.
+    OPEN = "not judged"
+    # The autopilot refuses a mission with it.
+    REFUSED = "refused"
+
+
+class Support(NamedTuple):
+    """Treatment of a command by each autopilot, and the reason in a few words, for people."""
+
+    arduplane: Treatment
+    px4: Treatment
+    reason: str
+
+
+C = Command
+_FLOWN = Treatment.FLOWN
+_NO_EFFECT = Treatment.NO_EFFECT
+_OPEN = Treatment.OPEN
+_REFUSED = Treatment.REFUSED
+
+# What commands without an effect on the path are for.
+CAMERA = "the camera's, nothing to fly"
+_GIMBAL = "points a camera, not the aircraft"
+# ArduPlane: `Plane::start_command` knows no such command, `Plane::verify_command` takes it for done.
+_PASSED_OVER = "ArduPlane takes it and passes it over"
+_HOLDS_BACK = "holds back the commands behind it; open where one of them is flown"
+
+# What the autopilots make of each command that one of them takes; both refuse any other.
+SUPPORT: dict[Command, Support] = {
+    C.NAV_WAYPOINT: Support(_FLOWN, _FLOWN, "a place to fly to"),
+    C.NAV_LOITER_UNLIM: Support(_FLOWN, _FLOWN, "a loiter without end, of which a minute is flown"),
+    C.NAV_LOITER_TURNS: Support(_FLOWN, _REFUSED, "a loiter for some turns"),
+    C.NAV_LOITER_TIME: Support(_FLOWN, _FLOWN, "a loiter for some time"),
+    C.NAV_RETURN_TO_LAUNCH: Support(_FLOWN, _FLOWN, "a return to launch"),
+    C.NAV_LAND: Support(_FLOWN, _FLOWN, "a landing; flown to the ground where the scenario has a [landing]"),
+    C.NAV_TAKEOFF: Support(_FLOWN, _FLOWN, "a take-off; flown from the ground where the scenario has a [launch]"),
+    # `Plane::verify_continue_and_change_alt`: straight on, climbing at what the aircraft can, until it is there.
+    C.NAV_CONTINUE_AND_CHANGE_ALT: Support(_OPEN, _REFUSED, "ArduPlane flies straight on to an altitude"),
+    C.NAV_LOITER_TO_ALT: Support(_FLOWN, _FLOWN, "a loiter to an altitude"),
+    # PX4 writes it as DO_SET_ROI.
+    C.NAV_ROI: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
+    # `Plane::do_altitude_wait`: servos at trim and no throttle until an altitude or a sink rate (under a balloon).
+    C.NAV_ALTITUDE_WAIT: Support(_OPEN, _REFUSED, "ArduPlane does not steer until an altitude is reached"),
+    C.NAV_VTOL_TAKEOFF: Support(_OPEN, _OPEN, "a VTOL aircraft climbs straight up"),
+    C.NAV_VTOL_LAND: Support(_OPEN, _OPEN, "a VTOL aircraft lands straight down"),
+    C.NAV_GUIDED_ENABLE: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    # `ModeAuto::verify_nav_delay` is done at once while the motor is armed; PX4 (NAV_CMD_DELAY) waits in the air.
+    C.NAV_DELAY: Support(_NO_EFFECT, _OPEN, "ArduPlane does not wait in the air; PX4 does"),
+    C.NAV_PAYLOAD_PLACE: Support(_OPEN, _REFUSED, "a QuadPlane lands to place its payload"),
+    # They hold back the DO commands behind them, see `flight.mission.itinerary`; by themselves they do nothing.
+    C.CONDITION_DELAY: Support(_FLOWN, _REFUSED, _HOLDS_BACK),
+    C.CONDITION_DISTANCE: Support(_FLOWN, _REFUSED, _HOLDS_BACK),
+    C.CONDITION_YAW: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.DO_JUMP: Support(_FLOWN, _FLOWN, "a jump to another item"),
+    C.DO_CHANGE_SPEED: Support(_FLOWN, _FLOWN, "another airspeed"),
+    # `Plane::do_set_home`.  PX4 takes coordinates in frame 2 alone, where they are no coordinates.
+    C.DO_SET_HOME: Support(_FLOWN, _OPEN, "another home, for the altitudes and returns behind it"),
+    # A relay of another function than a plain one, as of an ignition, is not switched by it (AP_Relay).
+    C.DO_SET_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
+    C.DO_REPEAT_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
+    # `AP_ServoRelayEvents::do_set_servo` moves no channel that has a function, so no control surface and no throttle.
+    C.DO_SET_SERVO: Support(_NO_EFFECT, _NO_EFFECT, "moves a servo that does not steer"),
+    C.DO_REPEAT_SERVO: Support(_NO_EFFECT, _REFUSED, "moves a servo that does not steer"),
+    C.DO_RETURN_PATH_START: Support(_NO_EFFECT, _REFUSED, "a mark that returns may go on from"),
+    C.DO_LAND_START: Support(_FLOWN, _FLOWN, "the mark of a landing sequence"),
+    C.DO_GO_AROUND: Support(_NO_EFFECT, _REFUSED, "a mark that a broken off landing goes on from"),
+    C.DO_PAUSE_CONTINUE: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.DO_SET_REVERSE: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.DO_SET_ROI_LOCATION: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
+    C.DO_SET_ROI_WPNEXT_OFFSET: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
+    C.DO_SET_ROI_NONE: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
+    C.DO_CONTROL_VIDEO: Support(_REFUSED, _NO_EFFECT, CAMERA),
+    C.DO_SET_ROI: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
+    C.DO_DIGICAM_CONFIGURE: Support(_NO_EFFECT, _REFUSED, CAMERA),
+    C.DO_DIGICAM_CONTROL: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.DO_MOUNT_CONFIGURE: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
+    C.DO_MOUNT_CONTROL: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
+    C.DO_SET_CAM_TRIGG_DIST: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    # The mission's fence is judged, enabled or not.
+    C.DO_FENCE_ENABLE: Support(_NO_EFFECT, _REFUSED, "switches the fence, which is judged all the same"),
+    C.DO_PARACHUTE: Support(_OPEN, _REFUSED, "may release the parachute, or let it be released"),
+    C.DO_INVERTED_FLIGHT: Support(_OPEN, _REFUSED, "ArduPlane flies on inverted"),
+    C.DO_GRIPPER: Support(_NO_EFFECT, _NO_EFFECT, "the payload's; its mass is not flown"),
+    # `Plane::autotune_enable`: the gains of roll and pitch change in flight.
+    C.DO_AUTOTUNE_ENABLE: Support(_OPEN, _REFUSED, "ArduPlane changes its own gains in flight"),
+    C.NAV_SET_YAW_SPEED: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.DO_SET_CAM_TRIGG_INTERVAL: Support(_REFUSED, _NO_EFFECT, CAMERA),
+    C.DO_SET_RESUME_REPEAT_DIST: Support(_NO_EFFECT, _REFUSED, "for a mission that is broken off and resumed"),
+    C.DO_SPRAYER: Support(_NO_EFFECT, _REFUSED, "the payload's, nothing to fly"),
+    C.DO_SEND_SCRIPT_MESSAGE: Support(_OPEN, _REFUSED, "a script on board may do anything"),
+    # `RC_Channel::run_aux_function`: modes, motor stop and returns are among them.
+    C.DO_AUX_FUNCTION: Support(_OPEN, _REFUSED, "an auxiliary switch, which may change the mode or stop the motor"),
+    C.DO_GUIDED_LIMITS: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.DO_ENGINE_CONTROL: Support(_OPEN, _REFUSED, "starts or stops the engine"),
+    C.OBLIQUE_SURVEY: Support(_REFUSED, _NO_EFFECT, CAMERA),
+    C.SET_CAMERA_MODE: Support(_REFUSED, _NO_EFFECT, CAMERA),
+    C.SET_CAMERA_ZOOM: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.SET_CAMERA_FOCUS: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.SET_CAMERA_SOURCE: Support(_NO_EFFECT, _REFUSED, CAMERA),
+    C.JUMP_TAG: Support(_FLOWN, _REFUSED, "the mark that DO_JUMP_TAG leads to"),
+    C.DO_JUMP_TAG: Support(_FLOWN, _REFUSED, "a jump to the first JUMP_TAG of its number"),
+    C.DO_GIMBAL_MANAGER_PITCHYAW: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
+    C.DO_GIMBAL_MANAGER_CONFIGURE: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
+    C.IMAGE_START_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.IMAGE_STOP_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.DO_TRIGGER_CONTROL: Support(_REFUSED, _NO_EFFECT, CAMERA),
+    C.VIDEO_START_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.VIDEO_STOP_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.DO_VTOL_TRANSITION: Support(_OPEN, _OPEN, "a VTOL aircraft changes between rotors and wing"),
+    C.CONDITION_GATE: Support(_REFUSED, _FLOWN, "PX4 counts the speeds behind it from when it is passed"),
+    C.DO_WINCH: Support(_NO_EFFECT, _NO_EFFECT, "the payload's, nothing to fly"),
+    C.NAV_SCRIPT_TIME: Support(_OPEN, _REFUSED, "a script on board flies"),
+    C.NAV_ATTITUDE_TIME: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+}
+
+# Commands that do nothing where they stand, and that something else leads to.
+MARKS = frozenset({C.DO_RETURN_PATH_START, C.DO_LAND_START, C.DO_GO_AROUND, C.JUMP_TAG})
+
+_UNKNOWN = Support(_REFUSED, _REFUSED, "no autopilot takes it in a mission")
+
+
+def support_of(command: int) -> Support:
+    """Return what each autopilot makes of a command in a mission.
+
+    >>> support_of(Command.DO_JUMP).px4, support_of(Command.JUMP_TAG).px4, support_of(50_000).arduplane
+    (<Treatment.FLOWN: 'flown'>, <Treatment.REFUSED: 'refused'>, <Treatment.REFUSED: 'refused'>)
+    """
+    # A number that is no member is not found.
+    return SUPPORT.get(command, _UNKNOWN)  # type: ignore[call-overload, no-any-return]
