@@ -47,7 +47,7 @@ from logs.verdict.tolerances import (
     PLAN_TOLERANCE,
     POINT_ERROR,
 )
-from logs.verdict.wording import shortened
+from logs.verdict.wording import place_text, shortened
 from world.frames import to_map
 from world.geometry import wrap
 
@@ -122,23 +122,32 @@ def climbout_findings(
         if run < SAME_PLACE:
             return []
     if math.isnan(low):
-        return [make_finding("climbout", place, ok=None, reason="the ground at home is not known", unit="m")]
+        return [_unjudged("climbout", place, "the ground at home is not known", opens=takeoff is not None)]
     steepest, certain = _climb(requirements, max(0, first - 1), course, low)
     if not steepest > 0.0:
         reason = "the aircraft cannot climb there at this speed and in this wind"
-        return [make_finding("climbout", place, ok=None, reason=reason, unit="m")]
+        return [_unjudged("climbout", place, reason, opens=takeoff is not None)]
     if takeoff is None:
         way = straight_way(begin, course, _way_up(low, float(here[2]), run, steepest))
         return [_by_hand(place, _look(requirements, way))]
     up = float(requirements.points[0, 2])
     if up <= low:
         reason = f"the take-off's height is not above the ground at home, which is at {low:.0f} m AMSL"
-        return [make_finding("climbout", place, ok=None, reason=reason, unit="m")]
+        return [_unjudged("climbout", place, reason, opens=True)]
     met, least = (
         _look(requirements, straight_way(begin, course, _take_off(low, up, run, slope, climb)))
         for climb in (steepest, max(1e-3, MIN_CLIMB * certain))
     )
     return [_launched(requirements, launch.way, place, met, least, (begin, low, up), certain == steepest)]
+
+
+def _unjudged(rule: str, place: Place, reason: str, *, opens: bool) -> Finding:
+    """Return a finding of a way that is not judged.  opens: whether the mission holds it, which opens the verdict."""
+    title = "climb-out" if rule == "climbout" else rule
+    fault = message(f"the {title} at {place_text(place)} is not judged: {reason}")
+    return make_finding(
+        rule, place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY if opens else ""
+    )
 
 
 class _Launch(NamedTuple):
@@ -288,10 +297,10 @@ def approach_findings(
     high, under = float(begin[2]), float(ground.height(float(point[0]), float(point[1])))
     if math.isnan(low) or math.isnan(under) or run < ON_THE_SPOT:
         reason = "the height of the ground at the landing point is not known"
-        return [make_finding("approach", place, ok=None, reason=reason, unit="m")]
+        return [_unjudged("approach", place, reason, opens=True)]
     if high <= low:
         reason = "it begins no higher than the landing point"
-        return [make_finding("approach", place, ok=None, reason=reason, unit="m")]
+        return [_unjudged("approach", place, reason, opens=True)]
     glide = setup.autopilot.landing_glide(high - low, run, setup.scenario.wind.along(course, low)[0], low)
     flare = (run - glide.flare_distance, low + glide.flare_height)
     way = straight_way(begin, course, [(0.0, high), *([flare] if glide.flare_distance > 0.0 else []), (run, low)])

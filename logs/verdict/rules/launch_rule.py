@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flight.mission.ground_ways import TakeOff
 from flight.simulation.track import Track
-from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
+from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import Way, entered_by_way, track_way, way_clearance
@@ -61,14 +61,18 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
     if entered:
         faults.append(message(f"the climb enters {entered}"))
     known = _described(take_off, track, run, room)
-    if LAUNCH_ROOM <= room < LAUNCH_ROOM + CLIMB_ERROR:
-        known.insert(0, f"{room:.1f} m above ground {where:.0f} m from home, nearer than the law's climb is known")
+    open_ = []
+    if not faults and LAUNCH_ROOM <= room < LAUNCH_ROOM + CLIMB_ERROR:
+        brief = f"the launch passes {room:.1f} m above ground {where:.0f} m from home"
+        open_.append(message(brief, ", nearer than the law's climb is known"))
+    elif not faults and math.isnan(room):
+        open_.append(message("the ground below the launch's climb is not known"))
     return make_finding(
         "launch",
         requirements.waypoint(take_off.waypoint),
-        ok=False if faults else None if math.isnan(room) or room < LAUNCH_ROOM + CLIMB_ERROR else True,
-        reason=reason_of(faults, known),
-        faults=faults,
+        ok=False if faults else None if open_ else True,
+        reason=reason_of(faults or open_, known),
+        faults=faults or open_,
         flown=room,
         limit=LAUNCH_ROOM,
         source="check",
@@ -76,6 +80,7 @@ def _flown(requirements: RouteRequirements, ground: FlownGround, take_off: TakeO
         margin=room - LAUNCH_ROOM,
         unit="m",
         method="exact along the flown track",
+        check=GROUND_WAY if open_ else "",
         facts=(Fact("height lost", lost, "m"), Fact("runway left", left, "m")),
     )
 
@@ -123,9 +128,7 @@ def _described(take_off: TakeOff, track: Track, run: Floats, room: float) -> lis
         rise = float(track.position[-1, 2] - track.position[0, 2])
         course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
         known.append(f"climbs at {rise / run[-1]:.2f}, at last on {course}°")
-    if math.isnan(room):
-        known.append("the ground below the climb is not known")
-    elif math.isfinite(room):
+    if math.isfinite(room):
         known.append(f"{room:.0f} m above ground or more beyond {LAUNCH_RUN:.0f} m")
     return known
 

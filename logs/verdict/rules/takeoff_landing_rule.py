@@ -3,22 +3,25 @@
 A flight begins and ends in the air, so that both are judged by the mission's places alone, whether it was flown or not.
 An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than it can climb
 is not judged: a climb-out of 30 degrees is what QGroundControl draws (its TakeoffMissionItem), and autopilots climb on.
+What of a mission's own take-off or landing is not judged leaves the verdict open.
 """
 
 import math
 
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
 from flight.mission.return_path import RETURN_NOT_FLOWN_ON
-from logs.verdict.findings import Finding, make_finding, message
+from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import Place
 from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import PLAN_TOLERANCE
-from logs.verdict.wording import gentle_launch_text
+from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
 
 # How the flight does it instead.
 _ENDS = {"takeoff": "begins", "landing": "ends"}
+_TITLES = {"takeoff": "take-off", "landing": "landing"}
 # What is said of a slope beyond the limit.
 _BEYOND = {"takeoff": None, "landing": False}
 
@@ -49,7 +52,7 @@ def takeoff_findings(
         return [_slope(requirements, "takeoff", at, at + 1, route.takeoff_ground, high)]
     if at == 0 or not own:
         reason = f"to {up:.0f} m AMSL over home, on a course that is the autopilot's to choose"
-        return [make_finding("takeoff", requirements.waypoint(at), ok=None, reason=reason, unit="deg")]
+        return [_unjudged("takeoff", requirements.waypoint(at), reason)]
     # From home, over which the flight starts: `at` is the take-off item's own place.
     return [_slope(requirements, "takeoff", 0, at, route.takeoff_ground, up)]
 
@@ -93,9 +96,14 @@ def landing_findings(
         if not items:
             return []
         reason = f"{command_name(items[-1].command)} has no place of its own on the route"
-        if requirements.setup.route.return_from >= 0:
+        route = requirements.setup.route
+        if route.return_from >= 0:
             reason = RETURN_NOT_FLOWN_ON
-        return [make_finding("landing", requirements.waypoint(requirements.legs), ok=None, reason=reason, unit="deg")]
+        end, flown_on = requirements.waypoint(requirements.legs), RETURN_NOT_FLOWN_ON in " ".join(route.notes)
+        if route.return_from >= 0 and not flown_on:
+            # The return ends the mission; nobody flies to the landing behind it.
+            return [make_finding("landing", end, ok=None, reason=reason, unit="deg")]
+        return [_unjudged("landing", end, reason)]
     at, ground = found[-1], requirements.setup.route.landing_ground
     return [_slope(requirements, "landing", at - 1, at, float(requirements.points[at - 1, 2]), ground)]
 
@@ -111,7 +119,7 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
     place = requirements.waypoint(last)
     run = float(requirements.runs[first:last].sum())
     if math.isnan(low) or math.isnan(high):
-        return make_finding(rule, place, ok=None, reason="the height of the ground there is not known", unit="deg")
+        return _unjudged(rule, place, "the height of the ground there is not known")
     slope = math.atan2(high - low, run)
     limit, source = _limit(requirements, first, low, high, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
@@ -121,13 +129,16 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
     flown = (ways.take_off if rule == "takeoff" else ways.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
     reason += "" if flown else f"; not flown: the flight {_ENDS[rule]} in the air"
-    fault = message(text, f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind")
+    fault = message(
+        f"the {_TITLES[rule]} {text}",
+        f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind",
+    )
     ok = True if within else _BEYOND[rule]
     return make_finding(
         rule,
         place,
         ok=ok,
-        reason=reason if within else fault.text,
+        reason=reason if within else fault.text.removeprefix(f"the {_TITLES[rule]} "),
         faults=[] if within else [fault],
         planned=math.degrees(abs(slope)),
         limit=math.degrees(limit),
@@ -136,7 +147,14 @@ def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, lo
         margin=math.degrees(limit - abs(slope)),
         unit="deg",
         method="mission items",
+        check=GROUND_WAY if ok is None else "",
     )
+
+
+def _unjudged(rule: str, place: Place, reason: str) -> Finding:
+    """Return a finding of a take-off or landing that is not judged, which leaves the verdict open."""
+    fault = message(f"the {_TITLES[rule]} at {place_text(place)} is not judged")
+    return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_WAY)
 
 
 def _limit(requirements: RouteRequirements, leg: int, low: float, high: float, slope: float) -> tuple[float, str]:

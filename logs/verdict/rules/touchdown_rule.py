@@ -32,7 +32,7 @@ from logs.verdict.tolerances import (
     TOUCH_SINK,
     TOUCHED,
 )
-from logs.verdict.wording import shortened
+from logs.verdict.wording import place_text, shortened
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -76,11 +76,13 @@ def touchdown_findings(
     track, terrain = ground.landing, requirements.setup.scenario.terrain
     if ground.left >= len(ground.track) - 1:
         reason = "the flight did not get to its landing"
-        return [make_finding("touchdown", place, ok=None, reason=reason, unit="m")]
+        fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
+        return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
     over = math.nan if terrain is None else float(approach.point[2] - terrain.height(*approach.point[:2]))
     if terrain is None or math.isnan(over):
         reason = "the ground at the landing point is not known"
-        return [make_finding("touchdown", place, ok=None, reason=reason, unit="m")]
+        fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
+        return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
     k = _touched(track, terrain)
     if k is None:
         fault = message("the aircraft did not touch down", f" at {_place_of(approach)}")
@@ -124,13 +126,15 @@ def _finding(place: Place, approach: Approach, landing: _Landing, faults: list[M
     gusts: whether the air is turbulent.
     """
     open_ = [] if faults else _left_open(approach, landing, gusts=gusts)
+    if not faults and not open_ and math.isnan(landing.room):
+        open_ = [message("the ground below the final is not known")]
     said = faults or open_
     inside = 0.5 * approach.strip.length - TOUCH_ERROR
     farthest = max(landing.stop[0], abs(landing.touch[0]))
     return make_finding(
         "touchdown",
         place,
-        ok=False if faults else None if open_ or math.isnan(landing.room) else True,
+        ok=False if faults else None if open_ else True,
         reason=reason_of(said, _described(approach, landing)),
         faults=said,
         flown=farthest,
@@ -258,9 +262,7 @@ def _described(approach: Approach, landing: _Landing) -> list[str]:
     known.append(f"comes to rest with {landing.left:.0f} m of the strip left")
     sinks = f"sinks at {landing.sink:.1f} m/s, {landing.towards:.1f} m/s towards the ground"
     known.append(f"{sinks}, by a flare that is not judged")
-    if math.isnan(landing.room):
-        known.append("the ground below the final is not known")
-    elif math.isfinite(landing.room):
+    if math.isfinite(landing.room):
         known.append(f"the final stays {landing.room:.0f} m above ground or more")
     if approach.tail_wind > 0.1:
         known.append(f"with {approach.tail_wind:.1f} m/s of tail wind")

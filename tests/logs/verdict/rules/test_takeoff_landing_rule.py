@@ -73,7 +73,7 @@ def test_the_wind_makes_an_approach_steeper_from_ahead() -> None:
 def test_a_climb_too_steep_is_said_in_the_first_line() -> None:
     # 30 degrees, as QGroundControl draws a climb-out.
     verdict = judge_geometry(setup_of(*climb(30.0), home=HOME))
-    assert verdict.headline == "flyable; take-off not judged"
+    assert verdict.headline == "not judged in full: the take-off climbs 100 m in 173 m, 30.0°"
     assert any(line.startswith("Not judged: take-off (climbs 100 m in 173 m, 30.0°; at ") for line in verdict.lines)
 
 
@@ -92,7 +92,7 @@ def test_a_climb_over_home_is_not_judged_and_the_first_line_says_so() -> None:
     for line in (wp(0, 0, 200, command=22), "3 22 15 0 0 0 0 0 200"):
         verdict = judge_geometry(setup_of(line, *FAR, home=HOME))
         assert of(verdict, "takeoff").ok is None
-        assert verdict.headline == "flyable; take-off not judged"
+        assert verdict.headline == "not judged in full: the take-off at waypoint 0 (item 1) is not judged"
 
 
 def test_a_landing_without_a_place_or_a_height_is_not_judged() -> None:

@@ -94,4 +94,6 @@ def test_a_final_over_unknown_ground_is_not_judged() -> None:
     one = found(setup, flown.track, "touchdown")
     assert one.ok is None
     assert "the ground below the final is not known" in one.reason
-    assert judge_flight(setup, flown.track, "completed").headline == "flyable; touchdown not judged"
+    assert judge_flight(setup, flown.track, "completed").headline == (
+        "not judged in full: the ground below the final is not known"
+    )
