@@ -249,7 +249,7 @@ _REFUSED = Treatment.REFUSED
 CAMERA = "the camera's, nothing to fly"
 _GIMBAL = "points a camera, not the aircraft"
 # ArduPlane: `Plane::start_command` knows no such command, `Plane::verify_command` takes it for done.
-_PASSED_OVER = "ArduPlane takes it and passes it over"
+PASSED_OVER = "ArduPlane takes it and passes it over"
 _HOLDS_BACK = "holds back the commands behind it; open where one of them is flown"
 
 # What the autopilots make of each command that one of them takes; both refuse any other.
@@ -270,14 +270,14 @@ SUPPORT: dict[Command, Support] = {
     C.NAV_ALTITUDE_WAIT: Support(_OPEN, _REFUSED, "ArduPlane does not steer until an altitude is reached"),
     C.NAV_VTOL_TAKEOFF: Support(_OPEN, _OPEN, "a VTOL aircraft climbs straight up"),
     C.NAV_VTOL_LAND: Support(_OPEN, _OPEN, "a VTOL aircraft lands straight down"),
-    C.NAV_GUIDED_ENABLE: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.NAV_GUIDED_ENABLE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     # `ModeAuto::verify_nav_delay` is done at once while the motor is armed; PX4 (NAV_CMD_DELAY) waits in the air.
     C.NAV_DELAY: Support(_NO_EFFECT, _OPEN, "ArduPlane does not wait in the air; PX4 does"),
     C.NAV_PAYLOAD_PLACE: Support(_OPEN, _REFUSED, "a QuadPlane lands to place its payload"),
     # They hold back the DO commands behind them, see `flight.mission.itinerary`; by themselves they do nothing.
     C.CONDITION_DELAY: Support(_FLOWN, _REFUSED, _HOLDS_BACK),
     C.CONDITION_DISTANCE: Support(_FLOWN, _REFUSED, _HOLDS_BACK),
-    C.CONDITION_YAW: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.CONDITION_YAW: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_JUMP: Support(_FLOWN, _FLOWN, "a jump to another item"),
     C.DO_CHANGE_SPEED: Support(_FLOWN, _FLOWN, "another airspeed"),
     # `Plane::do_set_home`.  PX4 takes coordinates in frame 2 alone, where they are no coordinates.
@@ -291,8 +291,8 @@ SUPPORT: dict[Command, Support] = {
     C.DO_RETURN_PATH_START: Support(_NO_EFFECT, _REFUSED, "a mark that returns may go on from"),
     C.DO_LAND_START: Support(_FLOWN, _FLOWN, "the mark of a landing sequence"),
     C.DO_GO_AROUND: Support(_NO_EFFECT, _REFUSED, "a mark that a broken off landing goes on from"),
-    C.DO_PAUSE_CONTINUE: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
-    C.DO_SET_REVERSE: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.DO_PAUSE_CONTINUE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
+    C.DO_SET_REVERSE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_SET_ROI_LOCATION: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
     C.DO_SET_ROI_WPNEXT_OFFSET: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
     C.DO_SET_ROI_NONE: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
@@ -310,14 +310,14 @@ SUPPORT: dict[Command, Support] = {
     C.DO_GRIPPER: Support(_NO_EFFECT, _NO_EFFECT, "the payload's; its mass is not flown"),
     # `Plane::autotune_enable`: the gains of roll and pitch change in flight.
     C.DO_AUTOTUNE_ENABLE: Support(_OPEN, _REFUSED, "ArduPlane changes its own gains in flight"),
-    C.NAV_SET_YAW_SPEED: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.NAV_SET_YAW_SPEED: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_SET_CAM_TRIGG_INTERVAL: Support(_REFUSED, _NO_EFFECT, CAMERA),
     C.DO_SET_RESUME_REPEAT_DIST: Support(_NO_EFFECT, _REFUSED, "for a mission that is broken off and resumed"),
     C.DO_SPRAYER: Support(_NO_EFFECT, _REFUSED, "the payload's, nothing to fly"),
     C.DO_SEND_SCRIPT_MESSAGE: Support(_OPEN, _REFUSED, "a script on board may do anything"),
     # `RC_Channel::run_aux_function`: modes, motor stop and returns are among them.
     C.DO_AUX_FUNCTION: Support(_OPEN, _REFUSED, "an auxiliary switch, which may change the mode or stop the motor"),
-    C.DO_GUIDED_LIMITS: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.DO_GUIDED_LIMITS: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
     C.DO_ENGINE_CONTROL: Support(_OPEN, _REFUSED, "starts or stops the engine"),
     C.OBLIQUE_SURVEY: Support(_REFUSED, _NO_EFFECT, CAMERA),
     C.SET_CAMERA_MODE: Support(_REFUSED, _NO_EFFECT, CAMERA),
@@ -337,7 +337,7 @@ SUPPORT: dict[Command, Support] = {
     C.CONDITION_GATE: Support(_REFUSED, _FLOWN, "PX4 counts the speeds behind it from when it is passed"),
     C.DO_WINCH: Support(_NO_EFFECT, _NO_EFFECT, "the payload's, nothing to fly"),
     C.NAV_SCRIPT_TIME: Support(_OPEN, _REFUSED, "a script on board flies"),
-    C.NAV_ATTITUDE_TIME: Support(_NO_EFFECT, _REFUSED, _PASSED_OVER),
+    C.NAV_ATTITUDE_TIME: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
 }
 
 # Commands that do nothing where they stand, and that something else leads to.

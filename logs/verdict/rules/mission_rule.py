@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from flight.autopilots.autopilot import MissionChecks
-from flight.mission.commands import Treatment, support_of
+from flight.mission.commands import PASSED_OVER, Treatment, support_of
 from flight.mission.fences import fence_problem
 from flight.mission.items import (
     LANDINGS,
@@ -184,6 +184,7 @@ def _validity(mission: Mission) -> Iterator[_Remark]:
         if support.px4 == Treatment.REFUSED:
             taken = support.arduplane != Treatment.REFUSED
             who = "ArduPlane takes it" if taken else "nor does ArduPlane take it"
+            who = "ArduPlane passes it over" if support.reason == PASSED_OVER else who
             yield REFUSED if taken else False, item.seq, f"unsupported command {name}; {who}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (
