@@ -117,7 +117,7 @@ class CampaignResult:
         """Each flight's way, read from the campaign's folder at every call; a row a flight, NaN where none is known.
 
         "clearance": (n, 150) least height above ground on each equal piece of the route's length, m.
-        "crossings": (n, w, 2) how far right of and above each waypoint it was at its nearest, m.
+        "crossings": (n, s, 2) distance right of and above each stop of the route at its nearest, m.
         Raises ValueError for a campaign that kept no folder.
         """
         if self.table is None:

@@ -103,16 +103,19 @@ def clearance_profile(route: Route, track: Track) -> Singles:
 
 
 def waypoint_crossings(route: Route, track: Track) -> Singles:
-    """(w, 2) how far right of and above each waypoint the track was at its nearest, m; NaN where it did not get there.
+    """(s, 2) distance right of and above each of s stops at the track's nearest row, m; NaN where it did not get there.
 
-    Right is seen along the mean of the courses in and out.
+    A stop is a waypoint, or the corner at which a loiter or a return begins: how many corners follow differs between
+    flights.  Right is seen along the mean of the courses in and out.
     """
     points = route.waypoints
     out = np.full((len(points), 2), np.nan, dtype=np.float32)
     steps = np.diff(points[:, :2], axis=0)
     courses = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
     middle = np.concatenate([courses[:1], 0.5 * (courses[:-1] + courses[1:]), courses[-1:]])
-    for k, point in enumerate(points):
+    first = np.unique(route.stops, return_index=True)[1]
+    for k in first.tolist():
+        point = points[k]
         near = np.flatnonzero((track.leg == k) | (track.leg == k - 1))
         passed = len(track) and (track.leg.max() >= k or k == len(points) - 1)
         if not near.size or not passed:
@@ -120,7 +123,7 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
         off = track.position[near] - point
         nearest = off[np.argmin(off[:, 0] ** 2 + off[:, 1] ** 2)]
         out[k] = nearest[0] * np.cos(middle[k]) - nearest[1] * np.sin(middle[k]), nearest[2]
-    return out
+    return out[first]
 
 
 # ----------------------------------------------------------------------

@@ -149,8 +149,12 @@ def _ways(base: CampaignBase, store: Store) -> list[tuple[Figure, str]]:
         least = base.scenario.limits.min_clearance_m
         figure = draw_clearance_fan(np.array(shapes, dtype=np.float64), failed, ground, float(before[-1]), least)
         out.append((figure, "Height above ground along the way, over all flights, and the ground itself"))
-    crossings = np.array([np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _DRAWN)])
-    out.append((draw_crossings(crossings.astype(np.float64), failed), "Where flights crossed each waypoint"))
+    crossings = [np.frombuffer(data, np.float32).reshape(-1, 2) for data in store.blobs("crossings", _DRAWN)]
+    # Wind decides whether an autopilot has further stops on its way back: of flights without them NaN.
+    crossed = np.full((len(crossings), max(map(len, crossings)), 2), np.nan)
+    for row, known in zip(crossed, crossings, strict=True):
+        row[: len(known)] = known
+    out.append((draw_crossings(crossed, failed), "Where flights crossed each waypoint"))
     return out
 
 

@@ -557,7 +557,7 @@ def read_shapes(path: Path) -> dict[str, NDArray[np.float32]]:
     """What a campaign keeps of each flight's way, in the order of flights; NaN for flights that have none.
 
     "clearance": (n, 150) least height above ground on each equal piece of the route's length, m.
-    "crossings": (n, w, 2) how far right of and above each waypoint it was at its nearest, m.
+    "crossings": (n, s, 2) distance right of and above each stop of the route at its nearest, m.
     Raises StoreError for a file that is none of ours or is held.
     """
     with _opened(path) as connection:
@@ -570,7 +570,8 @@ def _singles(connection: sqlite3.Connection, name: str, entry: tuple[int, ...]) 
     found = np.full((count, (size or 0) // np.dtype(np.float32).itemsize), np.nan, dtype=np.float32)
     for row, (data,) in zip(found, connection.execute(f"SELECT {name} FROM flights ORDER BY flight"), strict=True):
         if data:
-            row[:] = np.frombuffer(data, np.float32)
+            known = np.frombuffer(data, np.float32)
+            row[: known.size] = known
     return found.reshape(count, found.shape[1] // math.prod(entry), *entry)
 
 

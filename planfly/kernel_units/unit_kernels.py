@@ -99,6 +99,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "logs.verdict.measures.path_sweeps._path_clearance",
         "logs.verdict.measures.path_sweeps._path_spheres",
         "logs.verdict.measures.slopes.lifted_speed",
+        "logs.verdict.measures.route_progress._lay",
         "logs.verdict.measures.track_alignment._align",
         "world.wind._mean_wind_speeds",
         "world.wind.mean_wind_speed",

@@ -16,6 +16,7 @@ from flight.simulation.tick import NEAR
 from flight.simulation.track import Track
 from logs.verdict.measures.acceptance import reach
 from logs.verdict.measures.path_sweeps import path_clearance
+from logs.verdict.measures.route_progress import RouteProgress, route_progress
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST, MAX_PLAUSIBLE
 from world.kernels import compiled, read_only
@@ -25,6 +26,8 @@ RowNumbers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
 
+# A waypoint that the route leads to so much further than it reaches was not flown by, m.
+_STILL_AHEAD_M = 50.0
 # Largest table of the assignment of rows to waypoints, cells; the track is thinned to stay within it.
 _CELLS = 40_000_000
 
@@ -72,6 +75,16 @@ class AlignedTrack:
         """Whether any of a leg was flown."""
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
 
+    def leg_at(self, row: int) -> int:
+        """Leg that a row was flown on; the last row is on the leg that the flight ended on."""
+        return int(np.searchsorted(self.rows[1:-1], min(row, len(self.track) - 2), side="right"))
+
+    def where(self, row: int, fraction: float = 0.0) -> str:
+        """Place of a row, or of a fraction of the way from it to the next, on the map, in words."""
+        position = self.track.position
+        east, north = (position[row] + fraction * (position[min(row + 1, len(position) - 1)] - position[row]))[:2]
+        return f"east {east:.0f} m, north {north:.0f} m"
+
     def around(self, first: int, last: int, seconds: float) -> slice:
         """Rows first..last and those within ``seconds`` of them."""
         time = self.track.time
@@ -89,27 +102,20 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     else:
         first_bad = float(track.time[int(np.argmin(good))])
         clean = Track(*(getattr(track, item.name)[good] for item in fields(track)))
-    apexes = requirements.apexes()
-    rows, distance = _assign(clean, apexes)
-    last = len(clean) - 1
-    off = np.hypot(*(clean.position[rows, :2] - apexes[:, :2]).T)
-    arrived = [
-        max(float(offset) + ARRIVED, reach(requirements, i).radius)
-        for i, offset in enumerate(requirements.fly_by_offset)
-    ]
-    first = requirements.setup.route.return_from
-    if first >= 0:
-        # A return ends where its autopilot circles, which is not where its circle is drawn.
-        until = requirements.setup.route.return_until
-        arrived[first + 1 : until] = [max(NEAR, radius) for radius in arrived[first + 1 : until]]
-    if requirements.setup.autopilot.loiter_rules.at_middle:
-        # A mission that ends on a circle about a middle ends anywhere on it, which is as wide as it is flown.
-        ends, item = requirements.setup.route.arcs.size - 1, requirements.setup.route.items[-1]
-        while ends > 0 and requirements.setup.route.items[ends] == item and requirements.setup.route.arcs[ends - 1]:
-            arrived[ends] = max(arrived[ends], NEAR)
-            ends -= 1
-    passed = (rows < last) | (off <= arrived)
+    apexes, last = requirements.apexes(), len(clean) - 1
+    progress = route_progress(requirements.setup.route, clean.position, anywhere=requirements.setup.source is not None)
+    arrived = _arrival_distances(requirements)
+    progress = _past_arrivals(requirements, clean, progress, arrived)
+    rows, distance = _assign(clean, apexes, progress)
+    off = np.hypot(*(clean.position[rows, :2] - requirements.points[:, :2]).T)
+    # The flight is past a waypoint that it flew by, or at one that it ended at; one far ahead it did not fly by.
+    ahead = progress.left > arrived + _STILL_AHEAD_M
+    ahead[-1] = False
+    passed = ((rows < last) & ~ahead) | (off <= arrived)
+    passed &= np.arange(len(rows)) <= progress.target
     passed = np.logical_and.accumulate(passed)
+    rows[~passed] = last
+    _begin_last_leg(requirements, clean, rows, passed, arrived)
     step = np.diff(clean.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(step[:, 0], step[:, 1]))
     ground = requirements.setup.scenario.terrain
@@ -129,6 +135,55 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         low_at=low_at,
         tick=float(np.median(np.diff(clean.time))),
     )
+
+
+def _arrival_distances(requirements: RouteRequirements) -> Floats:
+    """Distance from each waypoint, (w,) m, within which a track that ends there has passed it."""
+    route, follows_path = requirements.setup.route, requirements.setup.autopilot.follows_path
+    offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
+    arrived = [max(float(offset) + ARRIVED, reach(requirements, i).radius) for i, offset in enumerate(offsets)]
+    first = route.return_from
+    if first >= 0:
+        # A return ends where its autopilot circles, which is not where its circle is drawn.
+        until = route.return_until
+        arrived[first + 1 : until] = [max(NEAR, radius) for radius in arrived[first + 1 : until]]
+    if requirements.setup.autopilot.loiter_rules.at_middle:
+        # A mission that ends on a circle about a middle ends anywhere on it, which is as wide as it is flown.
+        ends, item = route.arcs.size - 1, route.items[-1]
+        while ends > 0 and route.items[ends] == item and route.arcs[ends - 1]:
+            arrived[ends] = max(arrived[ends], NEAR)
+            ends -= 1
+    return np.array(arrived)
+
+
+def _past_arrivals(
+    requirements: RouteRequirements, track: Track, progress: RouteProgress, arrived: Floats
+) -> RouteProgress:
+    """Add the waypoints that a track ends at to those that it set out for.
+
+    Who is within reach of a waypoint is on the way to the next one.
+    """
+    points, end, target = requirements.points, track.position[-1], progress.target
+    first, until = progress.first.copy(), progress.last.copy()
+    while target + 1 < len(points) and math.dist(end[:2], points[target, :2]) <= arrived[target]:
+        target += 1
+        first[target], until[target] = first[target - 1], len(track) - 1
+    return replace(progress, first=first, last=until, target=target)
+
+
+def _begin_last_leg(
+    requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrived: Floats
+) -> None:
+    """Begin the leg that a track ends on where the track came within reach of its first waypoint; changes ``rows``.
+
+    Only where the track ends within that reach, before the waypoint: who flies is on the next leg by then.
+    """
+    k = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
+    if not 0 < k < len(rows) - 1 or rows[k] < len(track) - 1 or requirements.setup.route.arcs[k] > 0.0:
+        return
+    off = np.hypot(*(track.position[:, :2] - requirements.points[k, :2]).T)
+    beyond = np.flatnonzero(off[rows[k - 1] :] > arrived[k])
+    rows[k] = min(rows[k] - 1, rows[k - 1] + (int(beyond[-1]) + 1 if beyond.size else 0))
 
 
 def along_across(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
@@ -177,12 +232,16 @@ def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
     return np.asarray(good & (time > before))
 
 
-def _assign(track: Track, apexes: Floats) -> tuple[RowNumbers, Floats]:
-    """Row of each waypoint's passage: the assignment in time order with the least sum of squared distances."""
+def _assign(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
+    """Row of each waypoint's passage: the assignment in time order with the least sum of squared distances.
+
+    Of the rows that are along each waypoint's legs.
+    """
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
     step = max(1, int(CHORD_TIME / tick), -(-len(track) * count // _CELLS))
-    chords, capped = _align(read_only(position), apexes, step, CAPTURE_RADIUS)
+    first, until = read_only(progress.first // step), read_only(progress.last // step)
+    chords, capped = _align(read_only(position), apexes, first, until, step, CAPTURE_RADIUS)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
     # Missed waypoints lie between their neighbours; those after the last one met lie at the end.
@@ -208,11 +267,12 @@ def _assign(track: Track, apexes: Floats) -> tuple[RowNumbers, Floats]:
 
 @compiled
 def _align(
-    position: Floats, marks: Floats, step: int, capture: float
+    position: Floats, marks: Floats, first: RowNumbers, until: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:  # pragma: no cover - compiled
     """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, capture)^2.
 
-    By dynamic programming; of equal assignments the earliest.  Also which marks no row of their chord captures.
+    By dynamic programming; of equal assignments the earliest.  Also which marks no row of their chord captures: each
+    is captured by chords first..until alone.
     """
     last = position.shape[0] - 1
     chords = -(-last // step)
@@ -234,6 +294,8 @@ def _align(
                 start2 += out * out
             f = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
             away2 = max(0.0, start2 - 2.0 * f * along + f * f * length2)
+            if not first[i] <= j <= until[i]:
+                away2 = math.inf
             total = best[j] + min(away2, capture * capture)
             if total < lowest:
                 lowest = total
@@ -252,7 +314,7 @@ def _align(
             for k in range(3):
                 away2 += (marks[i, k] - position[row, k]) ** 2
             nearest2 = min(nearest2, away2)
-        capped[i] = nearest2 >= capture * capture
+        capped[i] = nearest2 >= capture * capture or not first[i] <= j <= until[i]
     return chosen, capped
 
 

@@ -214,10 +214,8 @@ def _straight(requirements: RouteRequirements, leg: int) -> str:
 
 def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
     """When and where the aircraft was at this fraction of a segment, in words."""
-    time, position = aligned.track.time, aligned.track.position
-    when = time[k] + fraction * (time[k + 1] - time[k])
-    where = position[k] + fraction * (position[k + 1] - position[k])
-    return f"at {when:.1f} s, east {where[0]:.0f} m, north {where[1]:.0f} m"
+    time = aligned.track.time
+    return f"at {time[k] + fraction * (time[k + 1] - time[k]):.1f} s, {aligned.where(k, fraction)}"
 
 
 RULE = Rule(

@@ -13,7 +13,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import CONTRADICTION, GAP_STEPS, LONGEST_GAP
-from logs.verdict.wording import shortened
+from logs.verdict.wording import place_text_within, shortened
 
 
 def completion_findings(
@@ -25,7 +25,7 @@ def completion_findings(
     if plan is not None and not plan.feasible:
         faults.append(message("the plan is not feasible"))
     if ended != "completed":
-        faults.append(message(f"the flight ended early: {ended}"))
+        faults.append(message(f"the flight ended early: {ended}", _ending_place(requirements, aligned)))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     legs = 0
@@ -55,6 +55,14 @@ def completion_findings(
             method="waypoints passed in order",
         )
     ]
+
+
+def _ending_place(requirements: RouteRequirements, aligned: AlignedTrack | None) -> str:
+    """On which leg and at which place a flight ended before its last waypoint, in words."""
+    if aligned is None or aligned.passed[-1]:
+        return ""
+    row = len(aligned.track) - 1
+    return f" on {place_text_within(requirements.leg(aligned.leg_at(row)))} {aligned.where(row)}"
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:

@@ -12,7 +12,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import MAX_BANK, SLOWEST, SLOWEST_SHARE
-from logs.verdict.wording import shortened
+from logs.verdict.wording import place_text, shortened
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,14 @@ def departure_findings(
         faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s"))
     faults += slow
     if (aligned.low <= 0.0).any():
-        faults.append(message(f"ground contact at {track.time[int(np.argmax(aligned.low <= 0.0))]:.1f} s"))
+        k = int(np.argmax(aligned.low <= 0.0))
+        time = track.time[k] + aligned.low_at[k] * (track.time[k + 1] - track.time[k])
+        faults.append(
+            message(
+                f"ground contact at {time:.1f} s on {place_text(requirements.leg(aligned.leg_at(k)))}",
+                f", {aligned.where(k, float(aligned.low_at[k]))}",
+            )
+        )
     least = -_most(-track.airspeed.astype(np.float64))
     known = [] if math.isnan(most) else [f"bank at most {math.degrees(most):.0f}°"]
     known += [] if math.isnan(least) else [f"airspeed at least {least:.1f} m/s"]

@@ -15,7 +15,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.rule import LogNeeds, Margin, Rule
 from logs.verdict.suggestions import pass_threat
-from logs.verdict.wording import place_text
+from logs.verdict.wording import place_text, place_text_within
 from world.threats import Threats, threat_label
 
 Floats = NDArray[np.float64]
@@ -52,7 +52,8 @@ def threat_findings(
             if plan.closest[m] <= radii[m] or (track is not None and track.closest[m] <= radii[m]):
                 visit = None if geometric else _visit(track, m)
                 place = Place(side, m, name=table.name or "")
-                touched.append(_touched(place, _visit(plan, m), visit, float(radii[m])))
+                where = "" if side == "radar" else _nearest_place(requirements, aligned, visit, float(radii[m]))
+                touched.append(_touched(place, _visit(plan, m), visit, float(radii[m]), where))
     if not any(item.place.kind == "missile" for item in touched):
         error = position_error(requirements.setup)
         touched.insert(0, _untouched(len(threats), nearest, name, error, aligned is not None or geometric))
@@ -83,6 +84,18 @@ def _visit(visits: SphereVisits | None, m: int) -> _Visit:
     return _Visit(*(float(column[m]) for column in columns))
 
 
+def _nearest_place(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, visit: _Visit | None, radius: float
+) -> str:
+    """On which leg and where a flight inside a sphere (m) was nearest to its centre, in words; "" if not inside."""
+    if aligned is None or visit is None or math.isnan(visit.closest_time) or visit.closest > radius:
+        return ""
+    time = aligned.track.time
+    k = max(0, min(len(time) - 2, int(np.searchsorted(time, visit.closest_time, side="right")) - 1))
+    fraction = float((visit.closest_time - time[k]) / (time[k + 1] - time[k]))
+    return f" on {place_text_within(requirements.leg(aligned.leg_at(k)))} {aligned.where(k, fraction)}"
+
+
 def _untouched(count: int, nearest: float, name: str, error: float, judged: bool) -> Finding:
     """No sphere is entered.  nearest: m outside that of the threat of this name.  error: of navigation, m."""
     reason = f"no missile sphere of {count} threats is entered" if count else "the scenario has no threats"
@@ -110,13 +123,13 @@ def _untouched(count: int, nearest: float, name: str, error: float, judged: bool
     )
 
 
-def _touched(place: Place, plan: _Visit, track: _Visit | None, radius: float) -> Finding:
+def _touched(place: Place, plan: _Visit, track: _Visit | None, radius: float, where: str) -> Finding:
     judged = plan if track is None else track
     missing = math.isnan(judged.closest)
     facts = f"planned {plan.inside:.1f} s inside {radius:.0f} m, exposure {plan.exposure:.3g} s"
     if track is not None and not missing:
         facts += f"; flown {track.inside:.1f} s, exposure {track.exposure:.3g} s, nearest {track.closest:.0f} m"
-        facts += f" at {track.closest_time:.1f} s"
+        facts += f" at {track.closest_time:.1f} s{where}"
     flown = None if track is None else track.inside
     if place.kind == "radar":
         return make_finding(

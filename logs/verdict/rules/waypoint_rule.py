@@ -10,13 +10,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
+from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.rule import Margin, Rule
 from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
-from logs.verdict.wording import place_text
+from logs.verdict.wording import place_text, place_text_within
 
 Floats = NDArray[np.float64]
 
@@ -77,8 +77,10 @@ def _turns(requirements: RouteRequirements, i: int, near: Reach) -> str:
 def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
     near, setup = reach(requirements, i), requirements.setup
     offset, most = float(requirements.fly_by_offset[i]), near.radius + near.tolerance
-    away, ok, reason = math.nan, False, "missed: nothing was flown"
+    away, reason = math.nan, "missed: nothing was flown"
+    ok: bool | None = False
     facts: tuple[Fact, ...] = ()
+    faults: list[Message] = []
     if aligned is not None:
         away, off = _closest(requirements, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", off, "m"),)
@@ -92,7 +94,14 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
         if math.isfinite(beside):
             reason += f"; the line across the leg there crossed {beside:.0f} m beside it"
         if i > 0 and not aligned.passed[i]:
-            ok, reason = False, f"missed: the flight ended {math.hypot(away, off):.0f} m away"
+            ended = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
+            text = f": the flight ended on {place_text_within(ended)} {math.hypot(away, off):.0f} m away"
+            faults = [message("not reached", text)]
+            ok, reason = False, reason_of(faults)
+            if not aligned.passed[i - 1]:
+                # A waypoint that the flight was not on the way to: how far away it was says nothing.
+                away, ok, facts = math.nan, None, ()
+                reason = f"not reached: the flight ended on {place_text(ended)}"
         elif not ok:
             reason = f"missed: {reason}; {_counts(near)}"
     return make_finding(
@@ -100,13 +109,14 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
         requirements.waypoint(i),
         ok=ok,
         reason=reason,
+        faults=faults,
         planned=offset,
         flown=away,
         limit=near.radius,
         source=near.source,
         tolerance=near.tolerance,
-        # Past the line beside it counts as reached whatever its distance.
-        margin=near.radius - away if ok is (away <= most) else None,
+        # Past the line beside it counts as reached whatever its distance; one that was not reached has none.
+        margin=near.radius - away if ok is (away <= most) and not faults else None,
         unit="m",
         method="closest approach, horizontal",
         facts=facts,
@@ -147,6 +157,8 @@ def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, lev
 
 def _missed(item: Finding) -> str:
     """A missed waypoint in a headline."""
+    if item.flown is not None and item.brief != item.reason:
+        return f"{place_text(item.place)} {item.brief}"
     over = item.flown is not None and item.limit is not None and item.flown > item.limit
     return f"{place_text(item.place)} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if over else "")
 

@@ -138,6 +138,14 @@ def test_shapes_are_read_on_asking(base: CampaignBase, tmp_path: Path) -> None:
     assert np.isnan(crossings[1]).all()
 
 
+def test_flights_of_different_routes_have_their_shapes_in_one_array(base: CampaignBase, tmp_path: Path) -> None:
+    """Wind decides how many stops a way back has: the shorter arrays end with NaN."""
+    rows = [replace(made_flight(base, k), crossings=np.zeros((k, 2), np.float32).tobytes()) for k in (1, 3)]
+    crossings = read_shapes(kept(tmp_path / "c.sqlite", rows))["crossings"]
+    assert crossings.shape == (2, 3, 2)
+    assert np.isnan(crossings).sum(axis=(1, 2)).tolist() == [4, 0]
+
+
 def test_a_table_without_a_flight_has_columns_without_one(tmp_path: Path) -> None:
     path = kept(tmp_path / "c.sqlite", [])
     assert {len(values) for values in read_table(path).values()} == {0}

@@ -69,12 +69,13 @@ def test_it_counts_for_the_last_waypoint_too(radius: float) -> None:
     assert of(verdict, "waypoint", waypoint(2)).ok is (radius > 25.0)
 
 
-def test_of_a_flight_that_ended_before_the_waypoint_before_its_end_counts() -> None:
+def test_of_a_flight_that_ended_before_a_waypoint_its_end_counts() -> None:
     setup = make_setup(STRAIGHT)
     whole = fly_path(setup)
     ended = whole.rows(0, int(np.searchsorted(whole.position[:, 1], 2000.0)))
-    item = of(judge(setup, ended), "waypoint", waypoint(2))
-    assert item.flown == pytest.approx(6000.0 - ended.position[-1, 1], abs=0.01)
+    items = [of(judge(setup, ended), "waypoint", waypoint(k)) for k in (1, 2)]
+    assert items[0].flown == pytest.approx(setup.route.waypoints[1, 1] - ended.position[-1, 1], abs=0.01)
+    assert [item.ok for item in items] == [False, None]
 
 
 @pytest.mark.parametrize(("turn", "offset"), [(120.0, 110.4), (150.0, 316.1), (90.0, 45.7)])

@@ -1,0 +1,186 @@
+"""How far along its route a track got, and which rows of it lie along each leg, by their places alone.
+
+A route that comes back to where it began, or flies the same round again, is near to many of its waypoints at once.
+So the whole track is laid along the whole route: both only go forward, and the track may end anywhere on the way.
+What guidance recorded about itself is not read.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.route import Route
+from flight.simulation.tick import NEAR, WIDER
+from logs.verdict.tolerances import CAPTURE_RADIUS
+from world.kernels import compiled, read_only
+
+Floats = NDArray[np.float64]
+Numbers = NDArray[np.int64]
+
+# Distance between neighbouring samples of route and track, m; more where the table would be larger than this, cells.
+_SAMPLE_SPACING_M = 20.0
+_MAX_CELLS = 16_000_000
+# Rows that far before and after the rows along a waypoint's two legs may be those nearest to it, m of track.
+_WINDOW_MARGIN_M = 300.0
+# A part of the route without any of the track costs this share of its squared distance, and this distance squared.
+_SKIP_SHARE, _SKIP_DISTANCE_M = 0.1, 15.0
+# A flight that may begin anywhere on the route begins at the earliest place of equally near ones, m per sample.
+_LATE_START_M = 1.0
+# A loiter is flown within this of its drawn circle, m; how often it goes around it is of no importance here.
+_LOITER_MARGIN_M = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class RouteProgress:
+    """How far along a route of w waypoints a track got.
+
+    first, last: (w,) rows between which each waypoint may have been passed; first > last for one that the flight did
+    not set out for.
+    target: the waypoint that the flight was on the way to, or at, when it ended.
+    left: m of the route from where the track ends to each waypoint, (w,), negative for those behind.
+    """
+
+    first: Numbers
+    last: Numbers
+    target: int
+    left: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class _Samples:
+    """Places along a route, in flying order.
+
+    places: (m, 2) m.  radii: (m,) m within which each place is reached; 0 on a line, a circle's for a loiter.
+    along: (m,) m from the route's start.
+    of_waypoint: (w,) the sample of each waypoint; corners of one loiter share a sample.
+    """
+
+    places: Floats
+    radii: Floats
+    along: Floats
+    of_waypoint: Numbers
+
+
+def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RouteProgress:
+    """Lay a track along a route.
+
+    position: (t, 3) m, usable rows, at least two.
+    anywhere: the track may begin anywhere on the route, as a part of an imported log does; else at its start.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> route_progress(log.setup.route, log.track.position, anywhere=False).target
+    2
+    """
+    step = np.hypot(*np.diff(position[:, :2], axis=0).T)
+    run = np.concatenate([[0.0], np.cumsum(step)])
+    length = float(np.hypot(*np.diff(route.waypoints[:, :2], axis=0).T).sum())
+    spacing = max(_SAMPLE_SPACING_M, math.sqrt(max(1.0, length) * max(1.0, float(run[-1])) / _MAX_CELLS))
+    samples = _samples(route, spacing)
+    rows = np.unique(np.searchsorted(run, np.append(np.arange(0.0, run[-1], spacing), run[-1])))
+    ends = _lay(
+        read_only(np.ascontiguousarray(position[rows, :2])),
+        read_only(samples.places),
+        read_only(samples.radii),
+        CAPTURE_RADIUS,
+        anywhere,
+    )
+    begins, until = rows[ends[:, 0]], rows[ends[:, 1]]
+    final = int(np.flatnonzero(ends[:, 0] >= 0)[-1])
+    count = len(route.waypoints)
+    target = min(count - 1, int(np.searchsorted(samples.of_waypoint, final, side="right")))
+    while target + 1 < count and samples.of_waypoint[target + 1] == samples.of_waypoint[target]:
+        target += 1
+    first, last = np.full(count, len(run)), np.full(count, -1)
+    for i in range(target + 1):
+        here = int(samples.of_waypoint[i])
+        before = samples.of_waypoint[samples.of_waypoint < here]
+        after = samples.of_waypoint[samples.of_waypoint > here]
+        low = int(before[-1]) if before.size else 0
+        high = min(final, int(after[0]) if after.size else len(samples.along) - 1)
+        known = np.flatnonzero(ends[low : high + 1, 0] >= 0) + low
+        if known.size:
+            first[i] = np.searchsorted(run, run[begins[known[0]]] - _WINDOW_MARGIN_M)
+            last[i] = np.searchsorted(run, run[until[known[-1]]] + _WINDOW_MARGIN_M, side="right") - 1
+    return RouteProgress(first, last, target, samples.along[samples.of_waypoint] - samples.along[final])
+
+
+def _samples(route: Route, spacing: float) -> _Samples:
+    """Sample a route's legs; a loiter is one sample, however often it goes around."""
+    points = route.waypoints[:, :2]
+    places, radii, along = [points[0]], [0.0], [0.0]
+    of_waypoint = np.zeros(len(points), dtype=np.int64)
+    for i in range(1, len(points)):
+        a, b = points[i - 1], points[i]
+        if route.arcs[i] > 0.0 and route.arcs[i - 1] > 0.0 and route.stops[i] == route.stops[i - 1]:
+            of_waypoint[i] = of_waypoint[i - 1]
+            continue
+        length = math.dist(a, b)
+        count = max(1, math.ceil(length / spacing))
+        for k in range(1, count + 1):
+            places.append(a + (b - a) * (k / count))
+            radii.append(0.0)
+            along.append(along[-1] + length / count)
+        of_waypoint[i] = len(places) - 1
+        if route.arcs[i] > 0.0:
+            corners = [
+                k for k in range(i, len(points)) if route.stops[k] == route.stops[i] and route.arcs[i : k + 1].all()
+            ]
+            places[-1], radii[-1] = _hub(route, points[corners], float(route.arcs[i]), i)
+    return _Samples(np.array(places), np.array(radii), np.array(along), of_waypoint)
+
+
+def _hub(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
+    """Middle of a loiter's corners, and the distance from it, m, within which the loiter is flown."""
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    wide = float(np.hypot(*(corners - middle).T).max()) + _LOITER_MARGIN_M
+    if 0 <= route.return_from < first < route.return_until:
+        wide = max(wide, NEAR, WIDER * radius)
+    return middle, wide
+
+
+@compiled
+def _lay(
+    track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool
+) -> Numbers:  # pragma: no cover - compiled
+    """Lay a track (n, 2) along places (m, 2), both forward only, with the least sum of min(distance, capture)^2.
+
+    Gives the first and the last row at each place, (m, 2); -1 for places before its start and after its end.  Of equal
+    ends the earliest.  A place without a row of its own costs `_SKIP_SHARE` of that and `_SKIP_DISTANCE_M`^2.
+    """
+    rows, count = track.shape[0], places.shape[0]
+    moves = np.zeros((rows, count), dtype=np.uint8)
+    total = np.zeros(count)
+    for i in range(rows):
+        diagonal = math.inf
+        for j in range(count):
+            off = math.hypot(track[i, 0] - places[j, 0], track[i, 1] - places[j, 1]) - radii[j]
+            cost = min(max(0.0, off), capture) ** 2
+            before = total[j]
+            if i == 0:
+                best, move = cost + j * _LATE_START_M**2 if anywhere or j == 0 else math.inf, 3
+            elif before <= diagonal:
+                best, move = before + cost, 1
+            else:
+                best, move = diagonal + cost, 0
+            if j > 0:
+                skipped = total[j - 1] + _SKIP_SHARE * cost + _SKIP_DISTANCE_M**2
+                if skipped < best:
+                    best, move = skipped, 2
+            diagonal = before
+            total[j] = best
+            moves[i, j] = move
+    ends = np.full((count, 2), -1, dtype=np.int64)
+    i, j = rows - 1, int(np.argmin(total))
+    ends[j, 0], ends[j, 1] = i, i
+    while moves[i, j] != 3:
+        move = moves[i, j]
+        if move != 2:
+            i -= 1
+        if move != 1:
+            j -= 1
+            ends[j, 1] = i
+        ends[j, 0] = i
+    return ends

@@ -1,0 +1,99 @@
+"""A flight that ends early ends where it ended, also where its route comes back to where it began."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track
+from tests.logs.verdict.judging import failing, judge, of, waypoint
+from tests.synthetic import fly_path, make_setup
+
+Points = list[list[float]]
+TRIANGLE: Points = [[0, 0, 300], [0, 3000, 300], [-2600, 1500, 300], [20, 0, 300]]
+# Home lies in the middle of the route and at its end.
+EIGHT: Points = [
+    [0, 0, 300],
+    [0, 2000, 300],
+    [2000, 2000, 300],
+    [0, 0, 300],
+    [-2000, -2000, 300],
+    [0, -2000, 300],
+    [20, 0, 300],
+]
+SQUARE: Points = [[0, 0, 300], [0, 1500, 300], [1500, 1500, 300], [1500, 0, 300]]
+
+
+def cut(points: Points, leg: int, share: float) -> Track:
+    """The flight of a route up to a share of one of its legs."""
+    whole, (a, b) = fly_path(make_setup(points), rate=10.0), (np.array(points[k][:2]) for k in (leg, leg + 1))
+    lengths = [math.dist(points[k][:2], points[k + 1][:2]) for k in range(leg)]
+    # The row nearest to the place, of those that are about as far along the route.
+    run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(whole.position[:, :2], axis=0).T))])
+    wanted = sum(lengths) + share * math.dist(a, b)
+    away = np.hypot(*(whole.position[:, :2] - (a + share * (b - a))).T)
+    row = int(np.argmin(np.where(abs(run - wanted) < 0.05 * wanted + 100.0, away, np.inf)))
+    assert away[row] < 5.0
+    return whole.rows(0, row + 1)
+
+
+def lay(points: Points, track: Track) -> AlignedTrack:
+    aligned = align_track(route_requirements(make_setup(points)), track)
+    assert aligned is not None
+    return aligned
+
+
+@pytest.mark.parametrize(
+    ("points", "leg", "share"),
+    [
+        (TRIANGLE, 1, 0.2),
+        (TRIANGLE, 1, 0.7),
+        (TRIANGLE, 2, 0.5),
+        (TRIANGLE, 2, 0.95),
+        (EIGHT, 1, 0.5),
+        (EIGHT, 3, 0.4),
+        (EIGHT, 5, 0.6),
+        (SQUARE * 5, 5, 0.5),
+        (SQUARE * 5, 11, 0.3),
+        (SQUARE * 5, 17, 0.8),
+    ],
+)
+def test_a_flight_that_ends_early_passed_no_waypoint_after_it(points: Points, leg: int, share: float) -> None:
+    aligned = lay(points, cut(points, leg, share))
+    last = len(aligned.track) - 1
+    assert aligned.passed.tolist() == [k <= leg for k in range(len(points))]
+    assert aligned.leg_at(last) == leg
+    assert (aligned.rows[leg + 1 :] == last).all()
+    assert (np.diff(aligned.rows[: leg + 2]) > 0).all()
+
+
+def test_a_recorded_leg_changes_nothing() -> None:
+    track = cut(TRIANGLE, 1, 0.7)
+    lying = replace(track, leg=np.full(len(track), 2, dtype=np.int32))
+    assert lay(TRIANGLE, lying).passed.tolist() == lay(TRIANGLE, track).passed.tolist() == [True, True, False, False]
+
+
+def test_what_was_not_reached_is_named_once() -> None:
+    setup = make_setup(TRIANGLE)
+    verdict = judge(setup, cut(TRIANGLE, 1, 0.5))
+    assert ("waypoint", waypoint(2)) in failing(verdict)
+    assert of(verdict, "waypoint", waypoint(1)).ok is True
+    ahead, after = (of(verdict, "waypoint", waypoint(k)) for k in (2, 3))
+    # Half of the leg of 3,002 m was left.
+    assert ahead.reason == "not reached: the flight ended on leg 1, to item 2, 1501 m away"
+    assert (after.ok, after.flown, after.reason) == (None, None, "not reached: the flight ended on leg 1, to item 2")
+
+
+def test_a_flight_that_ends_within_reach_of_a_waypoint_is_on_the_next_leg() -> None:
+    """With an acceptance radius of 200 m, and 150 m before the waypoint."""
+    setup = make_setup(TRIANGLE)
+    setup = replace(setup, route=replace(setup.route, acceptance=np.full(4, 200.0)))
+    flown = fly_path(make_setup([[0, 0, 300], [0, 4000, 300]]), rate=10.0)
+    aligned = align_track(route_requirements(setup), flown.rows(0, int(np.argmax(flown.position[:, 1] > 2850.0))))
+    assert aligned is not None
+    assert aligned.passed.tolist() == [True, True, False, False]
+    assert aligned.leg_at(len(aligned.track) - 1) == 1
+    assert aligned.track.position[aligned.rows[1], 1] == pytest.approx(2800.0, abs=3.0)
