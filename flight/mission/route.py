@@ -94,7 +94,7 @@ class Route:
         if not len(self.arcs):
             object.__setattr__(self, "arcs", np.zeros(len(self.waypoints)))
         if len(self.stops) != len(self.waypoints):
-            changes = np.flatnonzero(np.diff(self.items))
+            changes = np.flatnonzero((np.diff(self.items) != 0) | (self.items[1:] < 0))
             object.__setattr__(self, "stops", np.searchsorted(changes, np.arange(len(self.items))))
         for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops"):
             array = np.array(getattr(self, name))
@@ -105,6 +105,11 @@ class Route:
     def legs(self) -> int:
         """How many legs there are."""
         return len(self.waypoints) - 1
+
+    @property
+    def leg_numbers(self) -> NDArray[np.int64]:
+        """Number of each leg as people count them, (w - 1,): all legs around a loiter have that of the leg to it."""
+        return np.maximum(self.stops[1:] - 1, 0)
 
     @property
     def return_until(self) -> int:

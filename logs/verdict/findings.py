@@ -322,6 +322,16 @@ def _plain(value: float | None) -> float | None:
     return round(float(value), 6) + 0.0  # no -0.0
 
 
+def badness(item: Finding) -> tuple[int, float]:
+    """Order of findings from the worst: failed, open, passed, and by margin.
+
+    >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
+    >>> badness(near) < badness(far)
+    True
+    """
+    return (0 if item.ok is False else 1 if item.ok is None else 2), 0.0 if item.margin is None else item.margin
+
+
 def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
     """Faults with the facts in brackets after them, or the facts alone.
 

@@ -6,7 +6,16 @@ from dataclasses import replace
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, setup_conditions
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Verdict, left_open, make_finding, message, reason_of
+from logs.verdict.findings import (
+    UNKNOWN_AIRCRAFT,
+    Finding,
+    Verdict,
+    badness,
+    left_open,
+    make_finding,
+    message,
+    reason_of,
+)
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
@@ -93,7 +102,27 @@ def _judged(
     for rule in RULES.values():
         if rule.merge is not None:
             findings = rule.merge(requirements, aligned, findings)
-    return findings
+    return one_per_stop(findings) if whole else findings
+
+
+def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Findings with those of a rule at the corners of one stop, or at its legs, replaced by the worst of them.
+
+    >>> from logs.verdict.places import Place
+    >>> legs = [Place("leg", k, to_item=4, number=2) for k in (2, 3, 4)]
+    >>> margins = zip(legs, (9.0, 4.0, 7.0))
+    >>> heights = [make_finding("clearance", leg, ok=True, reason="", margin=margin) for leg, margin in margins]
+    >>> [item.place.index for item in one_per_stop(heights)]
+    [3]
+    """
+    worst: dict[tuple[object, ...], Finding] = {}
+    for k, item in enumerate(findings):
+        place = item.place
+        known = place.kind in ("leg", "waypoint") and place.number is not None
+        key = (item.rule, item.check, place.kind, place.number, place.item, place.to_item) if known else (k,)
+        if key not in worst or badness(item) < badness(worst[key]):
+            worst[key] = item
+    return tuple(worst.values())
 
 
 def with_suggestions(

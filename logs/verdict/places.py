@@ -36,9 +36,11 @@ class Place:
     name: that the scenario gives the threat or the zone; "" where it gives none, and for every other kind.
     to_item: of a leg, the mission item that it leads to, None where it leads to none; a mission that jumps has several
     legs to one item.  It is no part of what makes two places the same: the index is enough, and older logs have none.
+    number: of a leg or a waypoint, as people count them: corners of one loiter are one stop.  None where it is the
+    index, as in older logs.  No part of what makes two places the same, either.
 
     >>> Place("waypoint", 3, item=4)
-    Place(kind='waypoint', index=3, item=4, name='', to_item=None)
+    Place(kind='waypoint', index=3, item=4, name='', to_item=None, number=None)
     >>> Place("leg", 3, to_item=5) == Place("leg", 3)
     True
     """
@@ -48,6 +50,7 @@ class Place:
     item: int | None = None
     name: str = ""
     to_item: int | None = field(default=None, compare=False)
+    number: int | None = field(default=None, compare=False)
 
 
 FLIGHT, MISSION, PLAN = Place("flight"), Place("mission"), Place("plan")

@@ -30,9 +30,10 @@ class _Place(_Table):
     item: int | None
     name: str
     to_item: int | None = None
+    number: int | None = None
 
     def place(self) -> Place:
-        return Place(self.kind, self.index, self.item, self.name, self.to_item)
+        return Place(self.kind, self.index, self.item, self.name, self.to_item, self.number)
 
 
 class _Airframe(_Table):

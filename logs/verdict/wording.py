@@ -19,7 +19,10 @@ def place_text(place: Place) -> str:
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
     >>> place_text(Place("exclusion", 0, name="town")), place_text(Place("leg", 7, to_item=9))
     ('town (exclusion)', 'leg 7, to item 9')
+    >>> place_text(Place("waypoint", 11, item=4, number=3))
+    'waypoint 3 (item 4)'
     """
+    number = place.index if place.number is None else place.number
     match place:
         case Place("mission", item=int(item)):
             return f"item {item}"
@@ -27,12 +30,12 @@ def place_text(place: Place) -> str:
             return f"{threat_text(place)} ({place.kind})"
         case Place("exclusion" | "inclusion"):
             return f"{place.name} ({place.kind})"
-        case Place("leg", index=int(index), to_item=int(item)):
-            return f"leg {index}, to item {item}"
-        case Place(kind, index=int(index), item=int(item)):
-            return f"{kind} {index} (item {item})"
-        case Place(kind, index=int(index)):
-            return f"{kind} {index}"
+        case Place("leg", index=int(), to_item=int(item)):
+            return f"leg {number}, to item {item}"
+        case Place(kind, index=int(), item=int(item)):
+            return f"{kind} {number} (item {item})"
+        case Place(kind, index=int()):
+            return f"{kind} {number}"
     return place.kind
 
 

@@ -45,6 +45,7 @@ def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
         ],
         winds=[NamedWind(a)] if a == b else winds,
         verdict=None,
+        stops=first.setup.route.stops.tolist(),
     )
 
 

@@ -1,6 +1,6 @@
 """Where a verdict's failures lie on a route, how a chart names them, and how far along it a flight has come."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -75,6 +75,17 @@ def _rules_at(failed: list[Finding], kind: PlaceKind, count: int) -> dict[int, t
             if word not in rules:
                 rules.append(word)
     return {number: tuple(rules) for number, rules in sorted(found.items())}
+
+
+def stop_rows(stops: Sequence[int]) -> list[int]:
+    """Waypoints at which a stop begins: of a loiter's corners the first.
+
+    stops: number of the stop of each waypoint, in flying order.
+
+    >>> stop_rows([0, 1, 1, 1, 2])
+    [0, 1, 4]
+    """
+    return [k for k in range(len(stops)) if k == 0 or stops[k] != stops[k - 1]]
 
 
 def route_distance(waypoints: Floats) -> Floats:

@@ -87,6 +87,7 @@ def _paths(subject: Subject) -> dict[str, Any]:
         "route_waypoints": subject.setup.shown_waypoints,
         "track": subject.track,
         "verdict": subject.verdict,
+        "stops": subject.setup.route.stops.tolist(),
     }
 
 

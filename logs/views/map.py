@@ -9,7 +9,7 @@ import numpy as np
 from flight.simulation.track import Track
 from logs.verdict.findings import Verdict
 from logs.views.charts import Floats, Json, Label, Layer, Panel, numbers, panel_json, shorten
-from logs.views.failures import Failures, fail_labels, failures, inside_threats, paths_differ
+from logs.views.failures import Failures, fail_labels, failures, inside_threats, paths_differ, stop_rows
 from logs.views.threats_and_zones import threat_circles, threat_names, zone_names, zone_shapes
 from world.airspace.zones_on_map import zone_rings
 from world.scenario import Scenario
@@ -76,6 +76,7 @@ def flight_map(
     track: Track | None,
     verdict: Verdict | None,
     waypoint_words: Sequence[str] = (),
+    stops: Sequence[int] | None = None,
 ) -> MapChart:
     """The map of a plan, or of its flight.
 
@@ -83,6 +84,7 @@ def flight_map(
     numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn beside it.
     Missiles are drawn as the sphere's circle (line) and as its cut at the height of the path nearest to it (fill).
     waypoint_words: what the page says of each waypoint.
+    stops: number of each waypoint of the route as people count them; None where each waypoint is a stop.
     """
     return map_chart(
         scenario,
@@ -93,6 +95,7 @@ def flight_map(
         winds=(NamedWind(scenario.wind),),
         verdict=verdict,
         waypoint_words=waypoint_words,
+        stops=stops,
     )
 
 
@@ -106,10 +109,12 @@ def map_chart(
     winds: Sequence[NamedWind],
     verdict: Verdict | None,
     waypoint_words: Sequence[str] = (),
+    stops: Sequence[int] | None = None,
 ) -> MapChart:
     """As `flight_map`, with any number of tracks and winds.  subject: of the title, after the scenario's name."""
     route = route_waypoints if route_waypoints is not None else plan_waypoints
     failed = failures(verdict, len(route) if route is not None else 0)
+    stops = range(0 if route is None else len(route)) if stops is None else stops
     tracks = [drawn for drawn in tracks if len(drawn.track)]
     entered = failed.threat_names()
     layers: list[Layer] = []
@@ -120,10 +125,11 @@ def map_chart(
     for drawn in tracks if failed.threats else ():
         layers += _inside(scenario, drawn.track, failed)
     if route is not None:
-        layers += _waypoints(route, failed, waypoint_words)
+        layers += _waypoints(route, stops, failed, waypoint_words)
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += fail_labels(failed, route[:, :2], centres)
-    labels += [*end_labels(scenario, route), *([] if route is None else _numbers(scenario, route, failed))]
+    labels += end_labels(scenario, route, None if route is None else stops)
+    labels += [] if route is None else _numbers(scenario, route, stops, failed)
     extent = map_extent(scenario, route, [drawn.track.position for drawn in tracks])
     return world_map(scenario, subject, layers, labels, extent, route=route, entered=frozenset(entered), winds=winds)
 
@@ -231,9 +237,11 @@ def _inside(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
     return [Layer("line", "flown inside a threat's reach", "inside", east, north, quiet=True)]
 
 
-def _waypoints(route: Floats, failed: Failures, words: Sequence[str]) -> list[Layer]:
-    dots = "waypoint" if len(route) <= _MAX_DOTS else "waypoint-small"
-    layers = [Layer("dots", "waypoint, numbered", dots, route[:, 0], route[:, 1], words=tuple(words))]
+def _waypoints(route: Floats, stops: Sequence[int], failed: Failures, words: Sequence[str]) -> list[Layer]:
+    first = stop_rows(stops)
+    dots = "waypoint" if len(first) <= _MAX_DOTS else "waypoint-small"
+    said = tuple(words[k] for k in first) if words else ()
+    layers = [Layer("dots", "waypoint, numbered", dots, route[first, 0], route[first, 1], words=said)]
     if failed.waypoints:
         east, north = route[list(failed.waypoints), :2].T
         layers.append(Layer("rings", "waypoint that fails a rule", "fail", east, north, quiet=True))
@@ -247,7 +255,7 @@ def _ends(scenario: Scenario) -> list[Layer]:
     ]
 
 
-def end_labels(scenario: Scenario, route: Floats | None) -> list[Label]:
+def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | None = None) -> list[Label]:
     """Start and destination, in one label where they are at one place.
 
     The route's first and last number stand in their labels where they coincide.
@@ -255,7 +263,9 @@ def end_labels(scenario: Scenario, route: Floats | None) -> list[Label]:
     labels = []
     for point, row, name in ((scenario.start, 0, "start"), (scenario.destination, -1, "destination")):
         at_end = route is not None and _same(route[row], point)
-        text = f"{row % len(route)} {name}" if at_end and route is not None else name
+        text = name
+        if at_end and route is not None:
+            text = f"{row % len(route) if stops is None else stops[row]} {name}"
         labels.append(Label(text, float(point[0]), float(point[1]), "end"))
     start, destination = labels
     if not _same(scenario.start, scenario.destination):
@@ -268,14 +278,15 @@ def _same(a: Floats, b: Floats) -> bool:
     return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
 
 
-def _numbers(scenario: Scenario, route: Floats, failed: Failures) -> list[Label]:
-    step = max(1, -(-len(route) // _MAX_NUMBERS))
+def _numbers(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+    first = stop_rows(stops)
+    step = max(1, -(-len(first) // _MAX_NUMBERS))
     last = len(route) - 1
     hidden = {k for k, end in ((0, scenario.start), (last, scenario.destination)) if _same(route[k], end)}
+    shown = {k for n, k in enumerate(first) if n % step == 0} | set(failed.waypoints)
     return [
-        Label(str(k), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")
-        for k in range(len(route))
-        if k not in hidden and (k % step == 0 or k in failed.waypoints)
+        Label(str(stops[k]), float(route[k, 0]), float(route[k, 1]), "number", "waypoint")
+        for k in sorted(shown - hidden)
     ]
 
 

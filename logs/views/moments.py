@@ -61,14 +61,17 @@ def leg_names(setup: FlightSetup) -> list[str]:
     'leg 0, to item 2'
     """
     items = setup.route.items.tolist()
-    return [place_text(Place("leg", k, to_item=_known(items[k + 1]))) for k in range(setup.route.legs)]
+    numbers = setup.route.leg_numbers.tolist()
+    return [
+        place_text(Place("leg", k, to_item=_known(items[k + 1]), number=numbers[k])) for k in range(setup.route.legs)
+    ]
 
 
 def waypoint_names(setup: FlightSetup) -> list[str]:
     """What each waypoint is called, with its mission item and height."""
-    heights = setup.shown_waypoints[:, 2].tolist()
+    heights, numbers = setup.shown_waypoints[:, 2].tolist(), setup.route.stops.tolist()
     return [
-        f"{place_text(Place('waypoint', k, item=_known(item)))}\n{heights[k]:.0f} m AMSL"
+        f"{place_text(Place('waypoint', k, item=_known(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"
         for k, item in enumerate(setup.route.items.tolist())
     ]
 

@@ -1,5 +1,7 @@
 """The profile: terrain, plan, flight and threats in the vertical plane along the path."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from flight.simulation.track import Track
@@ -12,6 +14,7 @@ from logs.views.failures import (
     inside_threats,
     route_distance,
     route_samples,
+    stop_rows,
     track_distance,
 )
 from logs.views.threats_and_zones import PathPlane, entered_cuts, threat_cuts, zone_bands
@@ -29,12 +32,14 @@ def profile_chart(
     route_waypoints: Floats | None,
     track: Track | None,
     verdict: Verdict | None,
+    stops: Sequence[int] | None = None,
 ) -> Chart:
     """Heights (m AMSL) over the distance along the route (km).
 
     The route is route_waypoints (w, 3), or plan_waypoints where there is none; without either, the straight line
     from start to destination.  The ground and the spheres' cuts are those under and about the route: a sphere or a zone
     is cut where the path runs through it.  Flown heights stand at the flight's progress along it, which never falls.
+    stops: number of each waypoint of the route as people count them; None where each waypoint is a stop.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -56,6 +61,8 @@ def profile_chart(
     low, high = _span(scenario, route, track, ground)
     plane = PathPlane(distance / 1000.0, points, ground, low, high)
     failed = failures(verdict, len(route))
+    stops = range(len(route)) if stops is None else stops
+    first = stop_rows(stops)
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
     flown, entered = _flown(scenario, route, track, failed, plane)
@@ -64,19 +71,19 @@ def profile_chart(
     layers += flown
     labels: list[Label] = []
     if not straight:
-        dots = "waypoint" if len(route) <= _MAX_DOTS else "waypoint-small"
-        layers.append(Layer("dots", "waypoint, numbered", dots, at / 1000.0, route[:, 2], quiet=True))
-        labels = _numbers(at, route, failed)
+        dots = "waypoint" if len(first) <= _MAX_DOTS else "waypoint-small"
+        layers.append(Layer("dots", "waypoint, numbered", dots, at[first] / 1000.0, route[first, 2], quiet=True))
+        labels = _numbers(at, route, stops, failed)
     layers += _failing_waypoints(at, route, failed)
     corners = np.column_stack([at / 1000.0, route[:, 2]])
     labels = [*fail_labels(failed, corners, entered), *labels, *cut_names, *zone_names]
     limits, note = _bounds(scenario, low, high)
     panel = Panel("height", "m AMSL", tuple(layers), limits, span=(low, high), note=note, labels=tuple(labels))
-    return _chart(scenario, at, panel, straight=straight)
+    return _chart(scenario, at, first, panel, straight=straight)
 
 
-def _chart(scenario: Scenario, at: Floats, panel: Panel, *, straight: bool) -> Chart:
-    """The panel as a chart; at: distance of each waypoint along the route, m."""
+def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, straight: bool) -> Chart:
+    """The panel as a chart; at: distance of each waypoint along the route, m; first: waypoints that begin a stop."""
     path = "the straight line from start to destination" if straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
     return Chart(
@@ -85,12 +92,18 @@ def _chart(scenario: Scenario, at: Floats, panel: Panel, *, straight: bool) -> C
         "km",
         (panel,),
         reach=(0.0, max(float(at[-1]), 1.0) / 1000.0),
-        marks=tuple((float(start) / 1000.0, f"leg {k}") for k, start in enumerate(at[:-1])),
+        # The leg to a loiter goes on around it.
+        marks=tuple((float(at[end]) / 1000.0, f"leg {n}") for n, end in enumerate(_leg_begins(first, len(at)))),
         tall=420,
         inches=4.05,
         legend="below",
         scaled=True,
     )
+
+
+def _leg_begins(first: list[int], count: int) -> list[int]:
+    """Waypoints at which a leg as people count them begins: where the stop before it ends."""
+    return [0, *(k - 1 for k in first[2:])] if count > 1 else []
 
 
 def ground_under(scenario: Scenario, points: Floats) -> Floats | None:
@@ -176,12 +189,12 @@ def _failing_waypoints(at: Floats, route: Floats, failed: Failures) -> list[Laye
     return [Layer("rings", "waypoint that fails a rule", "fail", at[rows] / 1000.0, route[rows, 2], quiet=True)]
 
 
-def _numbers(at: Floats, route: Floats, failed: Failures) -> list[Label]:
-    step = max(1, -(-len(route) // _MAX_NUMBERS))
+def _numbers(at: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+    first = stop_rows(stops)
+    step = max(1, -(-len(first) // _MAX_NUMBERS))
+    shown = {k for n, k in enumerate(first) if n % step == 0 or n == len(first) - 1} | set(failed.waypoints)
     return [
-        Label(str(k), float(at[k]) / 1000.0, float(route[k, 2]), "number", "waypoint")
-        for k in range(len(route))
-        if k % step == 0 or k in failed.waypoints or k == len(route) - 1
+        Label(str(stops[k]), float(at[k]) / 1000.0, float(route[k, 2]), "number", "waypoint") for k in sorted(shown)
     ]
 
 

@@ -141,6 +141,7 @@ class FailedPlace:
     item: int | None
     name: str
     to_item: int | None = None
+    number: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

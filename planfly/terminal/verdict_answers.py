@@ -27,6 +27,8 @@ class PlaceDocument:
     """That the scenario gives a threat or a zone."""
     to_item: int | None
     """Of a leg: the mission item that it leads to."""
+    number: int | None
+    """Of a leg or waypoint, as the text counts them: corners of one loiter are one stop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

@@ -351,11 +351,12 @@ class RouteRequirements:
 
     def waypoint(self, index: int) -> Place:
         """A waypoint as the place of a finding."""
-        return Place("waypoint", index, self._item(index))
+        return Place("waypoint", index, self._item(index), number=int(self.setup.route.stops[index]))
 
     def leg(self, index: int) -> Place:
         """A leg as the place of a finding, with the item that it leads to."""
-        return Place("leg", index, to_item=self._item(index + 1))
+        number = int(self.setup.route.leg_numbers[index])
+        return Place("leg", index, to_item=self._item(index + 1), number=number)
 
     def _item(self, waypoint: int) -> int | None:
         item = int(self.setup.route.items[waypoint])

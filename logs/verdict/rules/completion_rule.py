@@ -28,16 +28,18 @@ def completion_findings(
         faults.append(message(f"the flight ended early: {ended}", _ending_place(requirements, aligned)))
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
-    legs = 0
+    legs, numbers = 0, requirements.setup.route.leg_numbers
+    every = len(set(numbers.tolist()))
     if aligned is None:
         faults.append(message("the track has fewer than two usable rows"))
     else:
-        legs = int(aligned.passed[1:].sum())
-        if legs < requirements.legs:
-            faults.append(message(f"{legs} of {requirements.legs} legs flown"))
+        # A leg whose loiter was not flown to its end was not flown.
+        legs = every - len(set(numbers[~aligned.passed[1:]].tolist()))
+        if legs < every:
+            faults.append(message(f"{legs} of {every} legs flown"))
         faults += _record_faults(aligned)
     notes = "; ".join(requirements.setup.route.notes)
-    reason = reason_of(faults) if faults else f"all {requirements.legs} legs flown"
+    reason = reason_of(faults) if faults else f"all {every} legs flown"
     return [
         make_finding(
             "completion",
@@ -45,12 +47,12 @@ def completion_findings(
             ok=not faults,
             reason=reason + (f" (not flown as written: {notes})" if notes else ""),
             faults=faults,
-            planned=requirements.legs,
+            planned=every,
             flown=legs,
-            limit=requirements.legs,
+            limit=every,
             source="route",
             tolerance=0.0,
-            margin=legs - requirements.legs,
+            margin=legs - every,
             unit="legs",
             method="waypoints passed in order",
         )
@@ -187,7 +189,7 @@ def _ahead(setup: FlightSetup, legs: FlownLegs) -> int:
 def _named(setup: FlightSetup, legs: FlownLegs) -> str:
     ahead = _ahead(setup, legs)
     item = int(setup.route.items[ahead])
-    return f"waypoint {ahead}" + (f" (item {item})" if item >= 0 else "")
+    return f"waypoint {setup.route.stops[ahead]}" + (f" (item {item})" if item >= 0 else "")
 
 
 RULE = Rule(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.itinerary import loiter_of
-from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, make_finding, message, reason_of
 from logs.verdict.measures.circle_reach import beside_end, within_reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
@@ -103,7 +103,7 @@ def fold_loiters(
                     kept[k] = item if item.ok is not None else None
                 mine = [one for one in mine if one[1].ok is not None]
             if len(mine) > 1:
-                at_worst, worst = min(mine, key=lambda one: _badness(one[1]))
+                at_worst, worst = min(mine, key=lambda one: badness(one[1]))
                 for k, _ in mine:
                     kept[k] = None
                 reason = f"{worst.reason}; the worst of the circle's {len(mine)} legs"
@@ -135,10 +135,6 @@ def end_findings(
             check=UNKNOWN_WAY if found else "",
         )
     ]
-
-
-def _badness(item: Finding) -> tuple[int, float]:
-    return (0 if item.ok is False else 1 if item.ok is None else 2), 0.0 if item.margin is None else item.margin
 
 
 def _loiter(
@@ -261,7 +257,7 @@ def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float)
 
 def _not_held(circle: Circle, bad: list[Finding]) -> Message:
     """How many corners were not held, and the worst of them."""
-    worst = min(bad, key=_badness)
+    worst = min(bad, key=badness)
     corners = len({item.place for item in bad})
     count = f"{corners} of {circle.last - circle.first + 1} corners not held, as "
     return Message(f"{count}{place_text(worst.place)}: {worst.reason}", f"{count}{_bare(worst.place)}")

@@ -71,6 +71,7 @@ class MovieFrames:
                 route_waypoints=setup.route.waypoints,
                 track=None,
                 verdict=None,
+                stops=setup.route.stops.tolist(),
             )
         )
         axes = figure.axes[0]

@@ -123,7 +123,8 @@ def _by_circle(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
 def waypoint_name(route: Route, index: int) -> str:
     """Name a waypoint by its number and, where it has one, its mission item."""
     item = int(route.items[index])
-    return f"waypoint {index}" if item < 0 else f"waypoint {index} (item {item})"
+    number = int(route.stops[index])
+    return f"waypoint {number}" if item < 0 else f"waypoint {number} (item {item})"
 
 
 def _start(log: FlightLog) -> TimelineEntry:
@@ -155,13 +156,13 @@ def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
                 if 0 <= route.return_from <= leg < route.return_until
                 else f"loiter of item {item}"
             )
-            text = f"{what}: legs {leg} to {group[-1].leg} around its circle, radius {radius:.0f} m"
+            text = f"{what}: leg {route.leg_numbers[leg]} goes on around its circle, radius {radius:.0f} m"
             entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
             continue
         course = round(math.degrees(courses[leg])) % 360
         text = (
-            f"leg {leg} to {waypoint_name(route, leg + 1)}: course {course:03d}°, {runs[leg]:.0f} m, "
-            f"slope {math.degrees(slopes[leg]):+.1f}°, {route.airspeed[leg]:.1f} m/s"
+            f"leg {route.leg_numbers[leg]} to {waypoint_name(route, leg + 1)}: course {course:03d}°, "
+            f"{runs[leg]:.0f} m, slope {math.degrees(slopes[leg]):+.1f}°, {route.airspeed[leg]:.1f} m/s"
         )
         entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
     return entries
@@ -196,9 +197,8 @@ def _clearances(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     required = log.setup.scenario.limits.min_clearance_m
     entries = []
     for group in _by_circle(parts, log.setup.route):
-        part, name = replace(group[0], last=group[-1].last), f"leg {group[0].leg}"
-        if len(group) > 1:
-            name = f"legs {group[0].leg} to {group[-1].leg}"
+        part = replace(group[0], last=group[-1].last)
+        name = f"leg {log.setup.route.leg_numbers[part.leg]}" + (", around its circle" if len(group) > 1 else "")
         # Segment k goes from row k to row k + 1; the one that leads into the next leg belongs to this one.
         here = low[part.first : part.last + 1]
         if not np.isfinite(here).any():

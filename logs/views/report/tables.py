@@ -59,14 +59,14 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
     runs, courses, slopes = leg_runs(waypoints), np.degrees(leg_courses(waypoints)), np.degrees(leg_slopes(waypoints))
     turns = np.degrees(signed_turns(waypoints))
     above = ground_clearance(setup, track) if track is not None else None
-    rows = []
+    rows, numbers = [], setup.route.leg_numbers
     for leg in range(setup.route.legs):
         turn = NOTHING
         if leg < len(turns):
             side = "right" if turns[leg] > 0.0 else "left"
             turn = f"{number(abs(float(turns[leg])), digits=1)} {side}" if abs(turns[leg]) >= 0.05 else "0"
         shape = (
-            f"{leg}",
+            f"{numbers[leg]}",
             number(float(runs[leg]), digits=0),
             f"{round(float(courses[leg]), 1) % 360.0:05.1f}",
             number(float(slopes[leg]), signed=True, digits=2),

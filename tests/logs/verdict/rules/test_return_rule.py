@@ -114,7 +114,7 @@ def test_a_replay_tells_the_way_back_as_a_return(tmp_path: Path) -> None:
     assert (log.setup.route.return_from, log.setup.route.return_to) == (1, setup.route.return_to)
     texts = [entry.text for entry in timeline(log) if entry.kind == "leg"]
     assert not [text for text in texts if text.startswith("loiter")]
-    assert len([text for text in texts if text.startswith("return of item 3: legs ")]) == 2
+    assert len([text for text in texts if text.startswith("return of item 3: leg 1 goes on around its circle")]) == 2
 
 
 @pytest.mark.parametrize("parameters", [{}, {"RTL_ALTITUDE": 20.0}])
