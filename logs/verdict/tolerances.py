@@ -17,6 +17,11 @@ ROUNDING = 0.02
 # m.  How far below the required height above ground a leg, a circle or a return may come: what `ROUNDING` of a waypoint
 # comes to on steep ground.
 CLEARANCE_TOLERANCE = 0.1
+# m.  A waypoint further below home than this needs terrain: ground stations round home's altitude to whole metres.
+BELOW_HOME_M = 1.0
+# m.  The altitude of a mission's home may differ from the terrain there by this: an ellipsoid's height instead of one
+# above mean sea level, and what elevation files are off, come to less nearly everywhere that is flown at.
+HOME_ERROR_M = 50.0
 # m.  How far above the largest height above ground, or above the ceiling, a leg may rise: the same on steep ground.
 HEIGHT_TOLERANCE = 0.1
 # m.  A loiter's radius: 1e-7 degrees at the circle's middle.
@@ -148,6 +153,12 @@ PASS = 10.0
 EQUALLY_CLOSE = 0.5
 # m/s.  Mean airspeed of a leg off its command.
 OFF_MEAN = 1.0
+# Share of the commanded airspeed.  An airspeed that has settled further from its command than this, and no less than
+# `OFF_MEAN`, is not held.  Five aircraft by three laws flew legs within 10 % of it in still air, those
+# included on which they took up 10 m/s more; 10 % less airspeed is a fifth less lift.
+HELD_SPEED_SHARE = 0.1
+# m/s.  Where the commanded airspeed leaves less ground speed than this, PX4 flies faster on purpose (FW_GND_SPD_MIN).
+LEAST_GROUND_SPEED = 5.0
 # Share of the time that a leg takes at `SLOWEST`.  Steady flight for so long is enough for its mean airspeed, where the
 # leg is too short for `SATURATED`.
 MEASURED_SHARE = 0.5

@@ -6,15 +6,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import OVER_TERRAIN, Command
-from logs.verdict.findings import Finding, make_finding
+from flight.mission.items import OVER_HOME, OVER_TERRAIN, Command
+from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
 from logs.verdict.suggestions import fly_higher
-from logs.verdict.tolerances import CLEARANCE_TOLERANCE, GROUND_LEG_ROOM, NEAR_FIELD
+from logs.verdict.tolerances import BELOW_HOME_M, CLEARANCE_TOLERANCE, GROUND_LEG_ROOM, HOME_ERROR_M, NEAR_FIELD
+from world.frames import to_map
+from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
@@ -27,15 +29,14 @@ def clearance_findings(
     limit = requirements.limits.min_clearance
     if ground is None:
         reason = "no terrain was given, so heights above ground are not known"
-        return [
-            make_finding(
-                "clearance", FLIGHT, ok=None, reason=reason, limit=limit, source=requirements.limits_source, unit="m"
-            )
-        ]
+        unknown = make_finding(
+            "clearance", FLIGHT, ok=None, reason=reason, limit=limit, source=requirements.limits_source, unit="m"
+        )
+        return [unknown, *_below_home(requirements)]
     near = _near_ground(requirements)
     legs, points = requirements.path.legs, requirements.path.points
     low, _ = path_clearance(ground.heights, ground.to_pixel.record, points)
-    out = []
+    out = _home_off_ground(requirements, ground)
     for leg in range(requirements.legs):
         asked = _Asked(limit, near.get(leg, ()))
         of_leg = np.flatnonzero(legs == leg)
@@ -46,6 +47,38 @@ def clearance_findings(
             short = planned < least - CLEARANCE_TOLERANCE
             out.append(_flown_clearance(requirements, aligned, leg, planned, asked, planned_short=short))
     return out
+
+
+def _below_home(requirements: RouteRequirements) -> list[Finding]:
+    """Leave the lowest leg open if it is below home: the ground is at home's height there, as far as anybody knows."""
+    home = requirements.setup.mission.home
+    if home is None:
+        return []
+    below = home.alt - requirements.points[:, 2]
+    k = int(np.argmax(below))
+    if not float(below[k]) > BELOW_HOME_M:
+        return []
+    brief = f"waypoint {k} is {float(below[k]):.0f} m below home ({home.alt:.0f} m AMSL)"
+    fault = message(brief, ", and no terrain says that the ground there is as low: --terrain names an elevation file")
+    place = requirements.waypoint(k)
+    return [make_finding("clearance", place, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
+
+
+def _home_off_ground(requirements: RouteRequirements, ground: Terrain) -> list[Finding]:
+    """Leave a route over home open if the home of the file is not on the ground, where an autopilot takes it."""
+    setup = requirements.setup
+    home = setup.mission.home
+    if home is None or setup.plan is not None or not any(item.frame in OVER_HOME for item in setup.mission.items):
+        return []
+    east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
+    above = home.alt - float(ground.height(float(east), float(north)))
+    # Written so that NaN, where the terrain does not reach, says nothing.
+    if not abs(above) > HOME_ERROR_M:
+        return []
+    word = "above" if above > 0.0 else "below"
+    brief = f"the mission's home is {abs(above):.0f} m {word} the ground there"
+    fault = message(brief, ": an autopilot that is armed on that ground flies all heights over home as much off")
+    return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 
 class _Asked(NamedTuple):
@@ -223,7 +256,7 @@ RULE = Rule(
     title="clearance",
     asks="Does each leg stay the required height above the ground?",
     margin=Margin("height above ground", "m", 10.0),
-    tolerances=("CLEARANCE_TOLERANCE", "GROUND_LEG_ROOM", "NEAR_FIELD"),
+    tolerances=("BELOW_HOME_M", "CLEARANCE_TOLERANCE", "GROUND_LEG_ROOM", "HOME_ERROR_M", "NEAR_FIELD"),
     judge=clearance_findings,
     suggest=fly_higher,
     log=LogNeeds(("heights",)),

@@ -1,6 +1,7 @@
 """The speed rule: each leg's commanded airspeed in the envelope, room to take it up, and what was flown."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from logs.verdict.tolerances import (
     GUST_SHARE,
     GUST_SIGMAS,
     GUST_TIME,
+    HELD_SPEED_SHARE,
+    LEAST_GROUND_SPEED,
     LEVEL,
     MEASURED_SHARE,
     OFF_MEAN,
@@ -46,7 +49,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
     said += _no_room(requirements, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
     limit = slowest if commanded - slowest <= fastest - commanded else fastest
-    mean, tolerance, facts = math.nan, 0.0, []
+    mean, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
     unflown = not geometric and (aligned is None or not aligned.flew(leg))
     if unflown:
         said.append("the leg was not flown")
@@ -63,6 +66,12 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
                 text = f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s"
                 said += [text] if requirements.envelope else []
                 faults += [] if requirements.envelope else [message(text)]
+            if not faults and (unheld := _unheld(requirements, aligned, leg, commanded)):
+                # The speed that was flown is judged by its command, and no longer the command by the envelope.
+                mean, allowed, source = unheld.speed, unheld.allowed, "mission"
+                limit = commanded + math.copysign(allowed, mean - commanded)
+                margin, tolerance = allowed - abs(mean - commanded), unheld.tolerance
+                faults.append(message(f"{mean:.1f} m/s held of the commanded {commanded:.1f} m/s"))
         facts.append(Fact("speed error", mean - commanded, "m/s"))
     ok: bool | None = not faults
     check = ""
@@ -78,7 +87,7 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
         planned=commanded,
         flown=mean,
         limit=limit,
-        source="aircraft",
+        source=source,
         tolerance=tolerance,
         margin=margin,
         unit="m/s",
@@ -86,6 +95,38 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
         check=check,
         facts=facts,
     )
+
+
+class _HeldSpeed(NamedTuple):
+    """An airspeed that was held instead of the commanded one, m/s.
+
+    allowed: how far from the command it may be.  tolerance: what gusts may add to that.
+    """
+
+    speed: float
+    allowed: float
+    tolerance: float
+
+
+def _unheld(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float) -> _HeldSpeed | None:
+    """Return the airspeed over the second half of a leg's steady rows if it is far from its command; None if not.
+
+    In the first half an autopilot may still take up its speed.  Of an imported flight it is a fact only: its airspeed
+    sensor may be as far off.
+    """
+    rows = steady_rows(requirements, aligned, leg)
+    time = aligned.track.time[rows]
+    if requirements.setup.source is not None or time.size < 2 or 0.5 * float(time[-1] - time[0]) < SATURATED:
+        return None
+    half = rows.start + int(np.searchsorted(time, 0.5 * float(time[0] + time[-1])))
+    speed = float(aligned.track.airspeed[half : rows.stop].astype(np.float64).mean())
+    off, allowed = speed - commanded, max(OFF_MEAN, HELD_SPEED_SHARE * commanded)
+    tolerance = _gust_spread(requirements, float(aligned.track.time[rows.stop - 1] - aligned.track.time[half]))
+    if abs(off) <= allowed + tolerance or _by_the_air(requirements, aligned, leg, off):
+        return None
+    if off > 0.0 and float(requirements.ground_speed[leg]) < LEAST_GROUND_SPEED:
+        return None
+    return _HeldSpeed(speed, allowed, tolerance)
 
 
 def _in_doubt(requirements: RouteRequirements, leg: int, commanded: float, fastest: float) -> str:
@@ -182,11 +223,16 @@ def _measured(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
         return None
     speed = aligned.track.airspeed[rows].astype(np.float64)
     lasts = float(time[-1] - time[0])
-    gust = GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
     least = float(_second_means(aligned, rows).min())
-    spread = GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(lasts, 1e-3)))
+    spread = _gust_spread(requirements, lasts)
     steepened = leg > 0 and abs(float(requirements.slopes[leg] - requirements.slopes[leg - 1])) > LEVEL
     return float(speed.mean()), spread + (TAKE_UP / lasts if steepened else 0.0), least
+
+
+def _gust_spread(requirements: RouteRequirements, seconds: float) -> float:
+    """Return how far gusts may carry the mean airspeed over some seconds, m/s."""
+    gust = GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
+    return GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(seconds, 1e-3)))
 
 
 RULE = Rule(
@@ -195,8 +241,8 @@ RULE = Rule(
     asks="Is each leg's commanded airspeed one of level flight, and does the wind leave a way along the leg?",
     margin=Margin("airspeed", "m/s", 1.0),
     tolerances=(
-        *("ACCELERATION", "GUST_SHARE", "GUST_SIGMAS", "GUST_TIME", "LEVEL", "MEASURED_SHARE", "OFF_MEAN"),
-        *("SATURATED", "SLOWEST", "TAKE_UP", "UNDECIDED"),
+        *("ACCELERATION", "GUST_SHARE", "GUST_SIGMAS", "GUST_TIME", "HELD_SPEED_SHARE", "LEAST_GROUND_SPEED", "LEVEL"),
+        *("MEASURED_SHARE", "OFF_MEAN", "SATURATED", "SLOWEST", "TAKE_UP", "UNDECIDED"),
     ),
     judge=speed_findings,
     suggest=fly_level_speed,

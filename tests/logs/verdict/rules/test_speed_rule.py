@@ -127,3 +127,23 @@ def test_wind_that_leaves_no_way() -> None:
     verdict = judge_geometry(setup)
     assert ("speed", leg(0)) in failing(verdict)
     assert "no way" in of(verdict, "speed", leg(0)).reason
+
+
+def test_a_commanded_speed_that_is_not_held_fails(setup: FlightSetup) -> None:
+    setup = make_setup(STRAIGHT)
+    item = of(judge(setup, fly_path(setup, airspeed=lambda s: 0.0 * s - 4.0)), "speed", leg(0))
+    assert item.ok is False
+    assert item.reason.startswith("21.0 m/s held of the commanded 25.0 m/s")
+    # A tenth of 25 m/s may be missing.
+    assert (item.planned, item.limit_source, item.unit) == (25.0, "mission", "m/s")
+    assert item.flown == pytest.approx(21.0, abs=0.01)
+    assert item.limit == pytest.approx(22.5, abs=0.01)
+    assert item.margin == pytest.approx(-1.5, abs=0.01)
+
+
+def test_a_speed_that_is_taken_up_late_is_held() -> None:
+    """The second half of a leg counts: 8 m/s too slow over the first 1,300 m of 3,000 are over by then."""
+    setup = make_setup(STRAIGHT)
+    for until, ok in ((1300.0, True), (2500.0, False)):
+        track = fly_path(setup, airspeed=lambda s, until=until: -8.0 * (s < until))
+        assert of(judge(setup, track), "speed", leg(0)).ok is ok

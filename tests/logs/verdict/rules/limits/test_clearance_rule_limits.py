@@ -1,8 +1,12 @@
 """Heights over level ground just inside and just outside the clearance, planned and flown, on each leg."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from flight.mission.items import Home, Mission, MissionItem
+from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import judge, leg, of
 from tests.synthetic import bump, fly_path, make_setup
@@ -45,3 +49,33 @@ def test_what_was_flown_before_the_first_waypoint_and_after_the_last_counts(
     item = of(judge(setup, fly_path(longer, up=bump(at, up - 100.0, 50.0))), "clearance", leg(number))
     assert item.ok is ok
     assert item.flown == pytest.approx(up, abs=0.01)
+
+
+def at_home(setup: FlightSetup, alt: float, frame: int = 3) -> FlightSetup:
+    """The setup of a mission file with a home, and with one item in a frame."""
+    origin = setup.scenario.origin
+    item = MissionItem(1, 16, frame, (0.0,) * 4, origin.lat_deg, origin.lon_deg, 50.0)
+    mission = Mission(Home(origin.lat_deg, origin.lon_deg, alt), (item,))
+    return replace(setup, mission=mission)
+
+
+@pytest.mark.parametrize(("alt", "open_"), [(100.9, False), (101.1, True), (436.0, True), (50.0, False)])
+def test_a_route_below_home_is_open_where_no_terrain_is_given(alt: float, open_: bool) -> None:
+    """Waypoints at 100 m AMSL; a metre is what ground stations round by."""
+    made = make_setup(over(100.0))
+    blind = at_home(replace(made, scenario=replace(made.scenario, terrain=None)), alt)
+    for verdict in (judge_geometry(blind), judge(blind, fly_path(blind))):
+        assert verdict.undecided is open_
+        assert (f"{alt - 100.0:.0f} m below home" in verdict.headline) is open_
+    # Over terrain its heights above ground are judged.
+    assert judge_geometry(at_home(made, min(alt, 40.0))).flyable
+
+
+@pytest.mark.parametrize(("alt", "open_"), [(49.9, False), (50.1, True), (-49.9, False), (-50.1, True)])
+@pytest.mark.parametrize("frame", [0, 3])
+def test_a_home_off_the_ground_leaves_heights_over_it_open(alt: float, open_: bool, frame: int) -> None:
+    """The ground is at 0 m AMSL; heights above mean sea level do not count from home."""
+    setup = at_home(make_setup(over(100.0)), alt, frame)
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        assert verdict.undecided is (open_ and frame == 3)
+        assert not verdict.failed

@@ -69,3 +69,21 @@ def test_a_speed_is_decided_up_to_1_645_deviations_from_the_fastest(speed: float
     table = replace(envelope(), source="a data sheet", fastest_sd=1.5)
     setup = make_setup(straight(2000.0), airspeed=speed, table=table)
     assert of(judge_geometry(setup), "speed", leg(1)).ok is ok
+
+
+@pytest.mark.parametrize(("speed", "off", "ok"), [(25.0, 2.45, True), (25.0, -2.55, False), (17.0, 1.65, True)])
+def test_an_airspeed_is_held_to_a_tenth_of_its_command(speed: float, off: float, ok: bool) -> None:
+    """2.5 m/s of 25, 1.7 m/s of 17."""
+    for sign in (1.0, -1.0):
+        setup = make_setup(straight(2000.0), airspeed=speed)
+        track = fly_path(setup, airspeed=lambda s, sign=sign: 0.0 * s + sign * off)
+        assert of(judge(setup, track), "speed", leg(1)).ok is ok
+
+
+@pytest.mark.parametrize(("wind", "ok"), [(19.95, False), (20.05, True)])
+def test_a_speed_above_its_command_is_allowed_below_five_metres_a_second_of_ground_speed(wind: float, ok: bool) -> None:
+    """25 m/s against the wind leave 5.05 and 4.95 m/s (FW_GND_SPD_MIN)."""
+    setup = make_setup(straight(2000.0), wind={"speed_mps": wind, "from_deg": 0.0})
+    for off, passes in ((4.0, ok), (-2.6, False)):
+        track = fly_path(setup, airspeed=lambda s, off=off: 0.0 * s + off)
+        assert of(judge(setup, track), "speed", leg(1)).ok is passes
