@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.catalog import autopilot_of_log
+from flight.autopilots.parameter_origin import TITLES
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.implied_scenario import implied_scenario
@@ -106,6 +107,7 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
     plan_heights = options.plan is not None or flight.mission is None or flight.mission.with_heights
     if not plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
+    _refuse_other_autopilot(path, mission, flight.raw.program)
     scenario, placed = _world(mission, options, planned_in)
     scenario, wind_source = _in_its_wind(options.fences.on_scenario(change(scenario)), flight, options)
     known = options.aircraft is not None or options.scenario is not None or planned_in is not None
@@ -152,6 +154,15 @@ def import_flight(path: Path, options: ImportOptions, change: ScenarioChange) ->
     verdict = judge_flight(setup, track, "")
     ended = "completed" if verdict.complete else _end_of(verdict)
     return ImportedFlight(setup, track, _events(flight), verdict, ended)
+
+
+def _refuse_other_autopilot(path: Path, mission: Mission, program: str) -> None:
+    """Raise MissionError for a plan that was written for another autopilot than the one that wrote the log."""
+    flown = next((name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), "")
+    if mission.autopilot and flown and mission.autopilot != flown:
+        allowed = f"the flight of {path} is {program}'s: `plan` names the mission that was flown"
+        message = f"{mission.source}: written for {TITLES[mission.autopilot]}: {allowed}"
+        raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
 def _mission(path: Path, flight: LoggedFlight, options: ImportOptions) -> tuple[Mission, str, Scenario | None]:

@@ -128,6 +128,7 @@ def make_setup(
     fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
     autopilot = airframe.autopilot
+    mission = replace(mission, autopilot=autopilot.name)
     laws = autopilot.return_rules, autopilot.loiter_rules, autopilot.reads_as_px4
     if placed is None:
         route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits, *laws)

@@ -16,6 +16,7 @@ from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.rules.fence_rule import zone_test
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.file_autopilots import with_file_autopilot
 from planfly.make_plan import make_setup
 from planner.plan import Plan, parse_plan, plan_json, read_plan
 from world.airspace.zone_files import FileZones, is_zone_file, read_zone_file
@@ -201,6 +202,7 @@ def open_mission(
     else:
         implied = implied_scenario(mission, terrain, vertical_legs=True)
         scenario, placed = changed(implied.scenario), implied.placed
+    scenario = with_file_autopilot(scenario, mission)
     airframe = load_airframe(scenario)
     number = choose_seed(scenario, seed)
     return OpenedMission(make_setup(scenario, airframe, mission, number, placed=placed), airframe, path.stem)
@@ -266,7 +268,7 @@ def open_planned(
 
 
 def _with_mission(plan: Plan, source: str, change: ScenarioChange) -> OpenedPlan:
-    scenario = change(plan.scenario)
+    scenario = with_file_autopilot(change(plan.scenario))
     airframe = load_airframe(scenario)
     tracking = airframe.limits.tracking
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source=source, tracking=tracking)
@@ -286,7 +288,7 @@ def _placed(
     number, mission = seed if seed is not None else opened.plan.seed, fences.on_mission(opened.mission)
     if scenario_name is not None:
         # The plan's waypoints are in the map of its own scenario: another judges the mission, as a file.
-        other = change(load_scenario(scenario_name, terrain))
+        other = with_file_autopilot(change(load_scenario(scenario_name, terrain)))
         airframe = load_airframe(other)
         return OpenedMission(make_setup(other, airframe, mission, number), airframe, stem)
     setup = make_setup(opened.scenario, opened.airframe, mission, number, plan=opened.plan)

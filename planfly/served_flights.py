@@ -48,6 +48,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.registry import rule_word
 from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.file_autopilots import with_file_autopilot
 from planfly.make_plan import make_setup
 from planfly.open_mission import NamedFences, open_mission
 from planfly.reference_flights import judge_with_reference_flights
@@ -102,7 +103,7 @@ def open_served(options: ServeOptions) -> ServedScenario:
     """Load what is served.  Raises PlanflyError."""
 
     def change(scenario: Scenario) -> Scenario:
-        return with_flight(at_time(scenario, options.at), **options.flight)
+        return with_file_autopilot(with_flight(at_time(scenario, options.at), **options.flight))
 
     if options.mission:
         opened = open_mission(

@@ -463,8 +463,10 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     kept = scenario.flight.model_dump() | ({"aircraft_by_default": None} if "aircraft" in given else {})
     if "guidance" in given or "params" in given or "autopilot" in given:
         # Parameters alone are of the autopilot that the scenario names, where that takes any.
-        named = bool(set(given) & {"guidance", "autopilot"}) or kept["autopilot"] in (None, OWN_GUIDANCE)
-        kept |= {"guidance": None, "params": None} | ({"autopilot": None, "px4_version": None} if named else {})
+        taken = kept["autopilot_from"] is not None or kept["autopilot"] in (None, OWN_GUIDANCE)
+        named = bool(set(given) & {"guidance", "autopilot"}) or taken
+        kept |= {"guidance": None, "params": None, "autopilot_from": None}
+        kept |= {"autopilot": None, "px4_version": None} if named else {}
     table = checked_table(lambda: FlightTable(**(kept | given)), f"{scenario.name}: flight")
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 

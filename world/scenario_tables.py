@@ -401,6 +401,7 @@ class FlightTable(ScenarioTable):
     """[flight]; what is None was not stated, and `steering` says what that comes to.
 
     autopilot: who flies; guidance alone means "ideal", params alone "ardupilot".
+    autopilot_from: the file that names the autopilot where nobody did, see `planfly.file_autopilots`.
     params: the autopilot's parameters, a file.
     px4_version: of autopilot = "px4", whose releases fly differently; None for the newest.
     guidance: the law of "ideal".
@@ -412,6 +413,7 @@ class FlightTable(ScenarioTable):
     airspeed_mps: Annotated[float, within(15.0, 60.0)] | None = None
     max_bank_deg: Annotated[float, within(5.0, 60.0)] = 30.0
     autopilot: Name | None = None
+    autopilot_from: FilePath | None = None  # written where the autopilot was taken from a file
     params: FilePath | None = None
     px4_version: Px4Version | None = None
     guidance: Guidance | None = None

@@ -10,8 +10,9 @@ otherwise.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple, Protocol, Self
 
@@ -52,12 +53,38 @@ class ParameterValue(NamedTuple):
     origin: Origin
 
 
+# Who states a value, in words.
+_STATED_BY: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraft", "default": "the defaults"}
+
+
+def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
+    """Name the values of a file that are above or below a parameter that has to be the other way round.
+
+    orders: names of parameters whose values must not fall from one to the next.
+
+    >>> made = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
+    >>> find_misfits(made, [("THR_MIN", "TRIM_THROTTLE")])
+    ('TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the aircraft',)
+    """
+    known = {value.name: value for value in values}
+    found = []
+    for order in orders:
+        for low, high in pairwise(known[name] for name in order if name in known):
+            if low.value <= high.value or "file" not in (low.origin, high.origin):
+                continue
+            first, word, second = (high, "below", low) if high.origin == "file" else (low, "above", high)
+            texts = (f"{one.name} {one.value:g} of {_STATED_BY[one.origin]}" for one in (first, second))
+            found.append(f" is {word} ".join(texts))
+    return tuple(found)
+
+
 class Parameters(Protocol):
     """An autopilot's parameters by its own names and in its own units.
 
     values: every parameter that its law knows.  unused: names that the file states and the law has no use for.
     source: the file that a person gave, "" for none.  not_flown: read, but no flight shows them.
     beyond: values of the file outside their documented ranges, which are flown all the same, with those ranges.
+    misfits: values of the file that contradict another parameter, in words; the autopilot flies with them all the same.
     """
 
     not_flown: ClassVar[tuple[str, ...]]
@@ -76,6 +103,10 @@ class Parameters(Protocol):
 
     @property
     def beyond(self) -> tuple[str, ...]:
+        """As above."""
+
+    @property
+    def misfits(self) -> tuple[str, ...]:
         """As above."""
 
     def changed(self, **values: float) -> Self:

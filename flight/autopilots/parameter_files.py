@@ -16,8 +16,10 @@ from world.files import TextLine, read_small_file, utf8_text
 
 # A vehicle has some 1,500 parameters in lines of 40 bytes.
 MAX_BYTES = 4 * 2**20
-# Names have at most sixteen characters (MAVLink, PARAM_VALUE).
-_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
+# Characters that a parameter's name has at most (MAVLink, PARAM_VALUE): no autopilot knows a longer one.
+LONGEST_NAME = 16
+# Names that are read: longer ones stand in files that were edited by hand, and are passed over by ground stations.
+_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,63}")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # A line of QGroundControl's: vehicle, component, name, value, type.
 _QGC_FIELDS = 5
@@ -64,7 +66,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
 
     Raises ParameterError with file, line, field, value and what is allowed, for a line that is none, a value that is no
     finite number, a name that comes twice, and a file without a parameter.  Of a name that several components of a
-    vehicle have, the autopilot's counts.
+    vehicle have, the autopilot's counts.  A name that is too long is read as any that no autopilot knows.
 
     >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
     >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)
@@ -109,7 +111,7 @@ def _entry(line: str, where: TextLine) -> Entry:
             raise ParameterError(message, file=where.file, value=line, allowed=allowed)
         name, text = fields
     if not _NAME.fullmatch(name):
-        allowed = "up to 16 capitals, digits and _ are expected"
+        allowed = f"up to {LONGEST_NAME} capitals, digits and _ are expected"
         message = f"{where}: name {_shown(name)}: {allowed}"
         raise ParameterError(message, file=where.file, field="name", value=name, allowed=allowed)
     value = float(text) if _NUMBER.fullmatch(text) else math.nan

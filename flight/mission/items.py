@@ -246,6 +246,7 @@ class Mission:
     warnings: what was odd about the file but could be read.
     source: names it in messages.
     survey_plans: of its surveys, where the file keeps more of them than their items.
+    autopilot: that a .plan file was written for, by the name that scenarios state; "" where nothing says so.
     """
 
     home: Home | None
@@ -256,6 +257,7 @@ class Mission:
     warnings: tuple[str, ...] = field(default=(), compare=False)
     source: str = field(default="mission", compare=False)
     survey_plans: tuple[SurveyPlan, ...] = field(default=(), compare=False)
+    autopilot: str = field(default="", compare=False)
 
 
 def renumbered(mission: Mission) -> Mission:

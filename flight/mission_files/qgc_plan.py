@@ -243,6 +243,7 @@ class _Item(_Table):
 class _Mission(_Table):
     version: Annotated[int, Field(ge=2, le=2)]
     cruiseSpeed: Annotated[float, Field(ge=0.0, le=_FASTEST)] | None = None
+    firmwareType: int | None = None
     vehicleType: int | None = None
     plannedHomePosition: Annotated[list[_Unset], Field(min_length=3, max_length=3)] | None = None
     items: Annotated[list[_Item], Field(max_length=MAX_ITEMS)]
@@ -288,6 +289,12 @@ _OTHER_VEHICLES = (
     ((11, 12), "a boat or submarine"),
     ((19, 20, 21, 22, 23, 24, 25), "a VTOL aircraft"),
 )
+# MAV_TYPE_GENERIC and MAV_TYPE_FIXED_WING.
+_FIXED_WINGS = (0, 1)
+# Autopilots by MAV_AUTOPILOT (MAVLink's minimal.xml), as scenarios name them: ArduPilot and PX4.
+_FIRMWARES = {3: "ardupilot", 12: "px4"}
+# MAV_AUTOPILOT_GENERIC and MAV_AUTOPILOT_INVALID, which name no autopilot.
+_NO_FIRMWARE = (0, 8)
 
 
 def _check_vehicle(kind: int | None, source: str) -> None:
@@ -296,6 +303,19 @@ def _check_vehicle(kind: int | None, source: str) -> None:
         if kind in kinds:
             allowed = f"{name}: planfly flies fixed-wing aircraft (1)"
             raise MissionError.at(source, "mission.vehicleType", kind, allowed)
+    if kind is not None and kind not in _FIXED_WINGS:
+        allowed = "another vehicle (MAV_TYPE): planfly flies fixed-wing aircraft (1)"
+        raise MissionError.at(source, "mission.vehicleType", kind, allowed)
+
+
+def _autopilot(firmware: int | None, source: str) -> str:
+    """Return the autopilot that a firmwareType names, "" for none.  Raises MissionError for one that is not flown."""
+    if firmware is None or firmware in _NO_FIRMWARE:
+        return ""
+    if firmware not in _FIRMWARES:
+        allowed = "another autopilot (MAV_AUTOPILOT): 3 (ArduPilot), 12 (PX4) or 0 (not stated) is expected"
+        raise MissionError.at(source, "mission.firmwareType", firmware, allowed)
+    return _FIRMWARES[firmware]
 
 
 def parse_plan_file(text: str, source: str) -> Mission:
@@ -314,6 +334,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
     except ValidationError as error:
         raise MissionError(**first_fault(error, data).at(source)) from error
     _check_vehicle(file.mission.vehicleType, source)
+    autopilot = _autopilot(file.mission.firmwareType, source)
     items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
     if not (items or file.geoFence.circles or file.geoFence.polygons or file.rallyPoints.points):
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")
@@ -340,6 +361,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         warnings=tuple(warnings),
         source=source,
         survey_plans=tuple(plans),
+        autopilot=autopilot,
     )
     return renumbered(mission)
 
@@ -430,7 +452,8 @@ def plan_file_text(mission: Mission) -> str:
 
     cruiseSpeed is the mission's, or its first DO_CHANGE_SPEED, or QGC's default.  It is written in whole m/s, as
     hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC takes
-    both for numbers, and sends neither to an aircraft.
+    both for numbers, and sends neither to an aircraft.  firmwareType is the mission's autopilot's, 0 for planfly's own
+    guidance, which no ground station knows.
     """
     mission = renumbered(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
@@ -441,7 +464,7 @@ def plan_file_text(mission: Mission) -> str:
         "groundStation": "planfly",
         "mission": {
             "cruiseSpeed": round(_cruise_speed(mission)),
-            "firmwareType": 12,
+            "firmwareType": next((one for one, name in _FIRMWARES.items() if name == mission.autopilot), 0),
             # 0: mixed.
             "globalPlanAltitudeMode": modes[0] if len(modes) == 1 else 0,
             "hoverSpeed": _HOVER_SPEED,

@@ -15,7 +15,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import airspace_of, surveys_of
 from world.errors import FlightError
 from world.scenario import Scenario
-from world.scenario_tables import Navigation
+from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, Navigation
 from world.wind import Turbulence
 
 _NAV = {
@@ -84,12 +84,19 @@ def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot:
         wind_from_deg=round(math.degrees(wind.from_course) % 360.0, 9),
         turbulence=wind.turbulence,
         navigation=table.steering.nav,
-        autopilot=autopilot.described(aircraft),
+        autopilot=autopilot.described(aircraft) + _autopilot_source(table),
         autopilot_version=autopilot.version,
         terrain=None if terrain is None else terrain.source,
         height_datum=None if terrain is None else terrain.datum,
         zones=len(scenario.zones),
     )
+
+
+def _autopilot_source(table: FlightTable) -> str:
+    """Return a clause that names the file which another autopilot than the default was taken from; "" for none."""
+    if table.autopilot_from is None or table.steering.autopilot == DEFAULT_AUTOPILOT:
+        return ""
+    return f"; taken from {table.autopilot_from}, for nobody named an autopilot"
 
 
 def _source_of_airspeed(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from flight.autopilots.parameter_files import LONGEST_NAME
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
 from logs.verdict.findings import (
@@ -239,7 +240,12 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
     if parameters is None or not parameters.source:
         return []
     names = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
-    unused = list(parameters.unused[:_NAMED])
+    # A name that is too long is a mistake in the file, and the others belong to other hardware.
+    by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
+    unused = [
+        name if len(name) <= LONGEST_NAME else f"{name} (longer than {LONGEST_NAME} characters)"
+        for name in by_length[:_NAMED]
+    ]
     more = len(parameters.unused) - len(unused)
     said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
     returns = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
@@ -249,7 +255,8 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
     )
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
-        f" {names['default']} {setup.autopilot.title}'s defaults{said}"
+        f" {names['default']} {setup.autopilot.title}'s defaults{said}",
+        *(f"Parameters that do not fit: {'; '.join(parameters.misfits)}" for _ in parameters.misfits[:1]),
     ]
 
 

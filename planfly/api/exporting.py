@@ -36,6 +36,7 @@ from world.errors import MissionError, PlanflyError
 from world.extras import need_extra
 from world.files import temporary_folder, write_whole
 from world.scenario import Scenario, at_time
+from world.scenario_tables import DEFAULT_AUTOPILOT
 
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
 # Parameters of the autopilot that a mission was judged with: those of returns, rally points, take-off and landing.
@@ -199,7 +200,8 @@ def _read_mission(path: Path, fences: NamedFences, at: str | None, *, placed: bo
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan = path.suffix.lower() == ".json"
     if not (placed or is_plan or fences.zones or at is not None):
-        return _Source(fences.on_mission(read_mission(path)), path.stem)
+        mission = fences.on_mission(read_mission(path))
+        return _Source(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
     # What a station uploads has no times: which zones count is decided here.
     setup = open_mission(path, None, None, change=partial(at_time, at=at), fences=fences).setup
     line, zones = {"plan": plan_line(setup)}, map_zones(setup)
@@ -222,6 +224,8 @@ def _with_zones(source: _Source, scenario: Scenario) -> _Source:
 def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
     """Text of a target, and what it holds."""
     suffix, mission = target.suffix.lower(), source.mission
+    if source.autopilot is not None:
+        mission = replace(mission, autopilot=source.autopilot.name)
     if suffix in LOGS and source.log is not None:
         return _flown_text(source.log, suffix)
     if suffix in MAPS:

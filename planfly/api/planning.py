@@ -10,6 +10,7 @@ from flight.autopilots.catalog import load_autopilot, program_autopilot
 from logs.verdict.conditions import Conditions, conditions_of
 from planfly.airframe import choose_seed, cruise_airspeed, find_airframe, load_airframe
 from planfly.arguments import check_arguments, is_wind
+from planfly.file_autopilots import with_file_autopilot
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.make_plan import make_plan
@@ -104,7 +105,8 @@ def changed_scenario(
 
     wind: speed, m/s, and where it comes from, degrees.  aircraft: a name, or a folder.  airspeed: m/s.
     params: a file of the autopilot's parameters.  autopilot_law: whose law flies.  autopilot: an autopilot's program.
-    Raises ScenarioError for what a scenario file may not have either.
+    Where nobody names an autopilot, it is the one that the file of parameters was written for.
+    Raises ScenarioError for what a scenario file may not have either, and ParameterError for another autopilot's file.
 
     >>> changed = changed_scenario(load_scenario("tight"), wind=(8.0, 270.0), airspeed=28.0)
     >>> changed.wind.speed, changed.flight.airspeed_mps
@@ -123,7 +125,8 @@ def changed_scenario(
         autopilot=autopilot,
     )
     from_course = None if from_deg is None else math.radians(from_deg)
-    return with_wind(with_flight(at_time(scenario, at), **entries), speed, from_course, turbulence)
+    changed = with_file_autopilot(with_flight(at_time(scenario, at), **entries))
+    return with_wind(changed, speed, from_course, turbulence)
 
 
 def _two_numbers(wind: Wind) -> Wind:

@@ -222,6 +222,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     write_whole(folder / "plan.json", plan_json(plan))
     tracking = airframe.limits.tracking
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints", tracking=tracking)
+    mission = replace(mission, autopilot=airframe.autopilot.name)
     rally = [folder / "mission.rally"] if mission.rally else []
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
         write_whole(target, mission_text(mission, mission_kind(target)))

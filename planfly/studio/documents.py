@@ -223,6 +223,7 @@ def save_document(document: Document, desk: Desk, judged: Judged, kind: str) -> 
     if kind == "kml":
         text = kml_text(desk.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
         return Saved(name, _bytes(text), ("a map only: the commands, speeds and frames of the items are not in it",))
+    mission = replace(mission, autopilot=judged.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
     losses = (*_losses(desk, mission, text, name, kind), *_lost_settings(before, desk))
     return Saved(name, text.encode(), losses)

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters
+from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters, find_misfits
 from flight.autopilots.parameter_files import Entry, parse_parameters, read_parameter_file
+from flight.autopilots.parameter_origin import ARDUPILOT, read_parameters_for, refuse_unknown
 from world.errors import ParameterError
 from world.files import TextLine
 from world.kernels import Record, record_dtype
@@ -295,6 +296,15 @@ class ArduPilotParameters:
         """Nothing: a value beyond its range is refused."""
         return ()
 
+    @property
+    def misfits(self) -> tuple[str, ...]:
+        r"""Values of the file that contradict another parameter, in words; ArduPlane flies with them all the same.
+
+        >>> parameters_of("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").misfits
+        ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
+        """
+        return find_misfits(self.values, _ORDERS)
+
     def changed(self, **values: float) -> "ArduPilotParameters":
         """The same parameters but for these, by ArduPlane's names and in its units.
 
@@ -379,7 +389,9 @@ def load_parameters(aircraft: Aircraft, path: Path | str | None = None) -> ArduP
     stated: list[tuple[Origin, dict[str, float]]] = []
     unused: tuple[str, ...] = ()
     if path is not None:
-        values, unused = _known(read_parameter_file(Path(path)))
+        entries = read_parameters_for(Path(path), ARDUPILOT)
+        values, unused = _known(entries)
+        refuse_unknown(Path(path), ARDUPILOT, entries, values)
         stated.append(("file", values))
     own = aircraft.folder / AIRCRAFT_FILE
     if own.exists():
@@ -415,6 +427,13 @@ def stored_parameters(stored: StoredParameters) -> ArduPilotParameters:
     return _parameters(list(origins.items()), stored.source, stored.unused)
 
 
+# What has to be in order, but that ArduPlane does not compare.
+_ORDERS = (
+    ("THR_MIN", "TRIM_THROTTLE", "THR_MAX"),
+    ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX"),
+    ("PTCH_LIM_MIN_DEG", "PTCH_TRIM_DEG", "PTCH_LIM_MAX_DEG"),
+    ("TECS_SINK_MIN", "TECS_SINK_MAX"),
+)
 # What has to be in order.
 _PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
 

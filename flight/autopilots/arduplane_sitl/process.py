@@ -6,7 +6,7 @@ from pathlib import Path
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.parameters import AIRCRAFT_FILE, DEFINITIONS
-from flight.autopilots.parameter_files import read_parameter_file
+from flight.autopilots.parameter_files import LONGEST_NAME, read_parameter_file
 from flight.autopilots.sitl.exchange import LOOPBACK
 from flight.autopilots.sitl.link import free_ports
 from flight.autopilots.sitl.process import Launch
@@ -133,5 +133,9 @@ def person_parameters(setup: FlightSetup) -> dict[str, float]:
         # What the scenario asks for of its returns counts as stated.
         return made
     old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
-    stated = {name: entry.value for name, entry in read_parameter_file(Path(file)).items() if name not in old}
+    stated = {
+        name: entry.value
+        for name, entry in read_parameter_file(Path(file)).items()
+        if name not in old and len(name) <= LONGEST_NAME
+    }
     return stated | made

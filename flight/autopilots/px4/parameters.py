@@ -16,8 +16,9 @@ from typing import ClassVar, NamedTuple, get_args
 import numpy as np
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters
+from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters, find_misfits
 from flight.autopilots.parameter_files import Entry, parse_parameters, read_parameter_file
+from flight.autopilots.parameter_origin import PX4, read_parameters_for, refuse_unknown
 from world.errors import ParameterError
 from world.files import TextLine
 from world.kernels import Record, record_dtype
@@ -126,6 +127,15 @@ NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-
 _BY_NAME = {definition.name: definition for definition in DEFINITIONS.values()}
 # A station saves every parameter of the vehicle, a thousand and more; a person writes down what is of interest.
 _WHOLE_SET = 300
+# What has to be in order, but that PX4 does not refuse.
+_ORDERS = (
+    ("FW_THR_MIN", "FW_THR_TRIM", "FW_THR_MAX"),
+    ("FW_AIRSPD_MIN", "FW_AIRSPD_TRIM", "FW_AIRSPD_MAX"),
+    ("FW_P_LIM_MIN", "FW_PSP_OFF", "FW_P_LIM_MAX"),
+    ("FW_T_SINK_MIN", "FW_T_SINK_MAX"),
+    ("FW_T_SINK_R_SP", "FW_T_SINK_MAX"),
+    ("FW_T_CLMB_R_SP", "FW_T_CLMB_MAX"),
+)
 # What has to be in order.
 _PAIRS = (("FW_THR_MIN", "FW_THR_MAX"), ("FW_AIRSPD_MIN", "FW_AIRSPD_MAX"))
 
@@ -215,6 +225,15 @@ class Px4Parameters:
         return tuple(found)
 
     @property
+    def misfits(self) -> tuple[str, ...]:
+        """Values of the file that contradict another parameter, in words; PX4 warns of some, and flies with them.
+
+        >>> parameters_of("FW_AIRSPD_TRIM 25", "mine.params").misfits
+        ('FW_AIRSPD_TRIM 25 of the file is above FW_AIRSPD_MAX 20 of the defaults',)
+        """
+        return find_misfits(self.values, _ORDERS)
+
+    @property
     def is_whole_set(self) -> bool:
         """Whether the file holds all parameters of a vehicle: one that it does not state is the release's own."""
         return len(self.unused) + len(self.by_origin("file")) >= _WHOLE_SET
@@ -281,7 +300,9 @@ def load_parameters(
     stated: list[tuple[Origin, dict[str, float]]] = []
     unused: tuple[str, ...] = ()
     if path is not None:
-        values, unused = _known(read_parameter_file(Path(path)))
+        entries = read_parameters_for(Path(path), PX4)
+        values, unused = _known(entries)
+        refuse_unknown(Path(path), PX4, entries, values)
         stated.append(("file", values))
     stated.append(("aircraft", _of_aircraft(aircraft)))
     return _parameters(stated, "" if path is None else str(path), unused, version)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.parameter_files import read_parameter_file
+from flight.autopilots.parameter_files import LONGEST_NAME, read_parameter_file
 from flight.autopilots.px4.parameters import AIRCRAFT_FILE, Px4Parameters
 from flight.autopilots.px4_sitl.physics import AILERON, ELEVATOR, RUDDER, THROTTLE
 from flight.simulation.setup import FlightSetup
@@ -95,7 +95,11 @@ def given_parameters(setup: FlightSetup, aircraft: Aircraft, made: Px4Parameters
     own |= made.by_origin("file")
     base = SIMULATION | rate_gains(aircraft) | made.by_origin("aircraft")
     base["FW_AIRSPD_TRIM"] = setup.airspeed
-    flying = {name: value for name, value in own.items() if name.startswith(FLYING) and name not in SIMULATION}
+    flying = {
+        name: value
+        for name, value in own.items()
+        if name.startswith(FLYING) and name not in SIMULATION and len(name) <= LONGEST_NAME
+    }
     changed = {name: value for name, value in flying.items() if base.get(name) != value}
     return GivenParameters(base | flying, changed, tuple(sorted(own.keys() - flying.keys())))
 

@@ -1,0 +1,258 @@
+"""The autopilot and the vehicle that a parameter file was written for.
+
+QGroundControl writes both as comments at the head of the file ("# Stack: PX4 Pro", "# Vehicle: Fixed Wing"). Every
+other file shows them by its names: PX4 and ArduPilot share nearly none, and ArduPilot's vehicles differ in the names of
+their controllers (ArduPilot's and PX4's parameter references).
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from flight.autopilots.parameter_files import MAX_BYTES, Entry, parse_parameters
+from world.errors import ParameterError
+from world.files import read_small_file, utf8_text
+
+# Autopilots by the name that a scenario states, and the option that chooses each.
+ARDUPILOT = "ardupilot"
+PX4 = "px4"
+TITLES: Mapping[str, str] = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
+_MODELS: Mapping[str, str] = {ARDUPILOT: "ArduPlane", PX4: "PX4", "ideal": "planfly's own guidance"}
+
+# A header weighs as much as this many names: a file may be edited below its header.
+_HEADER_WEIGHT = 3
+# The autopilot with this many times the names of the other one is the file's; a file with fewer is of both.
+_CLEAR_MAJORITY = 4
+# Names that are shown as evidence.
+_SHOWN_NAMES = 3
+
+_STACK = re.compile(r"^\s*#+\s*stack\s*:\s*(.+?)\s*$", re.IGNORECASE | re.MULTILINE)
+_VEHICLE = re.compile(r"^\s*#+\s*vehicle\s*:\s*(.+?)\s*$", re.IGNORECASE | re.MULTILINE)
+_PROGRAM = re.compile(r"^\s*#.*\b(ArduPlane|ArduCopter|ArduRover|APMrover2|ArduSub|AntennaTracker)\b", re.I | re.M)
+
+
+def _pattern(names: str) -> re.Pattern[str]:
+    """Compile a pattern of names between blanks; one that ends with an underscore is the beginning of names."""
+    return re.compile("|".join(f"{name}.*" if name.endswith("_") else name for name in names.split()))
+
+
+_PX4_NAMES = _pattern(
+    "ASPD_ BAT[0-9]?_ CAL_ CA_ CBRK_ COM_ EKF2_ FD_ FW_ GF_ GND_L1_ GND_SPEED_ GND_THR_ IMU_ LNDFW_ LNDMC_ LPE_ MAN_ "
+    "MAV_COMP_ID MAV_SYS_ID MAV_TYPE MAV_[0-9]_ MC_ MIS_DIST_ MIS_LTRMIN_ALT MIS_MNT_ MIS_TAKEOFF_ MIS_TKOFF_ MIS_TKO_ "
+    "MIS_YAW MPC_ NAV_[A-BD-Z].* NPFG_ PWM_AUX_ PWM_MAIN_ PWM_MAX PWM_MIN RA_ RC_MAP_ RD_ RO_ "
+    "RTL_CONE_ RTL_DESCEND_ALT RTL_LAND_DELAY RTL_LOITER_RAD RTL_MIN_DIST RTL_RETURN_ALT RTL_TYPE RWTO_ SDLOG_ SENS_ "
+    "SER_ SYS_ THR_MDL_FAC TRIG_ TRIM_PITCH TRIM_ROLL TRIM_YAW UUV_ VT_ WEIGHT_BASE WEIGHT_GROSS WV_"
+)
+# Names that only an aeroplane of ArduPilot has; ArduPlane's VTOL parameters begin with Q_.
+_ARDUPLANE_NAMES = _pattern(
+    "AIRSPEED_CRUISE AIRSPEED_MAX AIRSPEED_MIN ALT_CTRL_ALG ALT_HOLD_ ARSPD_ CRUISE_ALT_FLOOR DSPOILER_ "
+    "DSPOILR_ ELEVON_ FBW[AB]_ FLAP_ FS_LONG_ FS_SHORT_ GLIDE_SLOPE_ GROUND_STEER_ KFF_ LAND_FLARE_ LAND_PF_ "
+    "LAND_PITCH_ LAND_WIND_COMP LEVEL_ROLL_LIMIT LIM_ MIXING_GAIN NAVL1_ PITCH_LIM_ PTCH2SRV_ PTCH_ Q_ "
+    "RALLY_INCL_HOME RALLY_LIMIT_KM RLL2SRV_ RLL_RATE_ ROLL_LIMIT_DEG RTL_ALTITUDE RTL_AUTOLAND RTL_CLIMB_MIN "
+    "RTL_RADIUS RUDD_DT_GAIN STAB_PITCH_ STALL_PREVENTION STEER2SRV_ TECS_ TERRAIN_FOLLOW THROTTLE_NUDGE "
+    "THR_FAILSAFE THR_MAX THR_MIN THR_PASS_ THR_SLEWRATE TKOFF_ TRIM_ARSPD_CM TRIM_PITCH_CD TRIM_THROTTLE "
+    "USE_REV_THRUST WP_LOITER_RAD WP_MAX_RADIUS YAW2SRV_ YAW_RATE_"
+)
+_ARDUPILOT_NAMES = _pattern(
+    "ACRO_ AHRS_ ARMING_ AUTOTUNE_ BATT[0-9]?_ BRD_ CAM[0-9]?_ CAN_ COMPASS_ EK[23]_ FENCE_ FLIGHT_OPTIONS "
+    "FLTMODE[0-9_].* FORMAT_VERSION FS_ GPS1_ GPS_TYPE.* GROUND_ INS_ LOG_ MIS_OPTIONS MIS_RESTART MIS_TOTAL "
+    "NTF_ RALLY_ RCMAP_ RNGFND RNGFND[0-9]?_ RSSI_ SCHED_ SERIAL[0-9]_ SERVO[0-9_].* SR[0-9]_ STAT_ SYSID_ "
+    "TERRAIN_ WP_RADIUS"
+)
+# What ArduPilot's other vehicles are, by the names that only they have.
+_ARDUPILOT_VEHICLES: Mapping[str, re.Pattern[str]] = {
+    "a multicopter or helicopter": _pattern(
+        "ANGLE_MAX ATC_ACCEL_ ATC_ANG_ ATC_INPUT_TC ATC_RATE_ ATC_RAT_ ATC_THR_ CIRCLE_ FRAME FRAME_CLASS "
+        "FRAME_TYPE FS_THR_ENABLE FS_THR_VALUE GND_EFFECT_COMP H_ IM_ LAND_ALT_LOW LAND_SPEED LAND_SPEED_HIGH "
+        "LOIT_ MOT_ PHLD_ PILOT_ POS[XYZ]_ PSC_ RATE_PIT_ RATE_RLL_ RATE_YAW_ RTL_ALT RTL_ALT_FINAL "
+        "RTL_LOIT_TIME RTL_SPEED SIMPLE STB_ SUPER_SIMPLE THROW_ THR_DZ THR_MID VEL[XYZ]_ WPNAV_ "
+        "WP_YAW_BEHAVIOR"
+    ),
+    "a rover or boat": _pattern(
+        "ATC_BAL_ ATC_BRAKE ATC_DECEL_MAX ATC_SAIL_ ATC_SPEED_ ATC_STOP_SPEED ATC_STR_ ATC_TURN_MAX_G "
+        "CRASH_ANGLE CRUISE_SPEED CRUISE_THROTTLE LEARN_CH MODE[1-6] MODE_CH PIVOT_TURN_ SAIL_ "
+        "SPEED_TURN_GAIN TURN_MAX_G TURN_RADIUS WP_OVERSHOOT WP_PIVOT_ WP_SPEED"
+    ),
+    "a submarine": _pattern("FS_LEAK_ENABLE FS_TERRAIN_ENAB JS_ MOT_[0-9]+_DIRECTION SURFACE_DEPTH"),
+}
+# What PX4's other vehicles are, by the names that only their controllers have.
+_PX4_PLANE = _pattern("FW_ LNDFW_ NPFG_ RWTO_")
+_PX4_VEHICLES: Mapping[str, re.Pattern[str]] = {
+    "a multicopter or helicopter": _pattern("LNDMC_ MC_ MPC_"),
+    "a rover or boat": _pattern("GND_ RA_ RD_ RO_"),
+    "a submarine": _pattern("UUV_"),
+}
+_VTOL = "a VTOL aircraft"
+# Names that PX4 has for a VTOL alone: its navigator asks for VT_B_ in every vehicle.
+_PX4_VTOL = _pattern("VT_ARSP_ VT_FW_ VT_F_ VT_TRANS_ VT_TYPE")
+# Words of a "# Vehicle:" header, the first that fits: QGroundControl's and MAVLink's names of vehicles.
+_VEHICLE_WORDS: tuple[tuple[str, str], ...] = (
+    (r"vtol|tail-?sitter|tilt-?rotor", _VTOL),
+    (r"fixed|plane\b", ""),
+    (r"multi|quad|hexa|octo|tri-?copter|copter|coaxial|heli", "a multicopter or helicopter"),
+    (r"rover|boat|car\b", "a rover or boat"),
+    (r"\bsub", "a submarine"),
+    (r"airship|balloon|blimp|tracker", "another vehicle than an aeroplane"),
+)
+# MAV_TYPE and CA_AIRFRAME of PX4, by value: MAVLink's common.xml, PX4's parameter reference.
+_PX4_TYPES: Mapping[str, Mapping[int, str]] = {
+    "MAV_TYPE": dict.fromkeys((2, 3, 4, 13, 14, 15), "a multicopter or helicopter")
+    | dict.fromkeys((10, 11), "a rover or boat")
+    | dict.fromkeys(range(19, 26), _VTOL)
+    | {12: "a submarine"},
+    "CA_AIRFRAME": dict.fromkeys((2, 3, 4), _VTOL)
+    | dict.fromkeys((5, 6, 13), "a rover or boat")
+    | dict.fromkeys((8, 10, 11, 12), "a multicopter or helicopter"),
+}
+_PROGRAMS: Mapping[str, str] = {
+    "arduplane": "",
+    "arducopter": "a multicopter or helicopter",
+    "ardurover": "a rover or boat",
+    "apmrover2": "a rover or boat",
+    "ardusub": "a submarine",
+    "antennatracker": "another vehicle than an aeroplane",
+}
+
+
+class ParameterOrigin(NamedTuple):
+    """What a parameter file was written for.
+
+    autopilot: "ardupilot" or "px4"; "" where neither is clear.
+    vehicle: of another kind than an aeroplane, in words; "" for an aeroplane, or where nothing says so.
+    evidence: the header or the names that show it.
+    mixed: True for a file with names of both autopilots, in which neither has a clear majority.
+    """
+
+    autopilot: str
+    vehicle: str = ""
+    evidence: str = ""
+    mixed: bool = False
+
+
+def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin:
+    r"""Return the autopilot and the vehicle that the text of a parameter file was written for.
+
+    entries: its parameters.
+
+    >>> text = "FW_AIRSPD_TRIM 15\nNAV_ACC_RAD 30\n"
+    >>> parameter_origin(text, parse_parameters(text, "a.params"))
+    ParameterOrigin(autopilot='px4', vehicle='', evidence='FW_AIRSPD_TRIM, NAV_ACC_RAD', mixed=False)
+    >>> text = "ATC_RAT_RLL_P,0.1\nWPNAV_SPEED,500\n"
+    >>> parameter_origin(text, parse_parameters(text, "b.param")).vehicle
+    'a multicopter or helicopter'
+    """
+    stack, program = _STACK.search(text), _PROGRAM.search(text)
+    header = ""
+    if stack is not None:
+        header = PX4 if "px4" in stack[1].lower() else ARDUPILOT if re.search("ardu|apm", stack[1], re.I) else ""
+    elif program is not None:
+        header = ARDUPILOT
+    names = {PX4: _matching(entries, _PX4_NAMES.fullmatch), ARDUPILOT: _matching(entries, _is_ardupilot)}
+    votes = {one: len(names[one]) + (_HEADER_WEIGHT if one == header else 0) for one in TITLES}
+    most = max(TITLES, key=lambda one: votes[one])
+    least = min(votes.values())
+    if not votes[most]:
+        return ParameterOrigin("")
+    if votes[most] < _CLEAR_MAJORITY * least:
+        shown = f"{names[PX4][0] if names[PX4] else 'its header'} is PX4's"
+        other = names[ARDUPILOT][0] if names[ARDUPILOT] else "its header"
+        return ParameterOrigin("", "", f"{shown} and {other} ArduPilot's", mixed=True)
+    evidence = ", ".join(names[most][:_SHOWN_NAMES])
+    if most == header:
+        evidence = f'"# Stack: {stack[1][:40]}"' if stack is not None else program[1] if program is not None else ""
+    vehicle = _px4_vehicle(text, entries) if most == PX4 else _ardupilot_vehicle(text, entries)
+    return ParameterOrigin(most, vehicle, evidence)
+
+
+def _matching(names: Iterable[str], matches: Callable[[str], object]) -> list[str]:
+    return [name for name in names if matches(name)]
+
+
+def _is_ardupilot(name: str) -> bool:
+    patterns = (_ARDUPLANE_NAMES, _ARDUPILOT_NAMES, *_ARDUPILOT_VEHICLES.values())
+    return not _PX4_NAMES.fullmatch(name) and any(pattern.fullmatch(name) for pattern in patterns)
+
+
+def _header_vehicle(text: str) -> str | None:
+    """Return the vehicle that the head of a file states, "" for an aeroplane, None where it states none."""
+    found = _VEHICLE.search(text)
+    if found is not None:
+        return next((kind for words, kind in _VEHICLE_WORDS if re.search(words, found[1], re.I)), None)
+    program = _PROGRAM.search(text)
+    return None if program is None else _PROGRAMS[program[1].lower()]
+
+
+def _voted_vehicle(
+    text: str, entries: Mapping[str, Entry], plane: re.Pattern[str], others: Mapping[str, re.Pattern[str]]
+) -> str:
+    """Return the vehicle that most names are of; a tie is an aeroplane's."""
+    stated = _header_vehicle(text)
+    votes = {"": len(_matching(entries, plane.fullmatch))}
+    votes |= {kind: len(_matching(entries, names.fullmatch)) for kind, names in others.items()}
+    if stated is not None:
+        votes[stated] = votes.get(stated, 0) + _HEADER_WEIGHT
+    return max(votes, key=lambda kind: votes[kind])
+
+
+def _px4_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
+    for name, kinds in _PX4_TYPES.items():
+        if name in entries and (kind := kinds.get(round(entries[name].value))):
+            return kind
+    if _header_vehicle(text) == _VTOL or _matching(entries, _PX4_VTOL.fullmatch):
+        return _VTOL
+    return _voted_vehicle(text, entries, _PX4_PLANE, _PX4_VEHICLES)
+
+
+def _ardupilot_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
+    return _voted_vehicle(text, entries, _ARDUPLANE_NAMES, _ARDUPILOT_VEHICLES)
+
+
+# ----------------------------------------------------------------------
+# A file of parameters for one autopilot.
+
+
+def read_origin(path: Path) -> ParameterOrigin:
+    """Return what the parameter file at a path was written for.  Raises ParameterError for one that cannot be read."""
+    text = _read(path)
+    return parameter_origin(text, parse_parameters(text, str(path)))
+
+
+def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
+    """Read a parameter file that an autopilot, by its name, is to fly with.
+
+    Raises ParameterError for a file that cannot be read, and for one of another autopilot or another vehicle.
+    """
+    text = _read(path)
+    entries = parse_parameters(text, str(path))
+    found = parameter_origin(text, entries)
+    if found.autopilot not in ("", autopilot):
+        raise other_autopilot(f"{path}", found.autopilot, found.evidence, autopilot)
+    if found.vehicle:
+        allowed = "planfly flies fixed-wing aircraft"
+        message = f"{path}: parameters of {found.vehicle} ({TITLES[found.autopilot]}): {allowed}"
+        raise ParameterError(message, file=path, field="vehicle", value=found.vehicle, allowed=allowed)
+    return entries
+
+
+def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]) -> None:
+    """Raise ParameterError for a file of which the autopilot's law knows no name, and which is not clearly its own."""
+    if known or parameter_origin("", entries).autopilot == autopilot:
+        return
+    names = ", ".join(list(entries)[:_SHOWN_NAMES])
+    allowed = f"a parameter file of {TITLES[autopilot]} is expected"
+    message = f"{path}: {names}: no name that {_MODELS[autopilot]}'s law knows: {allowed}"
+    raise ParameterError(message, file=path, value=names, allowed=allowed)
+
+
+def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
+    """Make the error of a file that was written for another autopilot than the one that is to fly."""
+    because = f" ({evidence})" if evidence else ""
+    allowed = f"{_MODELS[flying]} is to fly: --autopilot-law {written_for} flies it by {_MODELS[written_for]}'s law"
+    message = f"{where}: written for {TITLES[written_for]}{because}, and {allowed}"
+    return ParameterError(message, file=where, field="autopilot", value=written_for, allowed=allowed)
+
+
+def _read(path: Path) -> str:
+    data = read_small_file(path, MAX_BYTES, "parameter", ParameterError)
+    return utf8_text(data, path, ParameterError)

@@ -1,0 +1,66 @@
+"""The autopilot of a flight: taken from its files, or compared with them where somebody names one."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from flight.autopilots.parameter_origin import ARDUPILOT, PX4, TITLES, other_autopilot, read_origin
+from flight.mission.items import Mission
+from world.errors import MissionError, ParameterError
+from world.scenario import Scenario, with_flight
+from world.scenario_tables import OWN_GUIDANCE
+
+
+def with_file_autopilot(scenario: Scenario, mission: Mission | None = None) -> Scenario:
+    """Return the scenario flown by the autopilot that its parameter file or its mission was written for.
+
+    An autopilot that somebody named stays, as planfly's own guidance does; where nothing says who flies, the scenario
+    stays as it is.  Raises ParameterError or MissionError for a file of another autopilot than the one that was named,
+    for two files of two autopilots, and for a parameter file with names of both.
+
+    >>> from world.scenario import load_scenario
+    >>> made = with_file_autopilot(load_scenario("paper-07"), Mission(None, (), autopilot="px4", source="field.plan"))
+    >>> made.flight.autopilot, made.flight.autopilot_from
+    ('px4', 'field.plan')
+    """
+    table = scenario.flight
+    steering = table.steering.autopilot
+    if steering == OWN_GUIDANCE:
+        return scenario
+    stated = "" if mission is None else mission.autopilot
+    named = table.autopilot is not None and table.autopilot_from is None
+    if not named and table.params is not None and table.autopilot is None:
+        scenario = _of_parameters(scenario, table.params)
+        table = scenario.flight
+    if mission is None or not stated:
+        return scenario
+    if table.autopilot is None:
+        return _taken(scenario, stated, mission.source)
+    if stated != table.autopilot and table.autopilot in TITLES:
+        if table.autopilot_from is None:
+            raise MissionError.from_error(other_autopilot(mission.source, stated, _FIRMWARE[stated], table.autopilot))
+        other = f"{table.autopilot_from} for {TITLES[table.autopilot]}"
+        allowed = "files of one autopilot are expected"
+        message = f"{mission.source}: written for {TITLES[stated]} ({_FIRMWARE[stated]}), and {other}: {allowed}"
+        raise MissionError(message, file=mission.source, field="autopilot", value=stated, allowed=allowed)
+    return scenario
+
+
+# As a .plan states it.
+_FIRMWARE = {ARDUPILOT: "firmwareType 3", PX4: "firmwareType 12"}
+
+
+def _of_parameters(scenario: Scenario, params: str) -> Scenario:
+    found = read_origin(Path(params))
+    if found.mixed:
+        allowed = "--autopilot-law names the autopilot that is to fly"
+        message = f"{params}: {found.evidence}: {allowed}"
+        raise ParameterError(message, file=params, field="autopilot", value=found.evidence, allowed=allowed)
+    return _taken(scenario, found.autopilot, params) if found.autopilot else scenario
+
+
+def _taken(scenario: Scenario, autopilot: str, file: str) -> Scenario:
+    """Return the scenario with an autopilot taken from a file; one that flies by default anyway is stated, too."""
+    params = scenario.flight.params
+    made = with_flight(scenario, autopilot=autopilot, params=params)
+    table = made.flight.model_copy(update={"autopilot_from": file})
+    return replace(made, spec=made.spec.model_copy(update={"flight": table}), flight=table)
