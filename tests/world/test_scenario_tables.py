@@ -133,6 +133,7 @@ def test_every_default() -> None:
             "airspeed_mps": None,
             "max_bank_deg": 30.0,
             "autopilot": None,
+            "autopilot_from": None,
             "params": None,
             "px4_version": None,
             "guidance": None,
