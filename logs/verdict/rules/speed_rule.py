@@ -66,12 +66,13 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
                 text = f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s"
                 said += [text] if requirements.envelope else []
                 faults += [] if requirements.envelope else [message(text)]
-            if not faults and (unheld := _unheld(requirements, aligned, leg, commanded)):
+            wanted = _taken(requirements, leg)
+            if not faults and (unheld := _unheld(requirements, aligned, leg, wanted)):
                 # The speed that was flown is judged by its command, and no longer the command by the envelope.
                 mean, allowed, source = unheld.speed, unheld.allowed, "mission"
-                limit = commanded + math.copysign(allowed, mean - commanded)
-                margin, tolerance = allowed - abs(mean - commanded), unheld.tolerance
-                faults.append(message(f"{mean:.1f} m/s held of the commanded {commanded:.1f} m/s"))
+                limit = wanted + math.copysign(allowed, mean - wanted)
+                margin, tolerance = allowed - abs(mean - wanted), unheld.tolerance
+                faults.append(message(f"{mean:.1f} m/s held of the commanded {wanted:.1f} m/s"))
         facts.append(Fact("speed error", mean - commanded, "m/s"))
     ok: bool | None = not faults
     check = ""
@@ -95,6 +96,14 @@ def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: i
         check=check,
         facts=facts,
     )
+
+
+def _taken(requirements: RouteRequirements, leg: int) -> float:
+    """Return the airspeed that the autopilot takes on a leg, m/s: another one where it does not take the command."""
+    setup = requirements.setup
+    asked = setup.route.airspeed
+    taken = setup.autopilot.speeds_flown(asked, setup.airspeed)
+    return float(requirements.route.airspeed[leg] * taken[leg] / asked[leg])
 
 
 class _HeldSpeed(NamedTuple):
