@@ -19,7 +19,8 @@ UNKNOWN_AIRCRAFT = "unknown aircraft"
 UNKNOWN_WAY = "unknown way"
 # And of a way from the ground or to it that may not be free.
 GROUND_WAY = "ground way"
-# And of an item that changes the flight path and is not flown as the autopilot would.
+# And of an item that changes the flight path and is not flown as the autopilot would, or of parameters that contradict
+# one another, where nothing is flown.
 NOT_FLOWN = "not flown"
 # And of returns or glides that a scenario requires, which are not known well enough.
 UNKNOWN_RETURN = "unknown return"

@@ -186,7 +186,7 @@ def summary_lines(
     lines = [own.headline, *_whose_fault(levels, deciding, setup)]
     lines.append(f"Start: {setup.started}" if setup.started else "Start: not stated")
     lines += [*condition_lines(conditions), autopilot_line(conditions, flown=level == "flown")]
-    lines += _parameter_lines(setup) if level == "flown" else []
+    lines += _parameter_lines(setup, flown=level == "flown")
     lines += _unheeded_lines(setup)
     silent: dict[str, str] = {}
     for item in findings:
@@ -234,11 +234,17 @@ def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | No
     return [f"The aircraft can, {setup.autopilot.title}{whose} cannot{why}"]
 
 
-def _parameter_lines(setup: FlightSetup) -> list[str]:
-    """Where the parameters are from, if a file states any, and which of the file's have no use here."""
+def _parameter_lines(setup: FlightSetup, *, flown: bool) -> list[str]:
+    """Return where the parameters are from, if a file states any, and which of the file's have no use here.
+
+    Without a flight only what is wrong with the file is said.
+    """
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
         return []
+    misfits = [f"Parameters that do not fit: {'; '.join(parameters.misfits)}"] if parameters.misfits else []
+    if not flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
+        return misfits
     names = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
     # A name that is too long is a mistake in the file, and the others belong to other hardware.
     by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
@@ -256,7 +262,7 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
         f" {names['default']} {setup.autopilot.title}'s defaults{said}",
-        *(f"Parameters that do not fit: {'; '.join(parameters.misfits)}" for _ in parameters.misfits[:1]),
+        *misfits,
     ]
 
 

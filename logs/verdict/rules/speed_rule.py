@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import NOT_FLOWN, UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Margin, Rule, located
 from logs.verdict.suggestions import fly_level_speed
 from logs.verdict.tolerances import (
@@ -36,7 +37,18 @@ def speed_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge each leg's commanded airspeed by the envelope, and say what was flown."""
-    return [_speed(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
+    found = [_speed(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
+    return [*_misfits(requirements), *found] if geometric else found
+
+
+def _misfits(requirements: RouteRequirements) -> list[Finding]:
+    """Leave open whether an airspeed is held with parameters that contradict one another: only a flight tells."""
+    parameters = requirements.setup.autopilot.parameters
+    if parameters is None or not parameters.misfits or requirements.setup.source is not None:
+        return []
+    more = f" (+{len(parameters.misfits) - 1} more)" if len(parameters.misfits) > 1 else ""
+    fault = message(f"{parameters.misfits[0]}{more}", ": only a flight tells which airspeed is held")
+    return [make_finding("speed", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)]
 
 
 def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:

@@ -147,3 +147,15 @@ def test_a_speed_that_is_taken_up_late_is_held() -> None:
     for until, ok in ((1300.0, True), (2500.0, False)):
         track = fly_path(setup, airspeed=lambda s, until=until: -8.0 * (s < until))
         assert of(judge(setup, track), "speed", leg(0)).ok is ok
+
+
+def test_parameters_that_do_not_fit_are_open_without_a_flight() -> None:
+    """TRIM_THROTTLE 60 below THR_MIN 74: the throttle never comes down to what the airspeed needs."""
+    made = make_setup(STRAIGHT)
+    for values, open_ in (({"THR_MIN": 74.0, "TRIM_THROTTLE": 60.0}, True), ({"THR_MIN": 40.0}, False)):
+        parameters = replace(default_parameters().changed(AIRSPEED_MAX=32.0, **values), source="a.param")
+        setup = replace(made, autopilot=ArduPlane(parameters))
+        verdict = judge_geometry(setup)
+        assert verdict.undecided is open_, verdict.summary
+        assert ("TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the file" in verdict.headline) is open_
+        assert not judge(setup, fly_path(setup)).undecided
