@@ -108,6 +108,7 @@ def plan_then_fly(scenario: Scenario, *, seed: int | None = None, log: Path | No
     airframe = load_airframe(scenario)
     plan = make_plan(scenario, airframe, number)
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+    mission = replace(mission, autopilot=airframe.autopilot.name)
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan, planned_for(scenario, airframe)))
     setup = make_setup(scenario, airframe, mission, number, plan=plan)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.findings import NOT_FLOWN, UNKNOWN_AIRCRAFT, Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -23,6 +23,7 @@ from logs.verdict.tolerances import (
     LEVEL,
     MEASURED_SHARE,
     OFF_MEAN,
+    PLAN_TOLERANCE,
     SATURATED,
     SLOWEST,
     TAKE_UP,
@@ -132,9 +133,11 @@ class _HeldSpeed(NamedTuple):
 def _unheld(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float) -> _HeldSpeed | None:
     """Return the airspeed over the second half of a leg's steady rows if it is far from its command; None if not.
 
-    In the first half an autopilot may still take up its speed.  Of an imported flight it is a fact only: its airspeed
-    sensor may be as far off.
+    In the first half an autopilot may still take up its speed.  Where the leg is too steep for the aircraft, the rule
+    `slope` names the cause.  Of an imported flight it is a fact only: its airspeed sensor may be as far off.
     """
+    if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE:
+        return None
     rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]
     if requirements.setup.source is not None or time.size < 2 or 0.5 * float(time[-1] - time[0]) < SATURATED:
@@ -263,7 +266,7 @@ RULE = Rule(
     margin=Margin("airspeed", "m/s", 1.0),
     tolerances=(
         *("ACCELERATION", "GUST_SHARE", "GUST_SIGMAS", "GUST_TIME", "HELD_SPEED_SHARE", "LEAST_GROUND_SPEED", "LEVEL"),
-        *("MEASURED_SHARE", "OFF_MEAN", "SATURATED", "SLOWEST", "TAKE_UP", "UNDECIDED"),
+        *("MEASURED_SHARE", "OFF_MEAN", "PLAN_TOLERANCE", "SATURATED", "SLOWEST", "TAKE_UP", "UNDECIDED"),
     ),
     judge=speed_findings,
     suggest=fly_level_speed,

@@ -159,3 +159,11 @@ def test_parameters_that_do_not_fit_are_open_without_a_flight() -> None:
         assert verdict.undecided is open_, verdict.summary
         assert ("TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the file" in verdict.headline) is open_
         assert not judge(setup, fly_path(setup)).undecided
+
+
+def test_a_leg_that_is_too_steep_fails_by_its_slope_alone() -> None:
+    """20 degrees of climb, and 5 m/s less than commanded, as an aircraft flies it at full throttle."""
+    setup = make_setup([[0, 0, 300], [0, 3000, 1392]])
+    verdict = judge(setup, fly_path(setup, airspeed=lambda s: 0.0 * s - 5.0))
+    assert of(verdict, "slope", leg(0)).ok is False
+    assert of(verdict, "speed", leg(0)).ok is True
