@@ -19,7 +19,7 @@ ROUNDING = 0.02
 CLEARANCE_TOLERANCE = 0.1
 # m.  A waypoint further below home than this needs terrain: ground stations round home's altitude to whole metres.
 BELOW_HOME_M = 1.0
-# m.  The altitude of a mission's home may differ from the terrain there by this: an ellipsoid's height instead of one
+# m.  The altitude of a mission's home may be above the terrain there by this: an ellipsoid's height instead of one
 # above mean sea level, and what elevation files are off, come to less nearly everywhere that is flown at.
 HOME_ERROR_M = 50.0
 # m.  How far above the largest height above ground, or above the ceiling, a leg may rise: the same on steep ground.

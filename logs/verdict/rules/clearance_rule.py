@@ -36,7 +36,7 @@ def clearance_findings(
     near = _near_ground(requirements)
     legs, points = requirements.path.legs, requirements.path.points
     low, _ = path_clearance(ground.heights, ground.to_pixel.record, points)
-    out = _home_off_ground(requirements, ground)
+    out = []
     for leg in range(requirements.legs):
         asked = _Asked(limit, near.get(leg, ()))
         of_leg = np.flatnonzero(legs == leg)
@@ -46,7 +46,7 @@ def clearance_findings(
         else:
             short = planned < least - CLEARANCE_TOLERANCE
             out.append(_flown_clearance(requirements, aligned, leg, planned, asked, planned_short=short))
-    return out
+    return [*_home_above_ground(requirements, ground, out), *out]
 
 
 def _below_home(requirements: RouteRequirements) -> list[Finding]:
@@ -64,20 +64,24 @@ def _below_home(requirements: RouteRequirements) -> list[Finding]:
     return [make_finding("clearance", place, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 
-def _home_off_ground(requirements: RouteRequirements, ground: Terrain) -> list[Finding]:
-    """Leave a route over home open if the home of the file is not on the ground, where an autopilot takes it."""
+def _home_above_ground(requirements: RouteRequirements, ground: Terrain, legs: list[Finding]) -> list[Finding]:
+    """Leave a route over home open if it is too low once home is on the ground, where an autopilot takes it.
+
+    legs: the findings of the legs.
+    """
     setup = requirements.setup
     home = setup.mission.home
     if home is None or setup.plan is not None or not any(item.frame in OVER_HOME for item in setup.mission.items):
         return []
     east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
     above = home.alt - float(ground.height(float(east), float(north)))
-    # Written so that NaN, where the terrain does not reach, says nothing.
-    if not abs(above) > HOME_ERROR_M:
+    # NaN, where the terrain does not reach, says nothing.
+    if not above > HOME_ERROR_M or not any(one.margin is not None and 0.0 <= one.margin < above for one in legs):
         return []
-    word = "above" if above > 0.0 else "below"
-    brief = f"the mission's home is {abs(above):.0f} m {word} the ground there"
-    fault = message(brief, ": an autopilot that is armed on that ground flies all heights over home as much off")
+    least = min(one.margin + (one.limit or 0.0) for one in legs if one.margin is not None) - above
+    brief = f"the mission's home is {above:.0f} m above the ground there"
+    more = f": armed on that ground, an autopilot flies as much lower, down to {least:.0f} m above ground"
+    fault = message(brief, more)
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
 
 

@@ -71,11 +71,15 @@ def test_a_route_below_home_is_open_where_no_terrain_is_given(alt: float, open_:
     assert judge_geometry(at_home(made, min(alt, 40.0))).flyable
 
 
-@pytest.mark.parametrize(("alt", "open_"), [(49.9, False), (50.1, True), (-49.9, False), (-50.1, True)])
+@pytest.mark.parametrize(
+    ("alt", "up", "open_"), [(49.9, 75.0, False), (50.1, 75.0, True), (50.1, 85.0, False), (-60.0, 75.0, False)]
+)
 @pytest.mark.parametrize("frame", [0, 3])
-def test_a_home_off_the_ground_leaves_heights_over_it_open(alt: float, open_: bool, frame: int) -> None:
-    """The ground is at 0 m AMSL; heights above mean sea level do not count from home."""
-    setup = at_home(make_setup(over(100.0)), alt, frame)
+def test_heights_over_a_home_above_the_ground_are_open_where_they_are_too_low_from_the_ground(
+    alt: float, up: float, open_: bool, frame: int
+) -> None:
+    """The ground is at 0 m AMSL, and 30 m above it are required; only frame 3 counts from home."""
+    setup = at_home(make_setup(over(up), limits={"min_clearance_m": 30.0}), alt, frame)
     for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
         assert verdict.undecided is (open_ and frame == 3)
         assert not verdict.failed
