@@ -86,8 +86,8 @@ wheels: $(TESTED)
 LOWEST := --constraint constraints-low.txt
 low: SET := $(LOWEST)
 newest: SET := --upgrade
-# Third-party clients are no part of these environments: what needs one is left out, in CI too.
-low newest: export CI :=
+# Third-party clients are no part of these environments: what needs one is left out, under .ci/run too.
+low newest: export PLANFLY_NEED_CLIENTS :=
 low newest:
 	$(PYTHON) -m venv build/$@
 	build/$@/bin/python -m pip install --quiet $(SET) --editable '.[campaigns,gdal,live,tables]' hypothesis pytest pytest-xdist trimesh

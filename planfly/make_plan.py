@@ -9,8 +9,8 @@ from flight.mission.fences import fence_zones
 from flight.mission.field_notes import field_notes
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
-from flight.mission.placing import PlacedMission
-from flight.mission.route import lay_route, make_route, with_end_courses
+from flight.mission.placing import PlacedMission, place_stops
+from flight.mission.route import lay_route, with_end_courses
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FDM_HZ, FlightSetup
 from logs.verdict.conditions import Conditions, conditions_of
@@ -129,11 +129,9 @@ def make_setup(
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
     autopilot = airframe.autopilot
     mission = replace(mission, autopilot=autopilot.name)
-    laws = autopilot.return_rules, autopilot.loiter_rules, autopilot.reads_as_px4
     if placed is None:
-        route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits, *laws)
-    else:
-        route = lay_route(placed, airspeed, fly_over, limits, *laws)
+        placed = place_stops(mission, scenario.origin, scenario.terrain)
+    route = lay_route(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
     stated = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
     notes = field_notes(mission, route, scenario, autopilot.return_rules, stated)

@@ -25,6 +25,7 @@ from aircraft.tracking import TrackingError
 from flight.mission.ground_ways import GroundWays
 from flight.mission.loiter_circles import USUAL_LOITERS, LoiterRules
 from flight.mission.return_path import USUAL_RULES, ReturnRules
+from flight.mission.route import RouteRules
 from world.errors import ScenarioError
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Guidance, Navigation
@@ -363,6 +364,11 @@ class Autopilot(ABC):
         return self.acceptance_radius is None
 
     @property
+    def follows_ground(self) -> bool:
+        """True if it follows the ground along a leg to a height above terrain."""
+        return True
+
+    @property
     def keeps_to_arcs(self) -> bool:
         """Whether how closely it passes a waypoint tells the radius of its turn."""
         return True
@@ -440,6 +446,12 @@ class Autopilot(ABC):
     def loiter_rules(self) -> LoiterRules:
         """How it flies loiters: how wide where the mission does not say, how it joins and leaves them."""
         return USUAL_LOITERS
+
+    @property
+    def route_rules(self) -> RouteRules:
+        """How it flies the route of a mission."""
+        turn_distance = None if self.follows_path else self.turn_distance
+        return RouteRules(self.return_rules, self.loiter_rules, self.reads_as_px4, turn_distance)
 
     @property
     def mission_checks(self) -> MissionChecks:

@@ -33,6 +33,11 @@ class ProgramAutopilot(Autopilot):
     # Whatever its law does: unless its own class says otherwise, a program is put into the air on a rail.
     flies_ground: ClassVar[bool] = False
 
+    @property
+    def follows_ground(self) -> bool:
+        """False: heights above terrain are sent to a program as altitudes above sea level."""
+        return False
+
     @classmethod
     @abstractmethod
     def flying(cls, law: Any, binary: Path) -> Self:

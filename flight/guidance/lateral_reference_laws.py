@@ -36,6 +36,8 @@ WAYPOINT = record_dtype(
     ("ends", np.bool_),  # whether the mission ends there and goes no further: not to land, not home
     ("straight", np.bool_),  # whether the leg to it leads from wherever the aircraft is, along no line
     "slope_base",  # m, as of `flight.mission.return_path.ReturnCircle`
+    ("over_ground", np.bool_),  # whether the leg to it follows the ground
+    "above_ground",  # m, height above ground at the end of such a leg
 )
 
 

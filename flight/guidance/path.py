@@ -16,9 +16,10 @@ from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import loiter_of
-from flight.mission.route import Route, goes_no_further
+from flight.mission.route import SHARPEST_FLY_BY, Route, goes_no_further
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
 from world.kernels import Record, compiled, inner, record_dtype
+from world.terrain import Terrain
 
 Records = NDArray[np.record]
 Floats = NDArray[np.float64]
@@ -92,6 +93,20 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  
 
 
 @inner
+def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:  # pragma: no cover - compiled
+    """Move on in the memory behind sharp corners to the leg that an autopilot has turned to.
+
+    It may turn back before it passes the end of the leg before.  The others are as `find_on_path` takes them.
+    """
+    while memory.piece + 1 < pieces.shape[0] and pieces[memory.piece].leg < leg:
+        piece, following = pieces[memory.piece], pieces[memory.piece + 1]
+        is_corner = piece.curvature == 0.0 and following.curvature == 0.0
+        if not is_corner or math.cos(following.course - piece.course) >= 0.0:
+            return
+        memory.piece += 1
+
+
+@inner
 def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
     """Mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
     total = 0.0
@@ -137,9 +152,6 @@ def profile(nodes: Records, s: float) -> tuple[float, float, float]:  # pragma: 
     return node.height + node.slope * (s - node.distance), node.slope, 0.0
 
 
-# Where the legs are too short for a turn sharper than this, its corner stays: a tighter arc would cut the waypoint off
-# by most of the legs, and a U-turn has no arc at all.
-SHARPEST = math.radians(150.0)
 # Chords of an arc turn by at most this, rad.
 CHORD = math.radians(5.0)
 
@@ -163,8 +175,16 @@ class FlyByPath:
         self.nodes.setflags(write=False)
 
 
-def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
+# Corners of the height profile along a leg that follows the ground are this far apart, m: ArduPlane's TERRAIN_SPACING.
+GROUND_STEP_M = 100.0
+
+
+def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, *, swings: bool = True) -> FlyByPath:
     """Join the legs of a route.  The route has at least one leg; only the first may have no length.
+
+    An arc leads by each waypoint; behind one that is flown over, arcs lead back to the next leg.
+    terrain: what legs follow that are flown above ground; None flies them straight.
+    swings: False leaves such corners sharp, as the reference of an autopilot that turns by a law of its own.
 
     A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
 
@@ -181,7 +201,8 @@ def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
     """
     points = route.waypoints
     courses, runs, turns = leg_courses(points), leg_runs(points), signed_turns(points)
-    tangents, radii = _arcs(route, limits, courses, runs, turns)
+    tangents, radii, back = _arcs(route, limits, courses, runs, turns)
+    back *= swings
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
     # A circle that the flight begins on may end where it begins.
@@ -189,41 +210,80 @@ def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
     at = 0.0
     begin = points[0, :2].copy()
     for leg in range(route.legs):
-        straight = runs[leg] - tangents[leg] - tangents[leg + 1]
+        straight = runs[leg] - tangents[leg] - back[leg] - tangents[leg + 1]
         course = float(courses[leg])
+        if terrain is not None and math.isfinite(route.above_ground[leg + 1]):
+            nodes += _above_ground(route, terrain, leg, begin, course, at, straight)
         if straight > 1e-6 or not pieces:
             pieces.append((at, straight, *begin, course, 0.0, leg, math.inf))
             at += straight
         corner = points[leg + 1]
         begin = corner[:2] - tangents[leg + 1] * np.array([math.sin(course), math.cos(course)])
-        entry = float(corner[2] - slopes[leg] * tangents[leg + 1])
-        nodes.append((at, entry))
-        if leg + 1 == route.legs or tangents[leg + 1] == 0.0:
+        nodes.append((at, float(corner[2] - slopes[leg] * tangents[leg + 1])))
+        if leg + 1 == route.legs:
             continue
-        turn = float(turns[leg])
+        turn, after = float(turns[leg]), float(courses[leg + 1])
+        if back[leg + 1] > 0.0:
+            # Through the waypoint, and back to the next leg on arcs.
+            for place, heading, curvature, length in _swing(corner[:2], course, turn, radii[leg + 1]):
+                pieces.append((at, length, *place, heading, curvature, leg + 1, math.inf))
+                at += length
+            begin = corner[:2] + back[leg + 1] * np.array([math.sin(after), math.cos(after)])
+            nodes.append((at, float(corner[2] + slopes[leg + 1] * back[leg + 1])))
+            continue
+        if tangents[leg + 1] == 0.0:
+            continue
         length = radii[leg + 1] * abs(turn)
         pieces.append((at, length, *begin, course, math.copysign(1.0 / radii[leg + 1], turn), leg, at + length / 2))
         at += length
-        after = float(courses[leg + 1])
         begin = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
         nodes.append((at, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
     return FlyByPath(np.array(pieces, PIECE), _profile(nodes, limits, route), float(at))
 
 
-def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats) -> tuple[Floats, Floats]:
-    """Tangent lengths and radii at each waypoint, (w,) m, shrunk where a leg is too short for them."""
+def _above_ground(
+    route: Route, terrain: Terrain, leg: int, begin: Floats, course: float, at: float, straight: float
+) -> list[tuple[float, float]]:
+    """Return corners (distance along the path, altitude; m) of the height profile of a leg that follows the ground.
+
+    The height above ground changes evenly from its value at the leg's start to the value that is asked for.
+    begin: (2,) m, where the leg's straight part begins, at a distance along the path (m).  straight: its length, m.
+    """
+    first, end = route.waypoints[leg], float(route.above_ground[leg + 1])
+    start = float(first[2]) - float(terrain.height(first[0], first[1]))
+    if not math.isfinite(start):
+        start = end
+    corners = []
+    for along in np.arange(0.5 * GROUND_STEP_M, straight - 0.5 * GROUND_STEP_M, GROUND_STEP_M).tolist():
+        east, north = begin[0] + along * math.sin(course), begin[1] + along * math.cos(course)
+        share = math.hypot(east - first[0], north - first[1]) / math.dist(first[:2], route.waypoints[leg + 1, :2])
+        ground = float(terrain.height(east, north))
+        if math.isfinite(ground):
+            corners.append((at + along, ground + start + share * (end - start)))
+    return corners
+
+
+def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the arcs at each waypoint, (w,) m each.
+
+    They are the tangent lengths of fly-by arcs, shrunk where a leg is too short for them; the radii; and, for waypoints
+    that are flown over, the length of the next leg until the path is back on it, 0 where that leg is too short.
+    """
     count = len(route.waypoints)
-    tangents, radii = np.zeros(count), np.zeros(count)
+    tangents, radii, back = np.zeros(count), np.zeros(count), np.zeros(count)
     for i in range(1, count - 1):
         turn = abs(float(turns[i - 1]))
-        if route.fly_over[i] or turn < 1e-6:
+        if turn < 1e-6:
             continue
         speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
         radius = float(route.arcs[i]) or limits.turn_radius(
             float(courses[i - 1]), float(courses[i]), float(route.waypoints[i, 2]), speed
         )
-        tangents[i] = tangent_length(turn, radius)
-    sharp = np.concatenate([[False], np.abs(turns) > SHARPEST, [False]])
+        if not route.fly_over[i]:
+            tangents[i] = tangent_length(turn, radius)
+        elif math.isfinite(radius):
+            radii[i], back[i] = radius, radius * (math.sin(turn) + 2.0 * math.sin(_overshoot_angle(turn)))
+    sharp = np.concatenate([[False], np.abs(turns) > SHARPEST_FLY_BY, [False]])
     short = tangents[:-1] + tangents[1:] > runs
     tangents[sharp & (np.append(short, False) | np.append(False, short))] = 0.0
     # Where the wind leaves no way along a leg there is no radius; the longest that fits is drawn.
@@ -237,7 +297,32 @@ def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Fl
             tangents[leg + 1] = min(tangents[leg + 1], wanted[leg + 1] * share)
     drawn = np.flatnonzero(tangents)
     radii[drawn] = tangents[drawn] / np.tan(np.abs(turns[drawn - 1]) / 2)
-    return tangents, radii
+    # A leg that is too short for its path back keeps its corner.
+    back[:-1][back[:-1] + tangents[1:] > runs] = 0.0
+    return tangents, radii, back
+
+
+def _overshoot_angle(turn: float) -> float:
+    """Return the angle by which a fly-over turn (rad) goes beyond the next leg's course, cos phi = (1 + cos turn)/2."""
+    return math.acos(0.5 * (1.0 + math.cos(turn)))
+
+
+def _swing(corner: Floats, course: float, turn: float, radius: float) -> list[tuple[Floats, float, float, float]]:
+    """Return the arcs of a fly-over turn: start (2,) m, course there (rad), curvature (1/m), length (m).
+
+    Two arcs turn beyond the next leg's course, each by less than `flight.guidance.path.project` can tell from a turn
+    the other way, and the third leads back onto that leg.
+    turn: rad, positive to the right.
+    """
+    side, beyond = math.copysign(1.0, turn), _overshoot_angle(abs(turn))
+    half = 0.5 * (abs(turn) + beyond)
+    arcs, place, heading = [], corner, course
+    for angle, towards in ((half, side), (half, side), (beyond, -side)):
+        arcs.append((place, heading, towards / radius, radius * angle))
+        end = heading + towards * angle
+        step = math.cos(heading) - math.cos(end), math.sin(end) - math.sin(heading)
+        place, heading = place + towards * radius * np.array(step), end
+    return arcs
 
 
 def _profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
@@ -259,16 +344,21 @@ def _profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -
     return nodes
 
 
-def waypoint_records(route: Route, mission: Mission | None = None) -> Records:
-    """(w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last one has its leg's airspeed before it.
+def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: bool = False) -> Records:
+    """Return the (w,) records of `flight.guidance.lateral_reference_laws.WAYPOINT`.
 
-    mission: that the route is of, which states how its loiters end; None counts them all by their turns.
+    The last waypoint has the airspeed of the leg before it.
+    mission: the route's, which states how its loiters end; None ends them all by their turns.
+    fly_over: True if the scenario asks the autopilot to fly over waypoints without an acceptance radius.
     """
     waypoints: Records = np.zeros(len(route.waypoints), WAYPOINT)
     waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
     waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))
-    # A stated radius is what switches legs; only where there is none is a fly-over waypoint passed through.
-    waypoints["fly_over"], waypoints["acceptance"] = route.fly_over & (route.acceptance == 0.0), route.acceptance
+    # An acceptance radius that the mission states switches legs, whatever the scenario asks for.
+    waypoints["fly_over"] = fly_over & (route.acceptance == 0.0) & (route.arcs == 0.0)
+    waypoints["acceptance"] = route.acceptance
+    waypoints["over_ground"] = np.isfinite(route.above_ground)
+    waypoints["above_ground"] = np.nan_to_num(route.above_ground)
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
     waypoints["up"] = route.waypoints[:, 2]
     waypoints["item"], waypoints["stop"] = route.items, route.stops

@@ -18,7 +18,6 @@ from flight.mission.items import (
     JUMPS,
     LANDINGS,
     OVER_HOME,
-    OVER_TERRAIN,
     PLACES,
     TAKEOFFS,
     Frame,
@@ -528,8 +527,6 @@ class _Walk:
             self.leave_open(f"{name}: flown through as a waypoint", item.seq)
         if math.isnan(item.alt):
             self.notes.add(f"{name} without an altitude: keeps the last height", item.seq)
-        elif item.frame in OVER_TERRAIN:
-            self.notes.add("height above terrain: held at the waypoint, the legs between are straight", item.seq)
         radius = item.params[1] if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) else 0.0
         self.stops.append(self._stop(item, radius if radius > 0.0 else 0.0))
 

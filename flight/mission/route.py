@@ -1,16 +1,17 @@
 """A mission as the aircraft flies it: world-frame waypoints with speeds, jumps unrolled."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
-from flight.mission.items import LANDINGS, PLACES, Command, Mission, Notes, command_name
+from flight.mission.items import LANDINGS, OVER_TERRAIN, PLACES, Command, Mission, Notes, command_name
 from flight.mission.itinerary import NEVER_REACHED, Itinerary, ItineraryStop, OpenItem, loiter_of
 from flight.mission.loiter_circles import (
     PLAIN_SLOPE,
@@ -51,7 +52,7 @@ class Route:
     waypoints: (w, 3) east, north, up, m.
     airspeed: (w - 1,) m/s on each leg.
     acceptance: (w,) m, 0 where the mission states none (advisory: the verdict has its own rule).
-    fly_over: (w,) bool, whether the waypoint is flown through instead of by.
+    fly_over: (w,) bool, True where the path goes through the waypoint and turns behind it, and not by it on an arc.
     items: (w,) the mission item's seq, -1 for a point that is no item.
     started: a sentence for people: where and how the flight starts.
     notes: what cannot be flown as written, with item numbers.
@@ -69,6 +70,8 @@ class Route:
         another stop of the same item.  Where it is not given, waypoints of one item in a row are one.
     unjoined: stops that whoever flies goes to, and that the waypoints lack, for no tangent joins them to a circle.
     open_items: items that change the flight path, and that are not flown as the autopilot would.
+    above_ground: (w,) m, the height above ground that is held along the leg to the waypoint; NaN where the leg is
+        straight.
     """
 
     waypoints: Floats
@@ -88,6 +91,7 @@ class Route:
     stops: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     unjoined: tuple[Unjoined, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
+    above_ground: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -96,7 +100,9 @@ class Route:
         if len(self.stops) != len(self.waypoints):
             changes = np.flatnonzero((np.diff(self.items) != 0) | (self.items[1:] < 0))
             object.__setattr__(self, "stops", np.searchsorted(changes, np.arange(len(self.items))))
-        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops"):
+        if len(self.above_ground) != len(self.waypoints):
+            object.__setattr__(self, "above_ground", np.full(len(self.waypoints), math.nan))
+        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs", "stops", "above_ground"):
             array = np.array(getattr(self, name))
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -151,6 +157,7 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
         items=route.items[points],
         arcs=route.arcs[points],
         stops=route.stops[points],
+        above_ground=route.above_ground[points],
         endless=-1,
         takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
         landing_ground=route.landing_ground if last == route.legs else math.nan,
@@ -161,16 +168,47 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
 
 
 # ----------------------------------------------------------------------
-# Which waypoints a fly-by arc would miss: by more than the acceptance radius that the mission states there.
+# The waypoints that a path goes through, because the fly-by arc would pass them too far away.
 
 
-def arc_misses(points: Floats, airspeed: Floats, acceptance: Floats, limits: Limits | None) -> NDArray[np.bool_]:
-    """Whether the arc at the bank limit passes each waypoint beyond its acceptance radius, (w,).
+class RouteRules(NamedTuple):
+    """How an autopilot flies the route of a mission.
 
-    points: (w, 3) m.  airspeed: (w - 1,) m/s.  acceptance: (w,) m, 0 where none is stated, which no arc misses.
-    limits: None where they are not known, and so no arc.
-    A corner of ``turn`` is passed at R(1/cos(turn/2) - 1): at 25 m/s and 30 degrees of bank, R is 110 m, by 46 m at 90
-    degrees, and by 110 m at 120.
+    returns: its returns to launch.
+    loiters: its loiters.
+    reads_as_px4: True if it reads nothing but the value of a change of speed, and reads gates, as PX4 does.
+    turn_distance: distance before a waypoint at which it turns to the next leg, m, by the turn (rad, positive) and the
+        waypoint's altitude (m AMSL); None for guidance that follows the fly-by path.
+    """
+
+    returns: ReturnRules = USUAL_RULES
+    loiters: LoiterRules = USUAL_LOITERS
+    reads_as_px4: bool = False
+    turn_distance: Callable[[float, float], float] | None = None
+
+
+# Rules of guidance that follows the fly-by path.
+USUAL_ROUTE_RULES = RouteRules()
+# Guidance that follows the path flies over a waypoint with a sharper turn than this, rad: at 150 degrees the fly-by arc
+# begins 3.7 radii before the waypoint and passes 2.9 radii from it, and at 180 degrees it never comes near.
+SHARPEST_FLY_BY = math.radians(150.0)
+
+
+def fly_over_waypoints(
+    points: Floats,
+    airspeed: Floats,
+    acceptance: Floats,
+    limits: Limits | None,
+    turn_distance: Callable[[float, float], float] | None = None,
+) -> NDArray[np.bool_]:
+    """Return which waypoints the path goes through, since the fly-by arc at the bank limit would miss them, (w,).
+
+    points: (w, 3) m.  airspeed: (w - 1,) m/s.  acceptance: (w,) m, 0 where the mission states none.
+    limits: None where they are not known, and so no arc.  turn_distance: as of `RouteRules`.
+    An arc that turns by ``turn`` passes its waypoint at R(1/cos(turn/2) - 1).  At 25 m/s and 30 degrees of bank R is
+    110 m: it passes a corner of 90 degrees at 46 m, one of 120 degrees at 110 m, and one of 174 degrees at 2 km.  The
+    arc misses the waypoint where that is more than the acceptance radius which the mission states, or else more than
+    the autopilot's own distance before the waypoint; it flies on to there before it turns.
 
     >>> from types import SimpleNamespace
     >>> from aircraft.path_limits import PerformanceTable
@@ -178,19 +216,32 @@ def arc_misses(points: Floats, airspeed: Floats, acceptance: Floats, limits: Lim
     >>> table = PerformanceTable(25.0, 0.57735, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, nothing, nothing)
     >>> limits = SimpleNamespace(performance=lambda airspeed: table)
     >>> corner = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 500.0]])
-    >>> [arc_misses(corner, np.full(2, 25.0), np.array([0.0, m, 0.0]), limits).tolist()[1] for m in (0.0, 45.0, 46.0)]
+    >>> def is_flown_over(acceptance, turn_distance=None):
+    ...     radii = np.array([0.0, acceptance, 0.0])
+    ...     return bool(fly_over_waypoints(corner, np.full(2, 25.0), radii, limits, turn_distance)[1])
+    >>> [is_flown_over(acceptance) for acceptance in (0.0, 45.0, 46.0)]
     [False, True, False]
+    >>> [is_flown_over(0.0, lambda turn, amsl: distance) for distance in (10.0, 90.0)]
+    [True, False]
     """
     out = np.zeros(len(points), dtype=np.bool_)
     if limits is None:
         return out
     courses, turns = leg_courses(points), np.abs(signed_turns(points))
     tables = {float(speed): limits.performance(float(speed)) for speed in set(airspeed.tolist())}
-    for i in np.flatnonzero(acceptance[1:-1] > 0.0) + 1:
+    for i in range(1, len(points) - 1):
+        turn = float(turns[i - 1])
         table = tables[float(max(airspeed[i - 1], airspeed[i]))]
-        radius = turn_radius_between(table, courses[i - 1], courses[i], points[i, 2])
+        radius = float(turn_radius_between(table, courses[i - 1], courses[i], points[i, 2]))
         # Where the wind leaves no way along a leg there is no arc to miss with.
-        out[i] = np.isfinite(radius) and fly_by_offset(float(turns[i - 1]), float(radius)) > acceptance[i]
+        if turn == 0.0 or not math.isfinite(radius):
+            continue
+        if acceptance[i] > 0.0:
+            out[i] = fly_by_offset(turn, radius) > acceptance[i]
+        elif turn_distance is None:
+            out[i] = turn > SHARPEST_FLY_BY
+        else:
+            out[i] = fly_by_offset(turn, radius) > turn_distance(turn, float(points[i, 2]))
     return out
 
 
@@ -250,6 +301,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
         items=np.pad(route.items, (head, tail), constant_values=-1),
         arcs=np.pad(route.arcs, (head, tail)),
+        above_ground=np.pad(route.above_ground, (head, tail), constant_values=math.nan),
         stops=np.concatenate([np.arange(head), route.stops + head, route.stops[-1:] + head + np.arange(1, tail + 1)]),
         started=started,
         return_from=route.return_from + (head if route.return_from >= 0 else 0),
@@ -289,19 +341,16 @@ def make_route(
     default_airspeed: float,
     fly_over: bool,
     limits: Limits | None = None,
-    rules: ReturnRules = USUAL_RULES,
-    loiters: LoiterRules = USUAL_LOITERS,
-    reads_as_px4: bool = False,
+    rules: RouteRules = USUAL_ROUTE_RULES,
 ) -> Route:
     """Route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
 
     terrain: None where none is known; heights above terrain are then an error.
     default_airspeed: m/s until the mission sets one (a `.plan` file's cruiseSpeed, a station's estimate, sets none).
-    fly_over: whether waypoints are flown through instead of by; one whose arc would miss its acceptance always is.
+    fly_over: True to fly over all waypoints; `fly_over_waypoints` names those that are flown over in any case.
     limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
         a spiral (5 %).
-    rules, loiters: how whoever flies returns to launch, and flies loiters.
-    reads_as_px4: whether nothing but the value of a change of speed is read, and gates are, as PX4 does.
+    rules: how the autopilot flies a route.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
     has a horizontal length of at least `flight.mission.placing.SAME_PLACE`.  Raises MissionError, naming the item, for
@@ -318,9 +367,7 @@ def make_route(
     >>> route.started
     'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
     """
-    return lay_route(
-        place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules, loiters, reads_as_px4
-    )
+    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
 
 
 def lay_route(
@@ -328,9 +375,7 @@ def lay_route(
     default_airspeed: float,
     fly_over: bool,
     limits: Limits | None = None,
-    rules: ReturnRules = USUAL_RULES,
-    loiters: LoiterRules = USUAL_LOITERS,
-    reads_as_px4: bool = False,
+    rules: RouteRules = USUAL_ROUTE_RULES,
 ) -> Route:
     """Route through the places of a mission; arguments as of `make_route`.
 
@@ -343,10 +388,11 @@ def lay_route(
     [25.0]
     """
     mission, notes = placed.mission, Notes()
+    returns, loiters, reads_as_px4, turn_distance = rules
     places = _with_gates(placed, notes) if reads_as_px4 else list(placed.stops)
     kept = [_with_airspeed(place, default_airspeed, reads_as_px4) for place in places]
     returning = kept.pop() if placed.itinerary.returns else None
-    straight = None if returning is None else _straight_to_land(placed, kept, rules, notes)
+    straight = None if returning is None else _straight_to_land(placed, kept, returns, notes)
     if straight is not None:
         kept += [_with_airspeed(place, default_airspeed, reads_as_px4) for place in straight.stops]
     lay = partial(_lay_circles, mission.source, limits, loiters, notes)
@@ -354,22 +400,22 @@ def lay_route(
     _note_circles(placed.itinerary, kept, loiters, notes)
     landing, back = straight, dict[str, Any]()
     if returning is not None and straight is None:
-        back, landing = _lay_return(placed, returning.stop, points, rules, limits, notes)
+        back, landing = _lay_return(placed, returning.stop, points, returns, limits, notes)
         if landing is not None:
             points += lay([_with_airspeed(place, default_airspeed, reads_as_px4) for place in landing.stops])[0]
-    if len(points) < 2:
-        raise _too_few(mission.source, len(points))
+    _refuse_fewer_than_two(mission.source, len(points))
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
     airspeed = np.array([stop.airspeed for stop in stops[1:]])
     acceptance = np.array([stop.acceptance for stop in stops])
     _note_cruise_speed(mission, default_airspeed, stops[1], notes)
+    over = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
     return Route(
         waypoints=waypoints,
         airspeed=airspeed,
         acceptance=acceptance,
-        fly_over=np.where(arcs > 0.0, False, fly_over | arc_misses(waypoints, airspeed, acceptance, limits)),
+        fly_over=(arcs == 0.0) & (fly_over | over),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_started(placed.itinerary, stops[0], placed.origin, waypoints),
         notes=_notes_of(placed.itinerary, landing, reads_as_px4) + placed.notes + notes.lines(),
@@ -379,15 +425,23 @@ def lay_route(
         endless=placed.itinerary.endless,
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground if landing is None else landing.ground,
+        above_ground=np.array([_held_above_ground(stop) for stop in stops]),
         unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents leaves these out.
         open_items=_open_of(placed.itinerary, landing, reads_as_px4),
         **back,
     )
 
 
-def _too_few(source: str, places: int) -> MissionError:
-    message = f"{source}: {places} place to fly to: at least two different ones are expected"
-    return MissionError(message, file=source)
+def _held_above_ground(stop: ItineraryStop) -> float:
+    """Return the height above ground that is held along the leg to a stop, m; NaN where the leg is straight."""
+    return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else math.nan
+
+
+def _refuse_fewer_than_two(source: str, places: int) -> None:
+    """Raise MissionError for a route of fewer than two places."""
+    if places < 2:
+        message = f"{source}: {places} place to fly to: at least two different ones are expected"
+        raise MissionError(message, file=source)
 
 
 def _notes_of(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px4: bool) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from flight.dynamics.trim import Trim
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.gains import Gains
 from flight.guidance.navigation_error import ERRORS, start_navigation
-from flight.guidance.path import waypoint_records
+from flight.guidance.path import fly_by_path, waypoint_records
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.start import Start, find_start, start_trimmed
@@ -77,8 +77,14 @@ class Airborne(ABC):
 
     def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
         """Make the workspace for a route, and say how long it may take."""
-        self.setup, self.path, self.map = setup, setup.path, local_map
-        waypoints = waypoint_records(setup.route, setup.mission)
+        self.setup, self.map = setup, local_map
+        # An autopilot that turns by a law of its own does not follow the arcs behind waypoints that are flown over.
+        follows = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
+        follows = follows or not setup.route.fly_over.any()
+        self.path = (
+            setup.path if follows else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, swings=False)
+        )
+        waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
         waypoints["ends"] &= setup.autopilot.loiter_rules.ends_in_circle
         self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])

@@ -227,7 +227,7 @@ class FlightSetup:
 
     def __post_init__(self) -> None:
         """Draw the path here, where it cannot differ from route and limits."""
-        object.__setattr__(self, "path", fly_by_path(self.route, self.limits))
+        object.__setattr__(self, "path", fly_by_path(self.route, self.limits, self.scenario.terrain))
 
     @property
     def envelope(self) -> Envelope:

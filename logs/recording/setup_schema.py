@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from aircraft.envelope import Envelope
 from flight.autopilots.autopilot import AutopilotProgram, Origin, ParameterValue, StoredParameters
 from flight.mission.items import Camera, Home, Mission, MissionItem, SurveyPlan
+from flight.mission.itinerary import OpenItem
 from flight.mission.loiter_circles import Unjoined
 from flight.mission.return_path import ReturnCircle
 from flight.mission.route import Route
@@ -138,6 +139,8 @@ class RouteTable(SetupModel):
     ] = None
     straight_to: Annotated[int, Field(ge=-1, alias="straight_to_waypoint")] = -1
     unjoined: Annotated[tuple[Unjoined, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
+    above_ground: Annotated[list[_Height], Field(alias="above_ground_m"), _LISTED] = []
+    open_items: Annotated[tuple[OpenItem, ...], Field(alias="open_items_item_text")] = ()
 
     def route(self, file: str) -> Route:
         """The route of the table.  Raises LogError for columns that do not fit, and for a leg without length."""
@@ -149,7 +152,7 @@ class RouteTable(SetupModel):
             "acceptance",
             "fly_over",
             "items",
-            *(name for name in ("arcs", "stops") if getattr(self, name)),
+            *(name for name in ("arcs", "stops", "above_ground") if getattr(self, name)),
         ):
             length, expected = len(getattr(self, field)), len(waypoints) - (field == "airspeed")
             if length != expected:
@@ -163,7 +166,9 @@ class RouteTable(SetupModel):
         circle = None if self.return_to is None else ReturnCircle(*self.return_to)
         items = np.array(self.items, dtype=np.int64)
         stops = np.array(self.stops, dtype=np.int64)
-        return _made(Route, self, waypoints=waypoints, items=items, stops=stops, return_to=circle, **known)
+        above = np.array([math.nan if height is None else height for height in self.above_ground])
+        columns = {"waypoints": waypoints, "items": items, "stops": stops, "above_ground": above}
+        return _made(Route, self, return_to=circle, **columns, **known)
 
 
 class EnvelopeTable(SetupModel):

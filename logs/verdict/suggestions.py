@@ -229,7 +229,10 @@ def _gentler_turn(requirements: RouteRequirements, i: int, allowed: float) -> fl
         route,
         waypoints=route.waypoints[first:last],
         airspeed=route.airspeed[first : last - 1],
-        **{name: getattr(route, name)[first:last] for name in ("acceptance", "fly_over", "items", "arcs")},
+        **{
+            name: getattr(route, name)[first:last]
+            for name in ("acceptance", "fly_over", "items", "arcs", "above_ground")
+        },
     )
     tables, at = performance_tables(near, requirements.limits), i - first
     for _ in range(TRIES):

@@ -36,8 +36,8 @@ SWING = 2.25
 # m.  A leg shorter than this is a climb on the spot, with no course of its own.
 ON_THE_SPOT = 0.5
 # rad.  A turn sharper than this has no useful tangent length; a U-turn's is infinite.  Between
-# legs that are too short guidance leaves out the arc of a turn beyond a smaller limit of its own, SHARPEST in
-# flight/guidance/path.py, which the turn rule takes from there.
+# legs that are too short guidance leaves out the arc of a turn beyond a smaller limit of its own, SHARPEST_FLY_BY in
+# flight/mission/route.py, which the turn rule takes from there.
 U_TURN = math.pi - 1e-6
 # Radii.  Largest fly-by offset that is taken of a turn, which is one of about 176 degrees.
 LARGEST_OFFSET = 30.0
@@ -148,6 +148,10 @@ ROUGH_COURSE, ROUGH_SLOPE = math.radians(0.75), math.radians(0.5)
 # m.  Where neither mission nor autopilot says what counts as reached: this beside where the fly-by path passes; and the
 # corridor is as much wider than a turn that needs more than it.
 PASS = 10.0
+# Ratio.  An autopilot that turns by a law of its own swings behind a waypoint that it flies over up to this many times
+# as far beyond the next leg as R (1 - cos turn): up to 1.05 in 168 turns of 95 to 180 degrees by ArduPlane's simulated
+# control laws and up to 1.24 in 80 by PX4's, in wind of up to 12 m/s and light turbulence.
+FLY_OVER_SWING_RATIO = 1.25
 # m.  Approaches to a waypoint within this of the closest are equally close, as on a path that crosses itself above or
 # below: of them the one nearest in height counts.
 EQUALLY_CLOSE = 0.5

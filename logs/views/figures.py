@@ -153,7 +153,9 @@ FIGURES = (
         caption=_map_caption,
     ),
     FigureEntry(
-        "profile", "Profile", lambda subject: profile_chart(subject.setup.scenario, **_paths(subject)),
+        "profile", "Profile", lambda subject: profile_chart(
+            subject.setup.scenario, **_paths(subject), above_ground=subject.setup.route.above_ground
+        ),
         alternative=lambda subject: (
             f"Heights along the path: terrain, required clearance, {subject.flown('planned and flown', 'planned')} "
             "heights, the ceiling, and the missile and radar spheres that stand over the path."

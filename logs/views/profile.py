@@ -33,6 +33,7 @@ def profile_chart(
     track: Track | None,
     verdict: Verdict | None,
     stops: Sequence[int] | None = None,
+    above_ground: Floats | None = None,
 ) -> Chart:
     """Heights (m AMSL) over the distance along the route (km).
 
@@ -40,6 +41,7 @@ def profile_chart(
     from start to destination.  The ground and the spheres' cuts are those under and about the route: a sphere or a zone
     is cut where the path runs through it.  Flown heights stand at the flight's progress along it, which never falls.
     stops: number of each waypoint of the route as people count them; None where each waypoint is a stop.
+    above_ground: (w,) m, as of `flight.mission.route.Route`; None where no leg follows the ground.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -58,6 +60,8 @@ def profile_chart(
     at = route_distance(route)
     distance, points = route_samples(route, max(float(at[-1]) / _SAMPLES, 1.0))
     ground = ground_under(scenario, points)
+    if above_ground is not None and ground is not None and len(above_ground) == len(route):
+        points[:, 2] = _over_ground(at, route, above_ground, distance, points[:, 2], ground, scenario)
     low, high = _span(scenario, route, track, ground)
     plane = PathPlane(distance / 1000.0, points, ground, low, high)
     failed = failures(verdict, len(route))
@@ -104,6 +108,22 @@ def _chart(scenario: Scenario, at: Floats, first: list[int], panel: Panel, *, st
 def _leg_begins(first: list[int], count: int) -> list[int]:
     """Waypoints at which a leg as people count them begins: where the stop before it ends."""
     return [0, *(k - 1 for k in first[2:])] if count > 1 else []
+
+
+def _over_ground(
+    at: Floats, route: Floats, above: Floats, distance: Floats, up: Floats, ground: Floats, scenario: Scenario
+) -> Floats:
+    """Return the planned altitudes (s,) m, with the legs that follow the ground above it.
+
+    at: distance of each waypoint along the route, m.  above: (w,) m, NaN at the end of a straight leg.
+    distance, up, ground: (s,) m, samples of the route.
+    """
+    begins = ground_under(scenario, route)
+    starts = route[:, 2] - (0.0 if begins is None else begins)
+    leg = np.clip(np.searchsorted(at, distance, side="left"), 1, len(at) - 1)
+    share = (distance - at[leg - 1]) / np.maximum(at[leg] - at[leg - 1], 1e-9)
+    followed = ground + starts[leg - 1] + share * (above[leg] - starts[leg - 1])
+    return np.where(np.isfinite(followed), followed, up)
 
 
 def ground_under(scenario: Scenario, points: Floats) -> Floats | None:

@@ -1,4 +1,4 @@
-"""Fly a mission, and judge one, or a flight."""
+"""Fly a mission, and judge a mission or a flight."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -105,7 +105,8 @@ class Judged:
     verdict: whether it flies, with a finding for every rule and place.
     loss: what of a flight log could not be read, in a line; "" where nothing is missing.
     lossy: whether some of a log could not be read.
-    track: what was flown; None for a plan or a mission.
+    track: what was flown; None where nothing was.
+    is_log: True for a flight that a log or an earlier call holds.
     """
 
     setup: FlightSetup
@@ -113,6 +114,7 @@ class Judged:
     loss: str = ""
     lossy: bool = False
     track: Track | None = None
+    is_log: bool = False
 
     @property
     def returns_line(self) -> str:
@@ -288,7 +290,7 @@ def _log_target(
 
 
 # ----------------------------------------------------------------------
-# Judge without flying.
+# Judge a flight by its log, or a mission.
 
 # Why a log takes no other world.
 _AS_FLOWN = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
@@ -313,47 +315,47 @@ def judge(
     plan: str | Path | None = None,
     flight: int | None = None,
     datum: VerticalDatum | None = None,
+    geometry: bool = False,
 ) -> Judged:
-    """Judge without flying, as `planfly.check` does, and keep what the verdict is about.
+    """Judge a flight by its log, or a plan or a mission by flying it, and keep what the verdict is about.
 
     what: a flight log or its path, an autopilot's log, what `planfly.fly` gave, a `Plan`, or the path of a plan.json,
     .waypoints or .plan.
+    geometry: True judges a plan or a mission by its geometry alone, which says nothing of how an autopilot flies it.
     scenario, wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law: of a plan or mission, as of
     `planfly.fly`; a flight is judged as it was flown.
     terrain, fence: in place of the ground, and beside the fences, that it carries.
     plan, flight, datum: of an autopilot's log, as of `planfly.import_log`.
-
     Raises a `planfly.PlanflyError` for bad input.
 
-    >>> import planfly
-    >>> judged = planfly.judge(planfly.plan("tight", seed=1))
-    >>> judged.verdict.level, judged.setup.scenario.name, judged.loss
-    ('geometric', 'tight', '')
+    >>> plan = planfly.plan("paper-07", seed=1)
+    >>> [planfly.judge(plan, geometry=geometry).verdict.level for geometry in (False, True)]
+    ['autopilot', 'geometric']
     """
-    flown_with: dict[str, Any] = {"wind": wind, "turbulence": turbulence, "at": at, "aircraft": aircraft}
-    flown_with |= {"airspeed": airspeed, "params": params}
+    flown_with: dict[str, Any] = {
+        "wind": wind, "turbulence": turbulence, "at": at, "aircraft": aircraft, "airspeed": airspeed, "params": params,
+        "guidance": guidance, "autopilot_law": autopilot_law,
+    }  # fmt: skip
+    of_log: dict[str, Any] = {"plan": plan, "flight": flight, "datum": datum}
     if isinstance(what, str | Path) and is_imported_log(Path(what)):
         # Imported here: no other check needs the libraries that read other programs' logs.
         from planfly.api.imported import read_imported
 
-        found = read_imported(
-            what, plan=plan, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence, at=at,
-            aircraft=aircraft, airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law,
-            flight=flight, datum=datum,
-        )  # fmt: skip
-        return Judged(found.setup, found.verdict, lossy=found.lossy, track=found.track)
+        found = read_imported(what, scenario=scenario, terrain=terrain, fence=fence, **of_log, **flown_with)
+        return Judged(found.setup, found.verdict, lossy=found.lossy, track=found.track, is_log=True)
     source = _source_of(what)
-    refuse(source, {"plan": plan, "flight": flight, "datum": datum}, "goes with an imported log, not with this file")
+    refuse(source, of_log, "goes with an imported log, not with this file")
     fences = named_fences(fence)
-    log = Path(what) if isinstance(what, str | Path) and is_log(Path(what)) else None
-    if log is not None or isinstance(what, FlightLog | FlownMission):
-        refuse(source, flown_with | {"guidance": guidance, "autopilot_law": autopilot_law}, _AS_FLOWN)
+    if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
+        refuse(source, flown_with, _AS_FLOWN)
         refuse(source, {"scenario": scenario}, _WHERE_FLOWN)
-    if log is not None:
-        what = read_log(log)
-    if isinstance(what, FlightLog | FlownMission):
+        what = read_log(Path(what)) if isinstance(what, str | Path) else what
+        refuse(source, {"geometry": geometry or None}, "a flight is judged as it was flown")
         return _judge_flight(what, terrain, fences)
-    change = partial(changed_scenario, guidance=guidance, autopilot_law=autopilot_law, **flown_with)
+    if not geometry:
+        flown = fly(what, scenario=scenario, terrain=terrain, fence=fence, **flown_with)
+        return Judged(flown.setup, flown.verdict, track=flown.track if len(flown.track) else None)
+    change = partial(changed_scenario, **flown_with)
     setup = opened_mission(what, scenario, terrain, None, fences, change).setup
     return Judged(setup, judge_geometry(setup))
 
@@ -375,23 +377,24 @@ def check(
     plan: str | Path | None = None,
     flight: int | None = None,
     datum: VerticalDatum | None = None,
+    geometry: bool = False,
 ) -> Verdict:
-    """Judge without flying: a flight by its log, or a plan or mission by its geometry alone.
+    """Judge a flight by its log, or a plan or a mission by flying it.
 
     The arguments are those of `planfly.judge`, which also returns what the verdict is about.
 
     Raises a `planfly.PlanflyError` for bad input.
 
     >>> import planfly
-    >>> verdict = planfly.check(planfly.plan("tight", seed=1))
-    >>> verdict.level, verdict.flyable
-    ('geometric', False)
+    >>> plan = planfly.plan("tight", seed=1)
+    >>> planfly.check(plan).flyable, planfly.check(plan, geometry=True).level
+    (False, 'geometric')
     """
     return judge(
         what, scenario=scenario, terrain=terrain, fence=fence, wind=wind, turbulence=turbulence,
         at=at, aircraft=aircraft,
         airspeed=airspeed, params=params, guidance=guidance, autopilot_law=autopilot_law, plan=plan, flight=flight,
-        datum=datum,
+        datum=datum, geometry=geometry,
     ).verdict  # fmt: skip
 
 
@@ -419,9 +422,9 @@ def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, 
         setup = replace(setup.in_scenario(fences.on_scenario(setup.scenario)), mission=fences.on_mission(setup.mission))
     if isinstance(flight, FlightLog):
         verdict = judge_log(replace(flight, setup=setup))
-        return Judged(setup, verdict, loss_text(flight), not flight.complete, flight.track)
+        return Judged(setup, verdict, loss_text(flight), not flight.complete, flight.track, is_log=True)
     verdict = flight.verdict if setup is flight.setup else judge_flight(setup, flight.track, flight.ended)
-    return Judged(setup, verdict, track=flight.track)
+    return Judged(setup, verdict, track=flight.track, is_log=True)
 
 
 def opened_mission(

@@ -1,4 +1,4 @@
-"""``planfly check``: a log judged from what it holds, or a mission by its geometry alone."""
+"""``planfly check``: judge a log by what it holds, or a mission by flying it."""
 
 import argparse
 from collections.abc import Mapping
@@ -32,9 +32,10 @@ def check_options(line: LineParser) -> None:
     """The parser of ``planfly check``."""
     parser = line.command(
         "check",
-        "judge a flight from its log (planfly's or an autopilot's), or a mission file by its geometry alone",
+        "judge a flight by its log (planfly's or an autopilot's), or a mission by flying it; write nothing",
         "planfly check flight.mcap --json verdict.json",
         "planfly check mission.waypoints --terrain jacksboro --json -",
+        "planfly check mission.waypoints --terrain jacksboro --geometry",
         "planfly check mission.waypoints --terrain jacksboro --for ardupilot,px4",
     )
     completed(
@@ -46,20 +47,25 @@ def check_options(line: LineParser) -> None:
     imported_log_options(parser)
     world_options(parser)
     flown_by_options(parser)
-    pilot_options(parser).add_argument(
+    group = pilot_options(parser)
+    group.add_argument(
         "--for", dest="autopilots", metavar="AUTOPILOT,...", type=autopilots,
         help="fly a mission by the laws of several autopilots, and print one table, a column each: "
         + ", ".join(CHOICES["autopilot_law"]),
+    )  # fmt: skip
+    group.add_argument(
+        "--geometry", action="store_true",
+        help="judge a mission by its geometry and the aircraft's envelope alone: quick, and no autopilot flies it",
     )  # fmt: skip
     result_options(parser, junit=True)
 
 
 def check(args: argparse.Namespace) -> int:
-    """Judge without flying; the exit code is the verdict's, or 3 for a log that is cut short."""
+    """Judge a flight or a mission; the exit code is the verdict's, or 3 for a log that is cut short."""
     if args.autopilots is not None:
         return _check_for(args)
     judged = call(planfly.judge, args)
-    if judged.verdict.level == "geometric":
+    if not judged.is_log:
         print_warnings([*judged.setup.mission.warnings, *judged.setup.scenario.notes])
     give_answer(args, lambda: _document(judged))
     give_junit(args, {args.what: judged.verdict})
@@ -72,7 +78,7 @@ def check(args: argparse.Namespace) -> int:
 
 
 # What does not go with several autopilots: what belongs to one of them, or to a log.
-_OF_ONE = ("params", "guidance", "autopilot_law", "plan", "flight", "datum")
+_OF_ONE = ("params", "guidance", "autopilot_law", "plan", "flight", "datum", "geometry")
 
 
 def _check_for(args: argparse.Namespace) -> int:
@@ -80,7 +86,7 @@ def _check_for(args: argparse.Namespace) -> int:
     from planfly.terminal.autopilot_table import autopilot_lines
 
     for name in _OF_ONE:
-        if (value := getattr(args, name)) is not None:
+        if (value := getattr(args, name)) not in (None, False):
             raise ArgumentError.of_argument(name, value, "not with --for, which flies several autopilots")
     flown = call(planfly.fly_by_each, args, mission=args.what)
     verdicts = {name: one.verdict for name, one in flown.items()}

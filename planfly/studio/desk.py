@@ -188,7 +188,8 @@ class Desk:
 
     def setup(self, mission: Mission) -> FlightSetup:
         """Everything that decides the flight of a mission.  Raises MissionError for one that cannot be laid out."""
-        if mission is self.opened.mission and self.scenario is self.opened.scenario:
+        # The setup's mission names its autopilot; its items are those that were opened.
+        if mission.items is self.opened.mission.items and self.scenario is self.opened.scenario:
             return self.opened
         return make_setup(self.scenario, self.airframe, mission, self.seed, placed=self.placed(mission))
 
@@ -199,10 +200,9 @@ class Desk:
 
     def route(self, mission: Mission) -> Route:
         """The route that a mission comes to, without the notes that are made for people."""
-        frame, autopilot = self.airframe, self.airframe.autopilot
-        fly_over = self.scenario.flight.fly_over
-        laws = autopilot.return_rules, autopilot.loiter_rules, autopilot.reads_as_px4
-        laid = lay_route(self.placed(mission), frame.airspeed, fly_over, frame.limits, *laws)
+        frame, fly_over = self.airframe, self.scenario.flight.fly_over
+        rules = frame.autopilot.route_rules
+        laid = lay_route(self.placed(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(laid, self.scenario, frame.limits)
 
     def part(self, mission: Mission, route: Route) -> FlightSetup:

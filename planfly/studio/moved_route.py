@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flight.mission.items import AMSL, OVER_HOME, OVER_TERRAIN, PLACES, Command, Mission, MissionItem
 from flight.mission.placing import HIGHEST, LOWEST
-from flight.mission.route import Route, arc_misses
+from flight.mission.route import Route, fly_over_waypoints
 from planfly.airframe import Airframe
 from world.frames import to_map
 from world.scenario import Scenario
@@ -56,8 +56,9 @@ def moved_route(route: Route, before: Mission, now: Mission, scenario: Scenario,
         changed |= {row, *beside}
     if any(_is_near(one, k) for one in (points, route.waypoints) for k in changed if k):
         return None
-    misses = arc_misses(points, route.airspeed, acceptance, frame.limits)
-    fly_over = np.where(route.arcs > 0.0, False, scenario.flight.fly_over | misses)
+    turn_distance = frame.autopilot.route_rules.turn_distance
+    over = fly_over_waypoints(points, route.airspeed, acceptance, frame.limits, turn_distance)
+    fly_over = np.where(route.arcs > 0.0, False, scenario.flight.fly_over | over)
     return replace(route, waypoints=points, acceptance=acceptance, fly_over=fly_over)
 
 

@@ -115,6 +115,7 @@ def _with_fastest(desk: Desk, route: Route, part: Route, *, ahead: bool) -> tupl
         fly_over=joined(part.fly_over, np.zeros(count, dtype=np.bool_)),
         items=joined(part.items, np.full(count, -1)),
         arcs=joined(part.arcs, np.zeros(count)),
+        above_ground=joined(part.above_ground, np.full(count, np.nan)),
         stops=np.concatenate([np.arange(count), part.stops + count]) if ahead else joined(part.stops, stops),
     )
     return made, count if ahead else 0

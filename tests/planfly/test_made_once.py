@@ -134,7 +134,9 @@ def test_plan_loads_the_airframe_alone(count: Count) -> None:
 def test_a_plan_is_opened_once_to_be_flown_judged_or_exported(count: Count, flight: Path) -> None:
     plan = str(flight / "plan.json")
     assert count("fly", plan, code=4) == ONCE | FLIGHT
-    assert count("check", plan, code=4) == ONCE | OPENED | {"judge_geometry": 1, "route_requirements": 1}
+    assert count("check", plan, code=4) == ONCE | FLIGHT
+    judged = ONCE | OPENED | {"judge_geometry": 1, "route_requirements": 1}
+    assert count("check", plan, "--geometry", code=4) == judged
     # Its fence is what the planned path keeps to.
     assert count("export", plan, "a.plan", code=0) == ONCE | OPENED | {"route_requirements": 1}
     assert count("export", plan, "a.kml", "b.plan", "b.fence", code=0) == ONCE | OPENED | {"route_requirements": 1}
@@ -153,8 +155,8 @@ def test_a_mission_that_a_person_brought_is_flown_or_judged_along_one_path(count
     flown = count("fly", str(MISSION), "--terrain", "jacksboro", code=0)
     assert flown == {key: n for key, n in (ONCE | FLIGHT | BESIDE).items() if key != "plan_mission"}
     judged = ONCE | ROUTED | {"judge_geometry": 1, "route_requirements": 1}
-    assert count("check", str(MISSION), "--terrain", "jacksboro", code=0) == judged
-    assert count("check", str(MISSION), "--scenario", "jacksboro-air", code=4) == judged
+    assert count("check", "--geometry", str(MISSION), "--terrain", "jacksboro", code=0) == judged
+    assert count("check", "--geometry", str(MISSION), "--scenario", "jacksboro-air", code=4) == judged
 
 
 def test_a_log_judged_over_another_terrain_keeps_its_path(count: Count, flight: Path, tmp_path: Path) -> None:

@@ -268,7 +268,7 @@ def test_what_cannot_be_flown_is_a_verdict_on_the_command_line_too(
 ) -> None:
     (tmp_path / "m.waypoints").write_text(FILE.format(up=up), encoding="utf-8")
     name, log = str(tmp_path / "m.waypoints"), str(tmp_path / "f.mcap")
-    assert main(["check", name, *options]) == code
+    assert main(["check", "--geometry", name, *options]) == code
     assert says in capsys.readouterr().out
     if "--turbulence" in options:
         return  # a gust from the side is more than the metre a second that is left

@@ -50,7 +50,7 @@ from world.wind import Turbulence
 # What of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` belongs to the way that is flown, and not to the aircraft.
 _OF_THE_WAY = (
     *("leg", "cross_track_sum", "on_circle", "loitering", "stayed", "circled", "bearing", "at_height", "next_look"),
-    *("up_before", "over", "waited", "left_for", "returning", "climbed"),
+    *("up_before", "over", "waited", "left_for", "returning", "climbed", "ground_leg"),
 )
 
 
@@ -140,6 +140,11 @@ class ArduPlane(Autopilot):
     def acceptance_radius(self) -> float | None:
         """WP_RADIUS."""
         return self.parameters.wp_radius
+
+    @property
+    def follows_ground(self) -> bool:
+        """TERRAIN_ENABLE."""
+        return self.parameters.terrain_enable == 1.0
 
     def turn_distance(self, turn: float, amsl: float) -> float:
         """WP_RADIUS for a right angle, in thin air more, and a share of it for a gentler turn."""

@@ -28,6 +28,7 @@ from flight.autopilots.arduplane.law import (
     begin_law,
     fly_as_ardupilot,
     follow_attitude,
+    look_ahead,
     update_tecs,
 )
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
@@ -152,6 +153,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
     if ground.stage == TAKING_OFF:
         _take_off(work, own, waypoints, pieces)
     elif ground.stage == IN_AIR:
+        look_ahead(work, heights, waypoints, own.parameters, memory)
         fly_as_ardupilot(
             work.state, work.estimated, pieces, path.node[: settings.nodes], waypoints, work.gains, work.memory,
             own.parameters, memory, work.commands, work.timing.dt,

@@ -10,7 +10,7 @@ from flight.autopilots.arduplane.navigator import navigate_legs, target_of
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
-from flight.guidance.path import find_on_path, profile
+from flight.guidance.path import find_on_path, leave_sharp_corners, profile
 from flight.mission.itinerary import UNLIMITED
 from flight.simulation.tick import (
     FAR,
@@ -22,8 +22,9 @@ from flight.simulation.tick import (
     end_return,
     end_tick,
 )
+from world.frames import polymap
 from world.kernels import Record, Records, compiled, inner, record_dtype
-from world.terrain import Heights
+from world.terrain import Heights, pixel_height
 
 Floats = NDArray[np.float64]
 
@@ -55,6 +56,10 @@ ARDUPILOT_MEMORY = record_dtype(
     "side_acceleration",  # m/s^2 to the right, as last demanded
     "roll_demand",  # rad
     # Height.
+    "ground",  # m AMSL, of the terrain here
+    "rise_ahead",  # m, by which a leg above ground has to be flown higher for the terrain ahead
+    ("ground_leg", np.int64),  # leg above ground that is flown, plus one; 0 before there was any
+    "from_above_ground",  # m, height above ground at which that leg began
     "height_asked",  # m, of the leg, or as it was when the aircraft could follow it no longer
     "height_limited",  # m, the same within its rate limits
     "height_demand",  # m, and after its lag
@@ -190,7 +195,12 @@ def demand_height(
     b: the leg's end, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     parameters, own: as `flight.autopilots.arduplane.navigator.navigate_legs` takes them.
     """
-    target = _return_height(estimated, b, parameters, own) if b.returns else _leg_height(estimated, b, parameters, own)
+    if b.returns:
+        target = _return_height(estimated, b, parameters, own)
+    elif b.over_ground:
+        target = _height_over_ground(estimated, b, parameters, own)
+    else:
+        target = _leg_height(estimated, b, parameters, own)
     share = dt / (dt + parameters.tecs_height_demand_time)
     # What the aircraft cannot follow is not asked of it: the demand waits, and its rate is brought down meanwhile.
     cannot_climb, cannot_sink = own.held > 0 and own.height_rate > 0.0, own.held < 0 and own.height_rate < 0.0
@@ -238,6 +248,68 @@ def _leg_height(estimated: Record, b: Record, parameters: Record, own: Record) -
         return end
     own.from_up = end - rest / left
     return here
+
+
+@inner
+def _height_over_ground(
+    estimated: Record, b: Record, parameters: Record, own: Record
+) -> float:  # pragma: no cover - compiled
+    """Return the altitude that a leg above ground asks for here, m AMSL.
+
+    The height above ground changes evenly along the leg, or at once where it changes by less than GLIDE_SLOPE_MIN; what
+    the terrain ahead rises by beyond half of the greatest climb is added (`Plane::set_offset_altitude_location`,
+    `set_target_altitude_proportion`, `relative_target_altitude_cm`, `lookahead_adjustment` in ArduPlane/altitude.cpp).
+    """
+    end, here = b.above_ground, estimated.up - own.ground
+    if own.ground_leg != own.leg + 1:
+        own.ground_leg, own.from_above_ground = own.leg + 1, here
+    end_e, end_n = target_of(b)
+    leg_e, leg_n = end_e - own.from_east, end_n - own.from_north
+    run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
+    along = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
+    change = end - own.from_above_ground
+    if own.on_circle or along >= 1.0 or abs(change) < parameters.glide_slope_min:
+        height: float = own.ground + end + own.rise_ahead
+        return height
+    left = 1.0 - max(0.0, along)
+    height = end - change * left
+    if change > 0.0 and 0.0 < parameters.glide_slope_threshold < here - height:
+        # Above a climb by more than the threshold, the climb is drawn anew from here.
+        rest = end - here if end - here >= parameters.glide_slope_min else 0.0
+        own.from_above_ground, height = end - rest / left, end - rest
+    return own.ground + height + max(0.0, own.rise_ahead + min(0.0, change))
+
+
+@inner
+def look_ahead(
+    work: Record, heights: Heights, waypoints: Records, parameters: Record, own: Record
+) -> None:  # pragma: no cover
+    """Note the ground below the aircraft and how far the terrain ahead rises above the climb, on a leg above ground.
+
+    As `AP_Terrain::lookahead` with half of TECS_CLMB_MAX as the climb: every TERRAIN_SPACING towards the waypoint, up
+    to it and up to TERRAIN_LOOKAHD.  Ground that is not known changes nothing.
+    work: a record of `flight.simulation.tick.WORKSPACE`.
+    """
+    b = waypoints[own.leg + 1]
+    if not b.over_ground or own.clock - work.timing.dt >= 0.5 * work.timing.dt:
+        return
+    here, place = work.estimated, work.place.ground
+    own.ground = own.ground if math.isnan(place) else place
+    own.rise_ahead = 0.0
+    speed = math.hypot(here.velocity_east, here.velocity_north)
+    end_e, end_n = target_of(b)
+    distance = math.hypot(end_e - here.east, end_n - here.north)
+    reach = min(distance, parameters.terrain_lookahead)
+    if own.on_circle or reach <= 0.0 or speed < 1.0:
+        return
+    step = parameters.terrain_spacing
+    climb = 0.5 * parameters.tecs_climb_max / speed * step
+    step_e, step_n = step * (end_e - here.east) / distance, step * (end_n - here.north) / distance
+    for k in range(1, math.ceil(reach / step) + 1):
+        column, row = polymap(work.pixel_map, here.east + k * step_e, here.north + k * step_n)
+        rise = pixel_height(heights, column, row) - own.ground - k * climb
+        if rise > own.rise_ahead:
+            own.rise_ahead = rise
 
 
 @inner
@@ -454,6 +526,7 @@ def arduplane_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     settings = work.settings
     if not begin_tick(work, heights):
         return NOT_A_NUMBER
+    look_ahead(work, heights, path.waypoint[: settings.waypoints], own.parameters, own.memory)
     fly_as_ardupilot(
         work.state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
         path.waypoint[: settings.waypoints], work.gains, work.memory, own.parameters, own.memory,
@@ -507,6 +580,7 @@ def fly_as_ardupilot(
         # Where a loiter was left sooner than the path does, the rest of it is not flown.
         while pieces[memory.piece].leg < own.left_for - 1 and memory.piece + 1 < pieces.shape[0]:
             memory.piece += 1
+        leave_sharp_corners(pieces, memory, own.leg)
         demand_height(estimated, waypoints[own.leg + 1], parameters, own, NAVIGATION_TICK)
         wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
         memory.speed_command = wanted * factor

@@ -127,6 +127,9 @@ DEFINITIONS = {
     "short_failsafe": Definition("FS_SHORT_ACTN", 0.0, 0.0, 4.0),
     "long_failsafe": Definition("FS_LONG_ACTN", 0.0, 0.0, 5.0),
     "station_failsafe": Definition("FS_GCS_ENABL", 0.0, 0.0, 3.0),
+    "terrain_enable": Definition("TERRAIN_ENABLE", 1.0, 0.0, 1.0),
+    "terrain_lookahead": Definition("TERRAIN_LOOKAHD", 2000.0, 0.0, 10_000.0),
+    "terrain_spacing": Definition("TERRAIN_SPACING", 100.0, 1.0, 10_000.0),
     "terrain_follow": Definition("TERRAIN_FOLLOW", 0.0, 0.0, 2.0**31 - 1.0),
     "battery_monitor": Definition("BATT_MONITOR", 0.0, 0.0, 255.0),
     "low_battery": Definition("BATT_FS_LOW_ACT", 0.0, 0.0, 7.0),
@@ -179,6 +182,8 @@ class ArduPilotParameters:
     rally_includes_home: 1 where a return goes home if that is nearer than any rally point; 0 where not.
     rtl_autoland: 0 where a return stays in its circle; 1 has it go on from there to the mission's landing sequence, 2
         straight to it, 3 says that sequence is for go-arounds only, 4 goes by the mission's return path.
+    terrain_enable: 1 if it has heights of the terrain.  terrain_lookahead: m, the farthest that it looks ahead for
+        rising ground on a leg above ground; terrain_spacing: m, between the places there.
     terrain_follow: bits of the modes that follow the terrain.
     low_voltage, critical_voltage: V.  low_charge, critical_charge: mAh; 0 or less triggers nothing.
     flare_time: s before the touch-down that the glide aims to flare at.  flare_height: m; half the most that the flare
@@ -274,6 +279,9 @@ class ArduPilotParameters:
     short_failsafe: float = field(init=False)
     long_failsafe: float = field(init=False)
     station_failsafe: float = field(init=False)
+    terrain_enable: float = field(init=False)
+    terrain_lookahead: float = field(init=False)
+    terrain_spacing: float = field(init=False)
     terrain_follow: float = field(init=False)
     battery_monitor: float = field(init=False)
     low_battery: float = field(init=False)

@@ -16,7 +16,7 @@ from flight.autopilots.px4.parameters import PX4_PARAMETERS
 from flight.autopilots.px4.tecs import update_tecs
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
-from flight.guidance.path import find_on_path, profile
+from flight.guidance.path import find_on_path, leave_sharp_corners, profile
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
@@ -136,6 +136,7 @@ def fly_as_px4(
     # Where PX4 left a circle sooner than the path does, the rest of it is not flown; nor is it over before its time.
     while pieces[memory.piece].leg < own.leg - 1 and memory.piece + 1 < pieces.shape[0]:
         memory.piece += 1
+    leave_sharp_corners(pieces, memory, own.leg)
     memory.done = memory.done and is_last(waypoints, own)
     wanted = max(commanded, own.airspeed_for_ground / told)
     memory.speed_command = min(parameters.airspeed_max, wanted) * factor

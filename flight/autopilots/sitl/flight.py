@@ -92,14 +92,18 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
 
 @inner
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
-    """Fill leg, distance, cross-track and height error of the memory: the nearest of the pieces from the last one on.
+    """Fill leg, distance, cross-track and height error of the memory, by the nearest piece from the last one on.
 
+    A piece that leads the other way than the aircraft flies is not begun: the way back of an out-and-back leg lies on
+    the way out.
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
     k, nearest, distance, aside = memory.piece, math.inf, 0.0, 0.0
     for i in range(memory.piece, min(memory.piece + _AHEAD, pieces.shape[0])):
         piece = pieces[i]
-        along, cross, _ = project(piece, true.east, true.north)
+        along, cross, course = project(piece, true.east, true.north)
+        if i > memory.piece and true.velocity_east * math.sin(course) + true.velocity_north * math.cos(course) < 0.0:
+            continue
         outside = max(0.0, -along, along - piece.length)
         if math.hypot(cross, outside) < nearest:
             k, nearest = i, math.hypot(cross, outside)

@@ -18,6 +18,7 @@ from logs.verdict.measures.route_requirements import (
 )
 from logs.verdict.tolerances import (
     CLOSER,
+    FLY_OVER_SWING_RATIO,
     KINK_SHARE,
     KINK_WAYPOINTS,
     NAVIGATION_SIGMAS,
@@ -90,7 +91,10 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     if requirements.setup.scenario.limits.corridor_m is not None:
         return half, "scenario"
     ends = slice(leg, leg + 2)
-    turning = float(corner_depths(requirements)[ends].max()) + PASS
+    depths = corner_depths(requirements)[ends]
+    if not requirements.setup.autopilot.follows_path:
+        depths = depths * np.where(requirements.setup.route.fly_over[ends], FLY_OVER_SWING_RATIO, 1.0)
+    turning = float(depths.max()) + PASS
     if requirements.setup.autopilot.loiter_rules.at_middle:
         arcs, tightest = requirements.setup.route.arcs[ends], requirements.tightest[ends]
         back = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
@@ -165,7 +169,7 @@ def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
 
 def _part(route: Route, kept: NDArray[np.int64]) -> Route:
     """A route of some of its waypoints, each leg at the speed of the old one that begins where it does."""
-    names = ("waypoints", "acceptance", "fly_over", "items", "arcs")
+    names = ("waypoints", "acceptance", "fly_over", "items", "arcs", "above_ground")
     return replace(route, airspeed=route.airspeed[kept[:-1]], **{name: getattr(route, name)[kept] for name in names})
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import OVER_HOME, OVER_TERRAIN, Command
+from flight.mission.items import OVER_HOME, Command
 from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -175,7 +175,7 @@ def _planned_clearance(
     if math.isnan(planned):
         reason = "the leg leaves the known terrain"
     elif planned < limit - CLEARANCE_TOLERANCE:
-        reason += f"; {limit:.0f} m are required{_straight(requirements, leg)}"
+        reason += f"; {limit:.0f} m are required"
     return make_finding(
         "clearance",
         requirements.leg(leg),
@@ -219,7 +219,7 @@ def _flown_clearance(
             reason = off if math.isnan(least) else f"{reason}; {off}"
             ok = None if ok is not False else False
         if ok is False:
-            reason += f"; {limit:.0f} m are required{_straight(requirements, leg)}"
+            reason += f"; {limit:.0f} m are required"
         ground = requirements.setup.scenario.terrain
         reason += _less_error(least, limit, None if ground is None else ground.vertical_error)
     if planned_short:
@@ -238,15 +238,6 @@ def _flown_clearance(
         unit="m",
         method="exact along the flown track",
     )
-
-
-def _straight(requirements: RouteRequirements, leg: int) -> str:
-    """That a leg does not follow the ground, where the height at its end is one above terrain."""
-    to_item = requirements.leg(leg).to_item
-    items = requirements.setup.mission.items
-    if any(item.seq == to_item and item.frame in OVER_TERRAIN for item in items):
-        return "; its height above terrain holds at its waypoint, and the leg is straight"
-    return ""
 
 
 def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:

@@ -89,6 +89,6 @@ RULE = Rule(
     title="corridor",
     asks="How far from the legs did the flight get, its turns included?",
     margin=Margin("distance from the legs", "m", 10.0),
-    tolerances=("ROUNDING", "PASS", "ON_COURSE"),
+    tolerances=("ROUNDING", "PASS", "FLY_OVER_SWING_RATIO", "ON_COURSE"),
     judge=corridor_findings,
 )

@@ -153,6 +153,10 @@ def _unjoined(setup: FlightSetup) -> Finding:
 def _not_flown(setup: FlightSetup) -> Iterator[Finding]:
     """One finding for each item that changes the flight path and is not flown as the autopilot would."""
     left = [(one.item, one.text) for one in setup.route.open_items]
+    if not setup.autopilot.follows_ground:
+        held = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
+        why = f"its height above terrain is not followed along the leg by {setup.autopilot.title} as it is flown here"
+        left += [(seq, why) for seq in held]
     if setup.scenario.returns is not None:
         # Returns from anywhere on the route are judged to the mission's home alone.
         left += [

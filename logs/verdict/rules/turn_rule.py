@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from flight.guidance.navigation_error import ERRORS
-from flight.guidance.path import SHARPEST
+from flight.mission.route import SHARPEST_FLY_BY
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import negligible_kink, reach
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
@@ -224,7 +224,7 @@ def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) ->
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
     tightest = float(requirements.tightest[i])
     # Guidance's own limit: a corner sharper than it has no arc to be held to where its legs are short.
-    least = fly_by_offset(turn, tightest) if turn < SHARPEST else math.inf
+    least = fly_by_offset(turn, tightest) if turn < SHARPEST_FLY_BY else math.inf
     # Another's autopilot does not follow the arc, and passes the waypoint as closely as it likes.
     followed = setup.autopilot.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
     if measure.passed is None or not math.isfinite(least) or not followed:

@@ -198,9 +198,32 @@ def test_collinear_u_turn_and_fly_over(make_setup: MakeSetup) -> None:
     over = make_setup([[0, 0, 500], [0, 1000, 500], [1000, 1000, 500], [1000, 0, 500]], fly_over=[1])
     path = _path(over)
     assert path.pieces[0].length == 1000.0
-    assert int((path.pieces["curvature"] != 0.0).sum()) == 1
     assert np.linalg.norm(sample_path(path, 1.0)[:, :2] - [0, 1000], axis=1).min() < 1e-9
-    _whole(path, over, corners=1)
+    # Behind the waypoint 90 and 60 degrees to the right, and 60 back: cos 60 = (1 + cos 90) / 2.
+    swing = [RADIUS * math.radians(angle) for angle in (75.0, 75.0, 60.0)]
+    assert path.pieces["length"][1:4] == pytest.approx(swing)
+    assert path.pieces["curvature"][1:4] == pytest.approx([1 / RADIUS, 1 / RADIUS, -1 / RADIUS])
+    assert (path.pieces[4].east, path.pieces[4].north) == pytest.approx((RADIUS * (1.0 + math.sqrt(3.0)), 1000.0))
+    _whole(path, over)
+    # As the reference of an autopilot that turns by a law of its own, the corner stays sharp.
+    sharp = fly_by_path(over.route, over.limits, swings=False)
+    assert sharp.pieces["length"][0] == 1000.0
+    _whole(sharp, over, corners=1)
+
+
+@pytest.mark.parametrize("turn_deg", [120.0, 165.0, 180.0, -135.0])
+def test_a_sharp_corner_that_is_flown_over_swings_out_and_back(make_setup: MakeSetup, turn_deg: float) -> None:
+    """Beyond the next leg it leads R (1 - cos turn)."""
+    turn = math.radians(turn_deg)
+    end = [2500.0 * math.sin(turn), 3000.0 + 2500.0 * math.cos(turn), 500.0]
+    setup = make_setup([[0, 0, 500], [0, 3000, 500], end], fly_over=[1])
+    path = _path(setup)
+    _whole(path, setup)
+    _smooth_profile(path)
+    behind = sample_path(path, 1.0)[3000:, :2] - [0.0, 3000.0]
+    beyond = -math.copysign(1.0, turn) * (behind @ [math.cos(turn), -math.sin(turn)])
+    radius = setup.limits.turn_radius(0.0, turn, 500.0)
+    assert beyond.max() == pytest.approx(radius * (1.0 - math.cos(turn)), abs=0.5)
 
 
 def test_one_leg_and_a_leg_of_a_metre(make_setup: MakeSetup) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flight.mission.itinerary import make_itinerary
-from flight.mission.route import make_route
+from flight.mission.route import RouteRules, make_route
 from tests.mission_lines import ORIGIN, ground, mission, refusal, route, wp
 
 
@@ -53,7 +53,7 @@ def test_a_speed_by_its_value_alone_is_that_or_the_autopilots_own(
     change: str, airspeed: float, noted: str | None
 ) -> None:
     items = wp(0, 0), "2 178 0 28 -1 0 0 0 0", wp(0, 900), f"2 178 {change} 0 0 0 0", wp(0, 1800)
-    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, reads_as_px4=True)
+    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     assert flown.airspeed.tolist() == [28.0, airspeed]
     assert flown.notes[-1:] == (() if noted is None else (f"item 4: {noted}",))
 
@@ -61,7 +61,7 @@ def test_a_speed_by_its_value_alone_is_that_or_the_autopilots_own(
 def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
     gate, fast, slow = wp(300, 600, command=4501), "2 178 0 28 -1 0 0 0 0", "2 178 0 20 -1 0 0 0 0"
     items = wp(0, 0), fast, gate, slow, wp(0, 1800)
-    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, reads_as_px4=True)
+    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     # From the gate to item 5 lead (-300, 1200): at right angles to that, 300^2 / 1200 m sooner on the leg.
     assert flown.waypoints[:, :2] == pytest.approx(np.array([[0.0, 0.0], [0.0, 525.0], [0.0, 1800.0]]), abs=0.1)
     assert (flown.airspeed.tolist(), flown.items.tolist(), flown.notes) == ([28.0, 20.0], [1, 3, 5], ())
@@ -101,7 +101,7 @@ def test_a_gate_changes_the_speed_where_its_plane_cuts_the_leg() -> None:
 def test_gates_that_leave_their_leg_whole(
     items: tuple[str, ...], airspeed: list[float] | None, noted: list[str]
 ) -> None:
-    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, reads_as_px4=True)
+    flown = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     assert [note for note in flown.notes if "GATE" in note] == noted
     if airspeed is None:
         assert flown.airspeed[0] == 20.0

@@ -10,7 +10,7 @@ import pytest
 
 from flight.mission.items import Mission
 from flight.mission.itinerary import make_itinerary
-from flight.mission.route import Route, make_route
+from flight.mission.route import Route, RouteRules, make_route
 from flight.mission_files.formats import parse_mission
 from tests.mission_lines import ORIGIN, mission, refusal, route, wp
 from world.errors import MissionError
@@ -92,7 +92,7 @@ def test_commands_behind_a_spent_jump_run_a_round_early_in_arduplane_and_in_thei
     # ArduPilot #30376: at the begin of the last round the jump's counter is used up, and item 7 runs.
     assert flown.airspeed.tolist() == [25.0] * 3 + [22.0] * 3 + [30.0] * 5
     assert flown.notes == ("item 7: DO_CHANGE_SPEED: run a round early, as ArduPlane does",)
-    by_px4 = make_route(mission(*items), ORIGIN, None, 25.0, False, reads_as_px4=True)
+    by_px4 = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     assert by_px4.airspeed.tolist() == [25.0] * 3 + [22.0] * 6 + [30.0] * 2
     assert by_px4.notes == ()
 
@@ -101,7 +101,7 @@ def test_a_jumps_target_command_is_not_run_behind_another_command() -> None:
     items = SPEED.format(20), wp(0, 0), wp(0, 1000), SPEED.format(22), "2 177 1 1 0 0 0 0 0", wp(1000, 1000)
     # Behind item 3 ArduPlane runs item 4; from there on the jump is spent, and item 6 the next: item 1 is left out.
     assert route(*items).airspeed.tolist() == [20.0, 22.0, 22.0, 22.0]
-    by_px4 = make_route(mission(*items), ORIGIN, None, 25.0, False, reads_as_px4=True)
+    by_px4 = make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True))
     assert by_px4.airspeed.tolist() == [20.0, 20.0, 20.0, 22.0]
 
 
@@ -144,7 +144,9 @@ def test_a_home_that_is_set_counts_for_the_altitudes_and_the_return_behind_it() 
     assert back.return_to[:2] == pytest.approx((600.0, 0.0), abs=0.02)
     assert made.open_items == back.open_items == ()
     # PX4 takes no coordinates for it, and where it is flown otherwise the verdict is open.
-    by_px4 = make_route(mission(wp(0, 0), moved, wp(0, 900)), ORIGIN, None, 25.0, False, reads_as_px4=True)
+    by_px4 = make_route(
+        mission(wp(0, 0), moved, wp(0, 900)), ORIGIN, None, 25.0, False, rules=RouteRules(reads_as_px4=True)
+    )
     assert [one.item for one in by_px4.open_items] == [2]
     here = route(wp(0, 0), wp(0, 900), "2 179 1 0 0 0 0 0 0", wp(900, 900))
     assert [one.item for one in here.open_items] == [3]

@@ -14,7 +14,7 @@ from aircraft.catalog import load_aircraft
 from flight.guidance.path import fly_by_path
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.loiter_circles import LoiterRules
-from flight.mission.route import Route, make_route
+from flight.mission.route import Route, RouteRules, make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
@@ -216,7 +216,9 @@ def test_a_replay_tells_a_loiter_in_one_line(flight: tuple[FlightSetup, Any], tm
 
 def laid_for(rules: LoiterRules, *lines: str) -> Route:
     made = setup_of(*lines)
-    return make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, loiters=rules)
+    return make_route(
+        made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, rules=RouteRules(loiters=rules)
+    )
 
 
 def test_a_loiter_without_a_radius_has_that_of_the_autopilots_parameter() -> None:

@@ -18,7 +18,7 @@ from flight.mission.return_path import (
     described_return,
     lay_return,
 )
-from flight.mission.route import make_route
+from flight.mission.route import RouteRules, make_route
 from tests.mission_lines import ORIGIN, mission, refusal, route, wp
 from world.frames import to_geo
 
@@ -281,7 +281,7 @@ def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:
     told = "item 3: the mission's landing counts as a place to return to: not flown to; to home"
 
     def notes(rules: ReturnRules, *items: str) -> tuple[str, ...]:
-        return make_route(mission(*items), ORIGIN, None, 25.0, False, rules=rules).notes
+        return make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(rules)).notes
 
     assert told in notes(ReturnRules(landing_counts=True), *lines)
     assert told not in notes(ReturnRules(landing_counts=True), *lines[:3])

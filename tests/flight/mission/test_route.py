@@ -14,7 +14,14 @@ from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.return_path import ReturnCircle
-from flight.mission.route import END_LEG_LENGTH, Route, arc_misses, make_route, with_end_courses
+from flight.mission.route import (
+    END_LEG_LENGTH,
+    Route,
+    RouteRules,
+    fly_over_waypoints,
+    make_route,
+    with_end_courses,
+)
 from flight.mission_files.formats import mission_text, parse_mission, read_mission
 from flight.simulation.setup import make_limits
 from tests.mission_lines import ORIGIN, ground, mission, refusal, route, setup_of, wp
@@ -77,9 +84,9 @@ def corner(turn: float) -> np.ndarray:
 def test_an_acceptance_just_below_and_just_above_where_the_arc_passes(turn_deg: float, limits: Limits) -> None:
     turn = math.radians(turn_deg)
     passes = RADIUS / math.cos(turn / 2.0) - RADIUS
-    for acceptance, misses in ((passes - 0.01, True), (passes + 0.01, False), (0.0, False)):
+    for acceptance, misses in ((passes - 0.01, True), (passes + 0.01, False), (0.0, turn_deg > 150.0)):
         radii = np.array([1.0, acceptance, 1.0])
-        found = arc_misses(corner(turn), np.full(2, 25.0), radii, limits)
+        found = fly_over_waypoints(corner(turn), np.full(2, 25.0), radii, limits)
         assert found.tolist() == [False, misses, False]
 
 
@@ -87,8 +94,32 @@ def test_the_faster_leg_draws_the_arc_and_without_limits_there_is_none(limits: L
     turn, speeds = math.radians(90.0), np.array([20.0, 30.0])
     passes = 30.0**2 / 25.0**2 * RADIUS * (math.sqrt(2.0) - 1.0)
     for acceptance, misses in ((passes - 0.01, True), (passes + 0.01, False)):
-        assert arc_misses(corner(turn), speeds, np.array([0.0, acceptance, 0.0]), limits)[1] == misses
-    assert not arc_misses(corner(turn), speeds, np.full(3, 1.0), None).any()
+        assert fly_over_waypoints(corner(turn), speeds, np.array([0.0, acceptance, 0.0]), limits)[1] == misses
+    assert not fly_over_waypoints(corner(turn), speeds, np.full(3, 1.0), None).any()
+
+
+def test_an_autopilot_flies_on_to_its_own_distance_before_a_corner_whose_arc_would_miss_it(limits: Limits) -> None:
+    turn = math.radians(120.0)
+    passes = RADIUS / math.cos(turn / 2.0) - RADIUS
+    for distance, misses in ((passes - 0.01, True), (passes + 0.01, False)):
+        asked = []
+
+        def turn_distance(angle: float, amsl: float, distance: float = distance, asked: list = asked) -> float:
+            asked.append((round(angle, 9), amsl))
+            return distance
+
+        found = fly_over_waypoints(corner(turn), np.full(2, 25.0), np.zeros(3), limits, turn_distance)
+        assert found.tolist() == [False, misses, False]
+        assert asked == [(round(turn, 9), 500.0)]
+        rules = RouteRules(turn_distance=turn_distance)
+        lines = (wp(0, 0), wp(0, 5000), wp(5000 * math.sin(turn), 5000 + 5000 * math.cos(turn)))
+        assert make_route(mission(*lines), ORIGIN, None, 25.0, False, limits, rules).fly_over[1] == misses
+
+
+@pytest.mark.parametrize("turn_deg", [149.0, 151.0, 165.0, 174.0, 179.9, 180.0, -180.0, -165.0])
+def test_guidance_that_follows_the_path_flies_over_reversals(turn_deg: float, limits: Limits) -> None:
+    found = fly_over_waypoints(corner(math.radians(turn_deg)), np.full(2, 25.0), np.zeros(3), limits)
+    assert found.tolist() == [False, abs(turn_deg) > 150.0, False]
 
 
 def test_a_route_flies_over_what_its_arc_would_miss(limits: Limits) -> None:
@@ -204,7 +235,8 @@ def test_heights_of_every_frame_are_amsl() -> None:
         terrain=ground(310.0),
     )
     assert flown.waypoints[:, 2].tolist() == pytest.approx([450, 450, 450, 450, 450, 450])
-    assert "items 5-6: height above terrain" in flown.notes[0]
+    # Those above terrain are held along the legs to them.
+    assert flown.above_ground.tolist() == pytest.approx([math.nan] * 4 + [140.0, 140.0], nan_ok=True)
 
 
 def test_a_home_off_the_ground_is_noted() -> None:

@@ -40,6 +40,20 @@ def test_profile_shows_ground_and_heights_along_the_route() -> None:
     assert np.interp(1.4, terrain.x, terrain.y) == pytest.approx(250.0 * np.exp(-(0.25**2) / 2), abs=0.3)
 
 
+def test_a_leg_above_ground_is_drawn_above_the_ground() -> None:
+    """The last leg begins wherever the route is, and comes to 90 m above ground evenly; the others are straight."""
+    above = np.array([math.nan, math.nan, math.nan, 90.0])
+    chart = profile_chart(make_scenario(), **ALL, track=None, verdict=None, above_ground=above)
+    planned, terrain = (
+        next(layer for layer in chart.panels[0].layers if layer.name == name) for name in ("planned", "terrain")
+    )
+    np.testing.assert_allclose(np.interp([0.0, 0.5, 1.0, 1.8], planned.x, planned.y)[[0, 2, 3]], ROUTE[:3, 2])
+    over = planned.y - terrain.y
+    begin = float(np.interp(1.8, planned.x, over))
+    for share in (0.25, 0.5, 1.0):
+        assert np.interp(1.8 + share * 0.6, planned.x, over) == pytest.approx(begin + share * (90.0 - begin), abs=0.5)
+
+
 def test_the_flown_ends_of_a_flight_stand_on_the_ground() -> None:
     """Take-off to 60 m over level ground at 0 m; the landing's leg itself is level at 54 m."""
     setup = circuit(Launch("catapult", math.radians(90.0), 20.0), LandingStrip(500.0, 600.0))

@@ -107,7 +107,7 @@ def test_heights_above_terrain_need_terrain(name: str, tmp_path: Path, capsys: p
 
 @pytest.mark.parametrize("name", LEGS)
 def test_the_geometric_level_agrees(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    code = main(["check", str(MISSIONS / name), "--terrain", "jacksboro"])
+    code = main(["check", "--geometry", str(MISSIONS / name), "--terrain", "jacksboro"])
     out = capsys.readouterr().out
     why = NOT_FLYABLE.get(name)
     assert code == (3 if name in OPEN else 0 if why is None else 4), out

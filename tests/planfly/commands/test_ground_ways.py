@@ -53,7 +53,7 @@ def test_a_first_waypoint_behind_a_ridge_is_not_judged_in_full(
 def test_a_climb_out_and_a_glide_into_a_ridge_are_not_flyable(
     mission: str, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["check", mission, "--terrain", "jacksboro"]) == 4
+    assert main(["check", "--geometry", mission, "--terrain", "jacksboro"]) == 4
     first = capsys.readouterr().out.splitlines()[0]
     assert first.startswith("not flyable: ")
     assert said in first

@@ -66,7 +66,7 @@ def test_edits_and_undos_come_to_the_verdict_of_the_api(tmp_path: Path) -> None:
             continue
         file = tmp_path / "edited.waypoints"
         file.write_text(mission_text(session.mission, "waypoints"), encoding="utf-8")
-        asked = planfly.judge(file, scenario="jacksboro").verdict
+        asked = planfly.judge(file, scenario="jacksboro", geometry=True).verdict
         assert verdict_json(session.judged.verdict) == verdict_json(asked), f"after edit {number}"
         compared += 1
     assert refused < EDITS // 2

@@ -11,7 +11,7 @@ import numpy as np
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
-from logs.verdict.judge_geometry import geometric_findings
+from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.studio import edits
 from planfly.studio.moved_route import moved_route
@@ -70,7 +70,7 @@ def test_windows_say_what_the_whole_says() -> None:
         try:
             mission, k = changed(session, int(rng.choice(edits.places(session.mission))), how, rng)
             found = judge_windows(session.desk, mission, k, session.judged.setup)
-            whole = by_place(geometric_findings(route_requirements(session.desk.setup(mission))))
+            whole = by_place(place_findings(route_requirements(session.desk.setup(mission))))
         except MissionError:
             continue
         route, windows = found
@@ -87,7 +87,7 @@ def test_windows_say_what_the_whole_says() -> None:
         assert all(same(inside[key], covered[key]) for key in covered), f"seed {seed}"
         compared += len(covered)
         if route.legs == session.judged.setup.route.legs:
-            before = by_place(session.judged.verdict.findings)
+            before = by_place(place_findings(route_requirements(session.judged.setup)))
             beyond = {key: rows for key, rows in whole.items() if key not in covered}
             assert all(same(before.get(key, []), rows) for key, rows in beyond.items()), f"seed {seed}"
     assert windowed >= MISSIONS // 2
@@ -121,7 +121,7 @@ def test_windows_violate_the_zones_that_the_whole_does() -> None:
         mission = edits.moved(session.mission, k, *desk.geographic(x, y))
         _, windows = judge_windows(desk, mission, k)
         whole = route_requirements(desk.setup(mission))
-        legs, again = fenced(whole, geometric_findings(whole), 0)
+        legs, again = fenced(whole, place_findings(whole), 0)
         for one in windows:
             seen, _ = fenced(one.requirements, one.findings, one.begin)
             for leg in range(one.first, one.last):

@@ -45,7 +45,7 @@ def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
 
 def test_counts_are_whole_and_all_else_are_numbers() -> None:
     kinds = {name: ARDUPILOT_MEMORY[name] for name in field_names(ARDUPILOT_MEMORY)}
-    assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held", "left_for"}
+    assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held", "left_for", "ground_leg"}
     truths = {name for name, kind in kinds.items() if kind == np.bool_}
     assert truths == {
         "begun", "flown", "on_circle", "loitering", "at_height", "over", "returning", "climbed", "under",

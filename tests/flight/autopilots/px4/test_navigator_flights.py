@@ -21,9 +21,7 @@ def flown(aerosonde: Aircraft, *lines: str, **values: float) -> tuple[FlightSetu
     """A mission by the law of 1.17, its route drawn for it."""
     law = Px4(load_parameters(aerosonde, None, "1.17").changed(**values))
     made = setup_of(*lines)
-    route = make_route(
-        made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, law.return_rules, law.loiter_rules
-    )
+    route = make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, law.route_rules)
     setup = replace(made, route=route, autopilot=law)
     return setup, simulate(setup, aerosonde)
 
@@ -161,8 +159,7 @@ def test_a_speed_after_a_gate_counts_from_where_it_is_crossed(aerosonde: Aircraf
     gate, slow = wp(300, 600, command=4501), "2 178 0 20 -1 0 0 0 0"
     law = Px4(load_parameters(aerosonde, None, "1.17"))
     made = setup_of(wp(0, 0, 300), gate, slow, wp(0, 1800, 300))
-    laws = law.return_rules, law.loiter_rules, law.reads_as_px4
-    route = make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, *laws)
+    route = make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, law.route_rules)
     result = simulate(replace(made, route=route, autopilot=law), aerosonde)
     assert result.ended == "completed"
     track = result.track

@@ -156,7 +156,9 @@ def test_px4_asks_for_a_takeoff_or_a_landing(text: str, lines: tuple[str, ...], 
 def test_without_a_landing_a_default_px4_flies_and_the_verdict_says_so() -> None:
     verdict = judge_geometry(replace(setup_of(*GOOD), autopilot=Px4(default_parameters())))
     said = "PX4 would not take it: PX4's fixed-wing default refuses a mission without a landing"
-    assert verdict.flyable
+    # Its take-off is not flown, and leaves the verdict open.
+    assert verdict.undecided
+    assert not verdict.failed
     assert [line for line in verdict.lines if line.startswith(said)]
     assert not [line for line in judge_geometry(setup_of(*GOOD)).lines if "MIS_TKO_LAND_REQ" in line]
 
@@ -168,7 +170,7 @@ def test_a_takeoff_climbs_beyond_the_acceptance_radius_that_is_set(radius: int, 
     assert found.ok is taken
     # As a value that is suggested is tried.
     law = Px4(default_parameters()).with_parameters(NAV_ACC_RAD=float(radius))
-    assert judge_geometry(replace(setup_of(*lines), autopilot=law)).flyable is taken
+    assert (not judge_geometry(replace(setup_of(*lines), autopilot=law)).failed) is taken
 
 
 @pytest.mark.parametrize(("degrees", "taken"), [(8.0, True), (7.5, False)])

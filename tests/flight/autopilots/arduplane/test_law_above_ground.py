@@ -1,0 +1,108 @@
+"""ArduPlane's legs above ground, by the arithmetic of `Plane::lookahead_adjustment` and `AP_Terrain::lookahead`."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flight.autopilots.arduplane.law import demand_height, look_ahead
+from flight.simulation.tick import WORKSPACE
+from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record, waypoints
+from world.frames import fit_polymap
+from world.kernels import Record
+
+DT = 0.1
+
+
+def asked(own: Record, north: float, up: float, above: float = 100.0, **values: float) -> float:
+    """Return the altitude that a leg of 1,000 m to a height above ground asks for, m AMSL."""
+    (b,) = waypoints((0, 1000, 0), over_ground=True, above_ground=above)
+    demand_height(flying(0.0, north, up), b, parameters(**values), own, DT)
+    return float(own.height_asked)
+
+
+def test_the_height_above_ground_is_held_wherever_the_ground_is() -> None:
+    own = memory(ground=400.0)
+    assert asked(own, 100.0, 500.0) == 500.0
+    own.ground = 437.0
+    assert asked(own, 500.0, 500.0) == 537.0
+    own.rise_ahead = 12.5
+    assert asked(own, 600.0, 500.0) == 549.5
+
+
+@pytest.mark.parametrize(("above", "expected"), [(114.9, 514.9), (115.0, 507.5), (85.1, 485.1), (85.0, 492.5)])
+def test_a_change_below_glide_slope_min_is_a_step_and_any_other_a_slope(above: float, expected: float) -> None:
+    own = memory(ground=400.0)
+    asked(own, 0.0, 500.0, above)
+    assert asked(own, 500.0, 500.0, above) == pytest.approx(expected)
+
+
+def test_a_descent_leaves_out_what_it_descends_of_the_rise_ahead() -> None:
+    own = memory(ground=400.0)
+    asked(own, 0.0, 500.0, 60.0)
+    own.rise_ahead = 50.0
+    # Halfway down from 100 to 60 m above ground, and 50 - 40 m of the rise.
+    assert asked(own, 500.0, 480.0, 60.0) == pytest.approx(400.0 + 80.0 + 10.0)
+    own.rise_ahead = 39.0
+    assert asked(own, 500.0, 480.0, 60.0) == pytest.approx(480.0)
+
+
+def test_a_climb_is_drawn_again_where_the_aircraft_is_above_it_by_the_threshold() -> None:
+    own = memory(ground=400.0)
+    asked(own, 0.0, 500.0, 200.0)
+    assert asked(own, 500.0, 554.9, 200.0) == pytest.approx(550.0)
+    assert asked(own, 500.0, 556.0, 200.0) == pytest.approx(556.0)
+
+
+def looked(heights: np.ndarray, above: float = 100.0, **values: float) -> Record:
+    """Look ahead from the middle of the south end of a raster of 10 m pixels along a leg of 1,000 m north."""
+    own = memory(clock=0.0)
+    work = record(WORKSPACE)
+    work.estimated = flying(0.0, 0.0, 500.0)
+    work.place.ground = float(heights[0, 1])
+    work.timing.dt = 1.0 / 60.0
+    span = [[-2000.0, 2000.0], [-2000.0, 2000.0]]
+    to_pixel = fit_polymap(lambda east, north: (1.0 + east / 1000.0, north / 10.0), span, 1e-6)
+    work.pixel_map = to_pixel.record
+    way = waypoints((0, 0, 0), (0, 1000, 0), over_ground=True, above_ground=above)
+    look_ahead(work, heights.astype(np.float32), way, parameters(**values), own)
+    return own
+
+
+def raster(*hills: tuple[float, float]) -> np.ndarray:
+    """Ground at 300 m but for heights at places north (m), (rows, 3)."""
+    made = np.full((300, 3), 300.0)
+    for north, up in hills:
+        made[int(north / 10.0)] = up
+    return made
+
+
+@pytest.mark.parametrize(
+    ("north", "up", "rise"),
+    [
+        # Half of 5 m/s at 25 m/s climbs 0.1: 400 m on, it has climbed 40 m.
+        (400.0, 380.0, 40.0),
+        (1000.0, 420.0, 20.0),
+        (400.0, 330.0, 0.0),
+        # Neither beyond the waypoint, nor between two places of TERRAIN_SPACING.
+        (1100.0, 900.0, 0.0),
+        (450.0, 900.0, 0.0),
+    ],
+)
+def test_the_rise_ahead_is_beyond_half_of_the_greatest_climb(north: float, up: float, rise: float) -> None:
+    own = looked(raster((north, up)))
+    assert own.ground == 300.0
+    assert own.rise_ahead == pytest.approx(rise, abs=0.01)
+
+
+def test_how_far_and_how_often_it_looks_are_parameters() -> None:
+    hill = raster((800.0, 500.0))
+    assert looked(hill).rise_ahead == pytest.approx(120.0, abs=0.01)
+    assert looked(hill, TERRAIN_LOOKAHD=600.0).rise_ahead == 0.0
+    assert looked(hill, TERRAIN_LOOKAHD=0.0).rise_ahead == 0.0
+    assert looked(raster((450.0, 500.0)), TERRAIN_SPACING=50.0).rise_ahead == pytest.approx(155.0, abs=0.01)
+    assert looked(hill, TECS_CLMB_MAX=10.0).rise_ahead == pytest.approx(40.0, abs=0.01)
+
+
+def test_ground_that_is_not_known_changes_nothing() -> None:
+    assert looked(raster((300.0, math.nan), (400.0, 380.0))).rise_ahead == pytest.approx(40.0, abs=0.01)
