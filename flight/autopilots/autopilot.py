@@ -363,6 +363,13 @@ class Autopilot(ABC):
         """Whether it follows the fly-by path, and does not turn by an acceptance radius."""
         return self.acceptance_radius is None
 
+    def settings_not_flown(self, *, returns: bool) -> list[str]:
+        """Return the settings that change the flight path and that no flight shows, as sentences without a full stop.
+
+        returns: True if the mission returns to launch.
+        """
+        return []
+
     @property
     def follows_ground(self) -> bool:
         """True if it follows the ground along a leg to a height above terrain."""

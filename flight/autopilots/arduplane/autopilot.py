@@ -141,6 +141,18 @@ class ArduPlane(Autopilot):
         """WP_RADIUS."""
         return self.parameters.wp_radius
 
+    def settings_not_flown(self, *, returns: bool) -> list[str]:
+        """ALT_OFFSET, SOAR_ENABLE, Q_ENABLE, RUDDER_ONLY, a fence of its own, and returns that follow the terrain."""
+        made = self.parameters
+        switched = {"ALT_OFFSET": made.altitude_offset, "SOAR_ENABLE": made.soaring, "Q_ENABLE": made.quadplane}
+        switched["RUDDER_ONLY"] = made.rudder_only
+        left = [f"{name} {value:g} changes the flight and is not flown" for name, value in switched.items() if value]
+        if made.has_fence_of_its_own:
+            left.append(f"the circle and the altitudes of FENCE_TYPE {made.fence_type:g} are not judged")
+        if returns and made.follows_terrain_home:
+            left.append(f"TERRAIN_FOLLOW {made.terrain_follow:g} has the return follow the terrain, which is not flown")
+        return left
+
     @property
     def follows_ground(self) -> bool:
         """TERRAIN_ENABLE."""

@@ -277,7 +277,8 @@ def _height_over_ground(
         # Above a climb by more than the threshold, the climb is drawn anew from here.
         rest = end - here if end - here >= parameters.glide_slope_min else 0.0
         own.from_above_ground, height = end - rest / left, end - rest
-    return own.ground + height + max(0.0, own.rise_ahead + min(0.0, change))
+    asked: float = own.ground + height + max(0.0, own.rise_ahead + min(0.0, change))
+    return asked
 
 
 @inner

@@ -141,11 +141,18 @@ DEFINITIONS = {
     "fence_enable": Definition("FENCE_ENABLE", 0.0, 0.0, 2.0),
     "fence_auto_enable": Definition("FENCE_AUTOENABLE", 0.0, 0.0, 3.0),
     "fence_action": Definition("FENCE_ACTION", 1.0, 0.0, 8.0),
+    "fence_type": Definition("FENCE_TYPE", 4.0, 0.0, 15.0),
+    "altitude_offset": Definition("ALT_OFFSET", 0.0, -32767.0, 32767.0),
+    "soaring": Definition("SOAR_ENABLE", 0.0, 0.0, 1.0),
+    "quadplane": Definition("Q_ENABLE", 0.0, 0.0, 2.0),
+    "rudder_only": Definition("RUDDER_ONLY", 0.0, 0.0, 1.0),
 }
 # Bit of FLIGHT_OPTIONS that has a return climb to its height before it turns.
 CLIMB_BEFORE_TURN = 1 << 4
 # Bits of TERRAIN_FOLLOW: every mode, and RTL.
 _FOLLOW_ALWAYS, _FOLLOW_HOME = 1 << 0, 1 << 4
+# Bits of FENCE_TYPE that are limits of its own, and not the mission's fence: altitudes and a circle about home.
+_OWN_FENCES = 0b1011
 # Of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
 _USUAL_LOITER_RADIUS = 60.0
 # Read, and no flight of ours shows it: a return is on a slope where this would have it follow the terrain.
@@ -200,6 +207,9 @@ class ArduPilotParameters:
     landing_pitch: rad, least of the flare.  landing_pitch_max: rad, its largest; 0 for that of flight.
     landing_speed_weight: of TECS in a landing, negative for one that falls to 0 on its way.  landing_time: s, of TECS.
     landing_sink_change: m/s of sink a metre beyond the landing point.  flare_holdoff: m, at which the sink is the last.
+    fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
+    altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 where it soars, has
+        lift motors, or steers by the rudder alone; no flight shows any of these four.
     throttle_failsafe to fence_auto_enable: when it leaves its mission by itself, and what it does then; see
         `flight.autopilots.arduplane.failsafes`.
     """
@@ -293,6 +303,11 @@ class ArduPilotParameters:
     fence_enable: float = field(init=False)
     fence_auto_enable: float = field(init=False)
     fence_action: float = field(init=False)
+    fence_type: float = field(init=False)
+    altitude_offset: float = field(init=False)
+    soaring: float = field(init=False)
+    quadplane: float = field(init=False)
+    rudder_only: float = field(init=False)
 
     def __post_init__(self) -> None:
         """Take the values to SI."""
@@ -341,6 +356,16 @@ class ArduPilotParameters:
         [False, True, False, True]
         """
         return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS | _FOLLOW_HOME))
+
+    @property
+    def has_fence_of_its_own(self) -> bool:
+        """True if its fence is on, acts, and has a circle about home or altitudes.
+
+        >>> [default_parameters().changed(FENCE_ENABLE=1, FENCE_TYPE=kind).has_fence_of_its_own for kind in (4, 6)]
+        [False, True]
+        """
+        enabled = self.fence_enable > 0.0 or self.fence_auto_enable > 0.0
+        return enabled and self.fence_action > 0.0 and bool(int(self.fence_type) & _OWN_FENCES)
 
     @property
     def return_radius(self) -> float:

@@ -129,6 +129,13 @@ class Px4(Autopilot):
         """NAV_ACC_RAD; up to 1.16 guidance's own switch distance at sea level where that is more."""
         return self.turn_distance(math.pi, 0.0)
 
+    def settings_not_flown(self, *, returns: bool) -> list[str]:
+        """GF_MAX_HOR_DIST and GF_MAX_VER_DIST where GF_ACTION acts, and COM_FLT_TIME_MAX."""
+        made, names = self.parameters, ["COM_FLT_TIME_MAX"]
+        if made["GF_ACTION"] > 0.0:
+            names += ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
+        return [f"{name} {made[name]:g} ends a mission and is not judged" for name in names if made[name] > 0.0]
+
     @property
     def reads_acceptance(self) -> bool:
         """The second parameter of a waypoint is for PX4's multicopters alone."""

@@ -121,9 +121,13 @@ DEFINITIONS = {
     "service_ceiling": Definition("FW_SERVICE_CEIL", -1.0, -1.0, 20_000.0),
     "return_descent": Definition("RTL_DESCEND_ALT", 100.0, 0.0, 10_000.0),
     "return_landing": Definition("RTL_LAND_DELAY", -1.0, -1.0, 10_000.0),
+    "fence_action": Definition("GF_ACTION", 2.0, 0.0, 5.0),
+    "fence_distance": Definition("GF_MAX_HOR_DIST", 0.0, 0.0, 1e6),
+    "fence_height": Definition("GF_MAX_VER_DIST", 0.0, 0.0, 1e6),
+    "longest_flight": Definition("COM_FLT_TIME_MAX", -1.0, -1.0, 1e6),
 }
 # Read, and no flight of ours shows what another value than PX4's own would do.
-NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-15:])
+NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
 _BY_NAME = {definition.name: definition for definition in DEFINITIONS.values()}
 # A station saves every parameter of the vehicle, a thousand and more; a person writes down what is of interest.
 _WHOLE_SET = 300

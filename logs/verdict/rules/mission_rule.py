@@ -151,7 +151,7 @@ def _unjoined(setup: FlightSetup) -> Finding:
 
 
 def _not_flown(setup: FlightSetup) -> Iterator[Finding]:
-    """One finding for each item that changes the flight path and is not flown as the autopilot would."""
+    """Return a finding for each item and setting that changes the flight path and is not flown."""
     left = [(one.item, one.text) for one in setup.route.open_items]
     if not setup.autopilot.follows_ground:
         held = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
@@ -164,13 +164,15 @@ def _not_flown(setup: FlightSetup) -> Iterator[Finding]:
             for item in setup.mission.items
             if item.command == C.DO_SET_HOME
         ]
-    for seq, text in left:
+    returns = any(item.command == C.NAV_RETURN_TO_LAUNCH for item in setup.mission.items)
+    settings = [(None, text) for text in setup.autopilot.settings_not_flown(returns=returns)]
+    for seq, text in [*left, *settings]:
         yield make_finding(
             "mission",
             Place("mission", item=seq),
             ok=None,
             reason=text,
-            faults=[message(f"item {seq}: {text}")],
+            faults=[message(text if seq is None else f"item {seq}: {text}")],
             source="route",
             method="mission items",
             check=NOT_FLOWN,

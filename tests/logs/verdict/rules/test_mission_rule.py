@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import default_parameters as arduplane_parameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import default_parameters, parameters_of
 from logs.recording.setup_schema import RouteTable
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import Place
+from logs.verdict.rules.mission_rule import mission_findings
 from tests.flight.autopilots.arduplane.kept_missions import setup_by_law
 from tests.mission_lines import mission, setup_of, wp
 
@@ -311,3 +314,49 @@ def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
     # Wherever in it that is; a waypoint there is flown to.
     assert not setup_by_law(mission(wp(0, 300, 300, command=22), *around)).route.unjoined
     assert setup_by_law(mission(wp(0, 300, 300), *around)).route.unjoined
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({}, ()),
+        ({"ALT_OFFSET": -120.0}, ("ALT_OFFSET -120",)),
+        ({"SOAR_ENABLE": 1.0, "Q_ENABLE": 1.0}, ("SOAR_ENABLE 1", "Q_ENABLE 1")),
+        ({"FENCE_ENABLE": 1.0}, ()),
+        ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0}, ("FENCE_TYPE 2",)),
+        ({"FENCE_AUTOENABLE": 1.0, "FENCE_TYPE": 5.0}, ("FENCE_TYPE 5",)),
+        ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 3.0, "FENCE_ACTION": 0.0}, ()),
+        ({"FENCE_TYPE": 3.0}, ()),
+        ({"TERRAIN_FOLLOW": 16.0}, ("TERRAIN_FOLLOW 16",)),
+    ],
+)
+def test_settings_of_arduplane_that_no_flight_shows_leave_the_verdict_open(
+    values: dict[str, float], said: tuple[str, ...]
+) -> None:
+    law = ArduPlane(arduplane_parameters().changed(**values))
+    lines = wp(0, 0), wp(0, 900), "0 20 0 0 0 0 0 0 0"
+    left = [item for item in mission_findings(replace(setup_of(*lines), autopilot=law)) if item.check == "not flown"]
+    assert [item.ok for item in left] == [None] * len(said)
+    assert all(words in item.reason for item, words in zip(left, said, strict=True))
+    # Without a return none follows the terrain.
+    alone = mission_findings(replace(setup_of(*lines[:2]), autopilot=law))
+    assert not any("TERRAIN_FOLLOW" in item.reason for item in alone)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({}, ()),
+        ({"GF_MAX_HOR_DIST": 300.0, "GF_MAX_VER_DIST": 50.0}, ("GF_MAX_HOR_DIST 300", "GF_MAX_VER_DIST 50")),
+        ({"GF_MAX_HOR_DIST": 300.0, "GF_ACTION": 0.0}, ()),
+        ({"COM_FLT_TIME_MAX": 60.0}, ("COM_FLT_TIME_MAX 60",)),
+    ],
+)
+def test_settings_of_px4_that_no_flight_shows_leave_the_verdict_open(
+    values: dict[str, float], said: tuple[str, ...]
+) -> None:
+    law = Px4(default_parameters().changed(**values))
+    found = mission_findings(replace(setup_of(wp(0, 0), wp(0, 900)), autopilot=law))
+    left = [item for item in found if item.check == "not flown"]
+    assert [item.ok for item in left] == [None] * len(said)
+    assert all(words in item.reason for item, words in zip(left, said, strict=True))
