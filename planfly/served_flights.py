@@ -192,7 +192,9 @@ class ServedFlights:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
         texts = mission_texts(setup, verdict)
-        judged = MissionJudged(request.number, True, verdict.flies, texts, home, items, start)
+        # A mission that is not judged in full is armed, with a warning: MAVSDK writes speeds over ground, for example.
+        arms = verdict.flies or verdict.undecided
+        judged = MissionJudged(request.number, True, arms, texts, home, items, start)
         return PreparedFlight(setup, flight.map), judged
 
     def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:

@@ -122,7 +122,7 @@ class MissionJudged:
 
     number: of the request.
     possible: whether the mission can be started at all.
-    flyable: the verdict on its geometry.
+    flyable: False if a finding of its geometry failed.
     texts: what stations are sent about it.
     home: the mission's, or the ground at its start; None if it is not possible.
     items: seq of the item at each waypoint, -1 for none.

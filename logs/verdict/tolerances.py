@@ -148,9 +148,9 @@ ROUGH_COURSE, ROUGH_SLOPE = math.radians(0.75), math.radians(0.5)
 # m.  Where neither mission nor autopilot says what counts as reached: this beside where the fly-by path passes; and the
 # corridor is as much wider than a turn that needs more than it.
 PASS = 10.0
-# Ratio.  An autopilot that turns by a law of its own swings behind a waypoint that it flies over up to this many times
-# as far beyond the next leg as R (1 - cos turn): up to 1.05 in 168 turns of 95 to 180 degrees by ArduPlane's simulated
-# control laws and up to 1.24 in 80 by PX4's, in wind of up to 12 m/s and light turbulence.
+# Ratio.  An autopilot that turns by a law of its own, at the waypoint or before it, swings up to this many times as far
+# beyond the next leg as R (1 - cos turn): up to 1.05 in 168 turns of 95 to 180 degrees by ArduPlane's simulated control
+# laws and up to 1.24 in 80 by PX4's, in wind of up to 12 m/s and light turbulence.
 FLY_OVER_SWING_RATIO = 1.25
 # m.  Approaches to a waypoint within this of the closest are equally close, as on a path that crosses itself above or
 # below: of them the one nearest in height counts.

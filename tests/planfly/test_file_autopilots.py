@@ -76,7 +76,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 )
 @pytest.mark.usefixtures("files")
 def test_the_autopilot_is_taken_from_the_files(mission: str, options: dict[str, str], flies: str) -> None:
-    judged = planfly.judge(mission, **options)  # type: ignore[arg-type]
+    judged = planfly.judge(mission, geometry=True, **options)  # type: ignore[arg-type]
     assert judged.setup.autopilot.name == flies
     (line,) = [line for line in judged.verdict.lines if line.startswith("Autopilot: ")]
     taken = flies == "px4" and "autopilot_law" not in options

@@ -93,7 +93,10 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     ends = slice(leg, leg + 2)
     depths = corner_depths(requirements)[ends]
     if not requirements.setup.autopilot.follows_path:
-        depths = depths * np.where(requirements.setup.route.fly_over[ends], FLY_OVER_SWING_RATIO, 1.0)
+        # It may turn as late as at the waypoint.
+        radius = np.where(requirements.setup.route.arcs[ends] == 0.0, requirements.radius[ends], 0.0)
+        swings = np.where(np.isfinite(radius), radius, 0.0) * (1.0 - np.cos(requirements.turns[ends]))
+        depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
     turning = float(depths.max()) + PASS
     if requirements.setup.autopilot.loiter_rules.at_middle:
         arcs, tightest = requirements.setup.route.arcs[ends], requirements.tightest[ends]

@@ -48,14 +48,16 @@ def test_each_keyword_changes_its_own(tmp_path: Path) -> None:
         assert changed_scenario(scenario, params=params).flight.params == str(tmp_path / "my.parm")
 
 
-def test_parameters_mean_arduplane_and_a_law_of_guidance_takes_its_place() -> None:
+def test_parameters_mean_arduplane_and_a_law_of_guidance_takes_its_place(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.parm"
+    mine.write_text("WP_RADIUS 80\n", encoding="utf-8")
     scenario = small_scenario(wind={"speed_mps": 3.0, "from_deg": 200.0, "turbulence": "light"})
-    by_arduplane = changed_scenario(scenario, params="mine.parm")
+    by_arduplane = changed_scenario(scenario, params=mine)
     assert by_arduplane.flight.steering == ("ardupilot", "path", "gnss")
-    assert by_arduplane.flight.params == str(Path("mine.parm").resolve())
+    assert by_arduplane.flight.params == str(mine)
     again = changed_scenario(by_arduplane, guidance="l1").flight
     assert (again.params, again.steering) == (None, ("ideal", "l1", "perfect"))
-    assert changed_scenario(scenario, params="mine.parm", nav="rtk").flight.steering.nav == "rtk"
+    assert changed_scenario(scenario, params=mine, nav="rtk").flight.steering.nav == "rtk"
     # A program is an ArduPlane, whatever the scenario says.
     assert (
         changed_scenario(changed_scenario(scenario, guidance="l1"), autopilot="arduplane").flight.steering.autopilot

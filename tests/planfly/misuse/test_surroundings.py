@@ -25,7 +25,8 @@ from world.files import hold, write_whole
 
 ROOT = Path(__file__).parents[3]
 Done: TypeAlias = subprocess.CompletedProcess
-CHECK = ("check", "m.waypoints", "--scenario", "field.toml", "--guidance", "path")
+# Of a mission whose take-off is not judged: exit code 3.
+CHECK = ("check", "m.waypoints", "--geometry", "--scenario", "field.toml", "--guidance", "path")
 
 
 @pytest.fixture
@@ -129,7 +130,7 @@ def test_names_of_any_kind(name: str, folder: Path, capsys: pytest.CaptureFixtur
     """Read, and in an error on one line that turns no text around."""
     shutil.copy("m.waypoints", name)
     given = f"./{name}"
-    assert main(["check", given, *CHECK[2:]]) == 0
+    assert main(["check", given, *CHECK[2:]]) == 3
     assert main(["export", given, f"{given}.plan"]) == 0
     assert Path(f"{name}.plan").is_file()
     capsys.readouterr()
@@ -151,7 +152,7 @@ def test_a_name_that_is_no_text(folder: Path, capsys: pytest.CaptureFixture[str]
 def test_a_target_that_is_a_link_stays_one(folder: Path) -> None:
     (folder / "real").mkdir()
     (folder / "link.json").symlink_to(folder / "real" / "verdict.json")
-    assert main([*CHECK, "--json", "link.json"]) == 0
+    assert main([*CHECK, "--json", "link.json"]) == 3
     assert (folder / "link.json").is_symlink()
     assert (folder / "real" / "verdict.json").read_text(encoding="utf-8").startswith("{")
     # One that leads nowhere is an error with its own name.
@@ -166,7 +167,7 @@ def test_a_target_that_is_a_link_stays_one(folder: Path) -> None:
 )
 def test_a_link_that_leads_to_itself(argv: tuple[str, str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "loop").symlink_to(folder / "loop")
-    assert main(["check", "m.waypoints", *argv]) == (1 if argv[0] == "--json" else 2)
+    assert main(["check", "--geometry", "m.waypoints", *argv]) == (1 if argv[0] == "--json" else 2)
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1
     assert "loop" in said[0]

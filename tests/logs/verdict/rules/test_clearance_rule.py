@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.mission.items import Command, Frame, MissionItem
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
@@ -49,17 +48,6 @@ def test_clearance_is_exact_and_says_where() -> None:
     assert failing(judge(low, fly_path(low))) == {("clearance", leg(1))}
     assert failing(judge_geometry(low)) == {("clearance", leg(1))}
     assert of(judge_geometry(low), "clearance", leg(1)).reason.endswith("m are required")
-    # A height above terrain is one of the waypoint; what fails is the straight leg to it.
-    place = MissionItem(7, Command.NAV_WAYPOINT, Frame.GLOBAL_TERRAIN_ALT, (0.0,) * 4, 0.0, 0.0, 85.0)
-    numbered = replace(low.route, items=np.array([5, 6, 7]))
-    for frame, said in (
-        (Frame.GLOBAL_TERRAIN_ALT, "; its height above terrain holds at its waypoint"),
-        (Frame.GLOBAL, ""),
-    ):
-        made = replace(low, route=numbered, mission=replace(low.mission, items=(replace(place, frame=frame),)))
-        for verdict in (judge_geometry(made), judge(made, fly_path(made))):
-            rest = of(verdict, "clearance", leg(1)).reason.partition("m are required")[2]
-            assert rest.partition("; the planned")[0].partition(",")[0] == said
     dive = fly_path(setup, up=bump(4500.0, -285.0, 300.0))
     assert ("departure", FLIGHT) in failing(judge(setup, edited(dive, position=dive.position - [0, 0, 20.0])))
 
