@@ -456,7 +456,7 @@ class Autopilot(ABC):
 
     @property
     def route_rules(self) -> RouteRules:
-        """How it flies the route of a mission."""
+        """Rules by which it flies the route of a mission."""
         turn_distance = None if self.follows_path else self.turn_distance
         return RouteRules(self.return_rules, self.loiter_rules, self.reads_as_px4, turn_distance)
 

@@ -117,7 +117,7 @@ _PROGRAMS: Mapping[str, str] = {
 
 
 class ParameterOrigin(NamedTuple):
-    """What a parameter file was written for.
+    """Autopilot and vehicle that a parameter file was written for.
 
     autopilot: "ardupilot" or "px4"; "" where neither is clear.
     vehicle: of another kind than an aeroplane, in words; "" for an aeroplane, or where nothing says so.

@@ -172,7 +172,7 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
 
 
 class RouteRules(NamedTuple):
-    """How an autopilot flies the route of a mission.
+    """Rules by which an autopilot flies the route of a mission.
 
     returns: its returns to launch.
     loiters: its loiters.

@@ -274,7 +274,7 @@ def _height_over_ground(
     left = 1.0 - max(0.0, along)
     height = end - change * left
     if change > 0.0 and 0.0 < parameters.glide_slope_threshold < here - height:
-        # Above a climb by more than the threshold, the climb is drawn anew from here.
+        # Above a climb by more than the threshold, the climb is drawn again from here.
         rest = end - here if end - here >= parameters.glide_slope_min else 0.0
         own.from_above_ground, height = end - rest / left, end - rest
     asked: float = own.ground + height + max(0.0, own.rise_ahead + min(0.0, change))

@@ -1,4 +1,4 @@
-"""How far along its route a track got, and which rows of it lie along each leg, by their places alone.
+"""Lay a track along its route by positions alone: the progress made, and the rows along each leg.
 
 A route that comes back to where it began, or flies the same round again, is near to many of its waypoints at once.
 So the whole track is laid along the whole route: both only go forward, and the track may end anywhere on the way.
@@ -24,8 +24,10 @@ _SAMPLE_SPACING_M = 20.0
 _MAX_CELLS = 16_000_000
 # Rows that far before and after the rows along a waypoint's two legs may be those nearest to it, m of track.
 _WINDOW_MARGIN_M = 300.0
-# A part of the route without any of the track costs this share of its squared distance, and this distance squared.
-_SKIP_SHARE, _SKIP_DISTANCE_M = 0.1, 15.0
+# A part of the route without any of the track costs this share of its squared distance,
+_SKIP_SHARE = 0.1
+# and this distance squared, m.
+_SKIP_DISTANCE_M = 15.0
 # A flight that may begin anywhere on the route begins at the earliest place of equally near ones, m per sample.
 _LATE_START_M = 1.0
 # A loiter is flown within this of its drawn circle, m; how often it goes around it is of no importance here.
@@ -34,7 +36,7 @@ _LOITER_MARGIN_M = 60.0
 
 @dataclass(frozen=True, slots=True)
 class RouteProgress:
-    """How far along a route of w waypoints a track got.
+    """Progress of a track along a route of w waypoints.
 
     first, last: (w,) rows between which each waypoint may have been passed; first > last for one that the flight did
     not set out for.
