@@ -92,8 +92,10 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         return half, "scenario"
     ends = slice(leg, leg + 2)
     depths = corner_depths(requirements)[ends]
-    if not requirements.setup.autopilot.follows_path:
-        # It may turn as late as at the waypoint.
+    source = requirements.setup.source
+    radius_is_known = source is None or source.aircraft_known
+    if radius_is_known and not requirements.setup.autopilot.follows_path:
+        # The autopilot may turn as late as at the waypoint.  Without a named aircraft the turn radius is a guess.
         radius = np.where(requirements.setup.route.arcs[ends] == 0.0, requirements.radius[ends], 0.0)
         swings = np.where(np.isfinite(radius), radius, 0.0) * (1.0 - np.cos(requirements.turns[ends]))
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
