@@ -21,7 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.arduplane_sitl.flight import fly_autopilot
 from flight.mission.from_plan import plan_mission
 from flight.simulation.setup import FlightSetup
@@ -191,7 +193,9 @@ def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
     """Fly one random plan with both."""
     setup, airframe = random_setup(seed, steep=steep)
     law = simulate(setup, airframe.aircraft)
-    real, _ = fly_autopilot(setup, airframe.aircraft, BINARY)
+    assert isinstance(setup.autopilot, ArduPlane)
+    autopilot = ArduPlaneSitl.flying(setup.autopilot, BINARY)
+    real, _ = fly_autopilot(setup, airframe.aircraft, autopilot)
     (law_across, law_up), (across, up) = (_along_legs(setup, flown.track) for flown in (law, real))
     wind = setup.scenario.wind
     compared = Compared(

@@ -14,13 +14,13 @@ from typing import Any
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight
-from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import load_parameters
+from flight.autopilots.px4_sitl.autopilot import Px4Sitl
 from flight.autopilots.px4_sitl.flight import Px4Flight
 from flight.autopilots.sitl.flight import SitlFlight
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import fly_to_end
-from tests.autopilots import find_arduplane, find_px4
+from tests.autopilots import arduplane_program, find_arduplane, find_px4
 from tests.setups import setup_maker, standard
 
 ROUNDS = 3
@@ -65,10 +65,11 @@ def run() -> dict[str, Any]:
         return setup_maker(aerosonde)(standard(), wind=(5.0, 250.0), turbulence="light", seed=seed)
 
     def arduplane(program: Path, seed: int) -> SitlFlight:
-        return AutopilotFlight(mission(seed), aerosonde, program, {})
+        return AutopilotFlight(mission(seed), aerosonde, arduplane_program(program), {})
 
     def px4(program: Path, seed: int) -> SitlFlight:
-        return Px4Flight(replace(mission(seed), autopilot=Px4(load_parameters(aerosonde))), aerosonde, program)
+        autopilot = Px4Sitl(load_parameters(aerosonde), binary=program)
+        return Px4Flight(replace(mission(seed), autopilot=autopilot), aerosonde, autopilot)
 
     found: dict[str, Any] = {}
     for name, program, make_flight, goal in (

@@ -38,13 +38,12 @@ Paths are `str` or `pathlib.Path`.  The command line is ``planfly --help``.
 
 from typing import TYPE_CHECKING, Any
 
+from planfly._version import __version__ as __version__
 from planfly.own_packages import refuse_hidden_packages
 from planfly.process_setup import prepare_child
 
 refuse_hidden_packages()
 prepare_child()
-
-__version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from flight.simulation.track import Track as Track

@@ -29,6 +29,9 @@ from world.scenario import Scenario, load_scenario, with_zones
 # Fences named beside a mission or log: files of fence items, and of zones.
 
 
+FencePaths = str | Path | Sequence[str | Path]
+
+
 @dataclass(frozen=True, slots=True)
 class NamedFences:
     """What the files hold.
@@ -56,8 +59,8 @@ class NamedFences:
         return scenario
 
 
-def read_named_fences(files: Sequence[str]) -> NamedFences:
-    """Read named files of fences and zones, by the suffix of each.
+def read_named_fences(files: FencePaths) -> NamedFences:
+    """Read one or more files of fences and zones, by the suffix of each.
 
     Raises MissionError or ScenarioError for a file that cannot be read, that holds no fence, or one whose shapes are
     none.
@@ -67,14 +70,14 @@ def read_named_fences(files: Sequence[str]) -> NamedFences:
     """
     items: list[MissionItem] = []
     zones = []
-    for file in files:
+    for file in [files] if isinstance(files, str | Path) else files:
         path = Path(file)
         if is_zone_file(path):
-            zones.append((file, read_zone_file(path, file)))
+            zones.append((str(file), read_zone_file(path, str(file))))
             continue
         found = read_fence(path)
         # Shapes are checked while it is known which file they are from.
-        fence_zones(found, GeoOrigin(found[0].lat_deg, found[0].lon_deg), file)
+        fence_zones(found, GeoOrigin(found[0].lat_deg, found[0].lon_deg), str(file))
         items += found
     return NamedFences(tuple(items), tuple(zones))
 

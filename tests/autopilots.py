@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.sitl import flight as sitl_flight
 
 _AUTOPILOTS = Path(__file__).parent / "flight" / "autopilots"
@@ -31,6 +34,11 @@ def _write_program(program: Path, fake: Path, fault: str) -> Path:
     program.write_text(f'#!/bin/sh\nexec {shlex.join([sys.executable, str(fake), fault])} "$@"\n', encoding="utf-8")
     program.chmod(0o755)
     return program
+
+
+def arduplane_program(program: Path) -> ArduPlaneSitl:
+    """Return the autopilot of an ArduPlane program, with the aerosonde's parameters."""
+    return ArduPlaneSitl(load_parameters(load_aircraft("aerosonde")), binary=program)
 
 
 def shorten_run_in(patch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,7 @@ from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission_files.wpl import waypoints_text
 from flight.simulation.track import Track
-from logs.importers.motion_log import MotionLog, Samples
+from logs.importers.motion import MotionLog, Samples
 from planfly.identification.manoeuvres import identification_mission
 from tests.logs.importers.written_logs import DataflashWriter
 

@@ -17,7 +17,7 @@ from aircraft.catalog import Aircraft, read_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission_files.wpl import waypoints_text
 from flight.simulation.track import Track
-from logs.importers.motion_log import MotionLog
+from logs.importers.motion import MotionLog
 from planfly.identification.manoeuvres import identification_mission
 from tests.instrumented_flights import HOME, Sensors, sensed
 

@@ -2,11 +2,14 @@
 
 from abc import abstractmethod
 from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.autopilot import Autopilot, AutopilotProgram, describe_program
 from flight.simulation.airborne import Airborne
 from flight.simulation.setup import FlightSetup
 
@@ -23,13 +26,19 @@ class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
         """End the program in order, and move its own log to a file; whether there was one."""
 
 
+@dataclass(frozen=True)
 class ProgramAutopilot(Autopilot):
     """An autopilot that is a program of its own; `law` is the autopilot that models it.
 
-    log_suffix: of the log that the program itself writes.
+    log_suffix: suffix of the log that the program itself writes.
+    program: the program that flew; None before the flight.
+    binary: the program's file; None for a flight that a log holds.
     """
 
+    own: ClassVar[np.dtype[np.record] | None] = None
     log_suffix: ClassVar[str]
+    program: AutopilotProgram | None = None
+    binary: Path | None = field(default=None, compare=False)
     # Whatever its law does: unless its own class says otherwise, a program is put into the air on a rail.
     flies_ground: ClassVar[bool] = False
 
@@ -42,6 +51,22 @@ class ProgramAutopilot(Autopilot):
     @abstractmethod
     def flying(cls, law: Any, binary: Path) -> Self:
         """The program, with the settings of its law.  binary: its file."""
+
+    def described(self, aircraft: str) -> str:
+        """Describe the program and the parameters that a person changed; before the flight its law."""
+        return super().described(aircraft) if self.program is None else describe_program(self.program, aircraft)
+
+    @property
+    def version(self) -> str:
+        """The version that the program states, or the release of the law before the flight."""
+        return super().version if self.program is None else self.program.version
+
+    @property
+    def file(self) -> Path:
+        """The program's file.  Raises ValueError if the autopilot is that of a recorded flight."""
+        if self.binary is None:
+            raise ValueError("the program of a recorded flight is not at hand")
+        return self.binary
 
     @abstractmethod
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:

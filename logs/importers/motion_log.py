@@ -1,90 +1,17 @@
-"""What a log holds of an aircraft's motion, unthinned: inertial sensors, servo outputs, attitude, air data, battery.
-
-`logs.importers.raw_log` has what a verdict needs, where a vehicle was; this is what identifies its model.  ArduPilot's
-logs are read here, PX4's by `logs.importers.px4_motion`.
-"""
+"""Read the motion of an aircraft from a log: ArduPilot's logs here, PX4's logs in `logs.importers.px4_motion`."""
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
 from logs.importers.dataflash_log import logged_home, program_and_vehicle
-from logs.importers.raw_log import VehicleKind
+from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_on_ground, rising
 from world.errors import LogError
 from world.extras import need_extra
-
-Floats = NDArray[np.float64]
-
-# Slower than this it stands on the ground, m/s.
-_STANDING = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Samples:
-    """Rows of one kind: time (n,) s of the log's clock, rising; values (n, k)."""
-
-    time: Floats
-    values: Floats
-
-    @property
-    def rate(self) -> float:
-        """Rows a second, by the median step; 0 of fewer than two."""
-        return float(1.0 / max(1e-6, np.median(np.diff(self.time)))) if len(self.time) > 1 else 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class MotionLog:
-    """A log's motion.  SI and radians; none of a kind has no rows.
-
-    source: the file.  sha256: of its bytes.  program: what flew.  vehicle: what it is.
-    inertial: (n, 6) specific force forward, right, down, and p, q, r, of the first inertial sensor.
-    outputs: (n, 14) servo outputs, microseconds, the first in column 0.
-    attitude: (n, 3) roll, pitch, yaw.  velocity: (n, 3) north, east, down.  wind: (n, 2) north, east, as it moves.
-    airspeed: (n, 1) equivalent, m/s, of a sensor that was in use.  ratio: (n, 1) true by equivalent airspeed.
-    height: (n, 1) m above sea level.  battery: (n, 2) V and A.
-    modes: time and number of the flight mode.  parameters: by name; those that changed in flight keep the last.
-    program_kind: whose log it is.
-    controls: (n, 4) pitch up, roll and yaw to the right as shares of full travel, and throttle (0..1), of a log that
-        has those in place of pulses.
-    elevons: whether the controls are made by elevons.
-    hovering: stretches (s) on lifting motors that the log names itself.
-    home: latitude and longitude, degrees, and m above sea level: as the vehicle had it last (ORGN), or its first
-        position on the ground; None where neither is logged.
-    """
-
-    source: str
-    sha256: str
-    program: str
-    vehicle: VehicleKind
-    inertial: Samples
-    outputs: Samples
-    attitude: Samples
-    velocity: Samples
-    wind: Samples
-    airspeed: Samples
-    ratio: Samples
-    height: Samples
-    battery: Samples
-    modes: tuple[tuple[float, int], ...] = ()
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    home: tuple[float, float, float] | None = None
-    program_kind: Literal["ardupilot", "px4"] = "ardupilot"
-    controls: Samples = field(default_factory=lambda: Samples(np.zeros(0), np.zeros((0, 4))))
-    elevons: bool = False
-    hovering: tuple[tuple[float, float], ...] = ()
-
-    @property
-    def moved(self) -> Samples:
-        """What was told to the surfaces: controls where the log has them, or else pulses."""
-        return self.controls if len(self.controls.time) else self.outputs
-
 
 _DEGREE = math.pi / 180.0
 _NAMES = (
@@ -92,7 +19,6 @@ _NAMES = (
     "VER", "ORGN",
 )  # fmt: skip
 _INSTANCES = ("I", "C", "Inst", "Instance")
-OUTPUTS = 14
 
 
 def read_motion(path: Path) -> MotionLog:
@@ -203,34 +129,3 @@ class _Dataflash:
         if home is not None:
             return home.lat_deg, home.lon_deg, home.alt
         return first_on_ground(self._first((("POS", ("Lat", "Lng", "Alt")),)), velocity)
-
-
-def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """The first position at which a vehicle stood still; None of a log that begins in flight.
-
-    position: (n, 3) latitude, longitude (degrees) and height (m).  velocity: (n, 3) m/s.
-
-    >>> place = Samples(np.array([1.0, 2.0]), np.array([[48.0, 11.0, 520.0], [48.0, 11.001, 540.0]]))
-    >>> first_on_ground(place, Samples(np.array([0.0, 3.0]), np.zeros((2, 3))))
-    (48.0, 11.0, 520.0)
-    """
-    if not len(position.time) or not len(velocity.time):
-        return None
-    time, place = position.time, position.values
-    speed = np.interp(time, velocity.time, np.linalg.norm(velocity.values, axis=1), left=np.inf, right=np.inf)
-    known = (np.abs(place[:, :2]) <= [90.0, 180.0]).all(axis=1) & (place[:, :2] != 0.0).any(axis=1)
-    standing = np.flatnonzero(known & (speed < _STANDING))
-    if not len(standing):
-        return None
-    lat, lon, height = place[standing[0]].tolist()
-    return lat, lon, height
-
-
-def rising(time: Floats, values: Floats) -> Samples:
-    """Rows in the order of their times; those that are no numbers and those of the same time left out."""
-    good = np.isfinite(time) & np.isfinite(values).all(axis=1)
-    time, values = time[good], values[good]
-    order = np.argsort(time, kind="stable")
-    time, values = time[order], values[order]
-    keep = np.concatenate([[True], np.diff(time) > 0.0]) if len(time) else np.zeros(0, np.bool_)
-    return Samples(time[keep], values[keep])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.importers.motion_log import MotionLog, Samples, first_on_ground, rising
+from logs.importers.motion import MotionLog, Samples, first_on_ground, rising
 from logs.importers.px4_log import Topics, open_topics
 from world.errors import LogError
 

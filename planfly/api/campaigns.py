@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from planfly.api.flying import FencePaths, named_fences
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import CampaignBase, is_mission_file, open_campaign
@@ -29,6 +28,7 @@ from planfly.campaigns.tables import DATABASE, WINDS_DATABASE, read_table
 from planfly.campaigns.worker_pool import Workers, in_own_process
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
+from planfly.open_mission import FencePaths, read_named_fences
 from planfly.stages import stage
 from planner.plan import Plan
 from world.errors import PlanflyError
@@ -67,7 +67,7 @@ class _Asked:
         opened = partial(
             in_own_process, open_campaign, self.target, dispersions, planned=planned, scenario_name=self.scenario,
             terrain=self.terrain, seed=self.seed, change=partial(changed_scenario, **self.flown),
-            fences=named_fences(self.fence),
+            fences=read_named_fences(self.fence),
         )  # fmt: skip
         is_planned = isinstance(self.target, Plan) or is_mission_file(self.target)
         if is_planned or (planned is not None and planned.is_file()):

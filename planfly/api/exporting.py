@@ -25,9 +25,17 @@ from logs.views.exports.map_files import (
     return_lines,
     track_line,
 )
-from planfly.api.flying import FencePaths, FlownMission, named_fences
+from planfly.api.flying import FlownMission
 from planfly.first_start import with_warm_up
-from planfly.open_mission import NamedFences, fence_of_plan, is_log, loss_text, open_mission
+from planfly.open_mission import (
+    FencePaths,
+    NamedFences,
+    fence_of_plan,
+    is_log,
+    loss_text,
+    open_mission,
+    read_named_fences,
+)
 from planfly.returns_beside import returns_beside
 from planfly.stages import stage
 from planfly.targets import refuse_existing
@@ -119,7 +127,7 @@ def export(
             if target.suffix.lower() not in (*MAPS, *PARAMETERS, *LOGS):
                 _refuse_unknown(target)
             refuse_existing(target, overwrite, path)
-        found = _read(path, targets, named_fences(fence), at, fenced=bool(fence))
+        found = _read(path, targets, read_named_fences(fence), at, fenced=bool(fence))
         texts = [_text(found, target) for target in targets]
     for target, (text, _) in zip(targets, texts, strict=True):
         write_whole(target, text)

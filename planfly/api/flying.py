@@ -22,6 +22,7 @@ from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits, fligh
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH, FLYING
 from planfly.open_mission import (
+    FencePaths,
     NamedFences,
     OpenedMission,
     ScenarioChange,
@@ -120,9 +121,6 @@ class Judged:
     def returns_line(self) -> str:
         """Returns from a few places of the flight, or of the planned path, in a line; "" without a home."""
         return returns_line(self.setup, self.track)
-
-
-FencePaths = str | Path | Sequence[str | Path]
 
 
 # ----------------------------------------------------------------------
@@ -345,7 +343,7 @@ def judge(
         return Judged(found.setup, found.verdict, lossy=found.lossy, track=found.track, is_log=True)
     source = _source_of(what)
     refuse(source, of_log, "goes with an imported log, not with this file")
-    fences = named_fences(fence)
+    fences = read_named_fences(fence)
     if isinstance(what, FlightLog | FlownMission) or (isinstance(what, str | Path) and is_log(Path(what))):
         refuse(source, flown_with, _AS_FLOWN)
         refuse(source, {"scenario": scenario}, _WHERE_FLOWN)
@@ -437,7 +435,7 @@ def opened_mission(
 ) -> OpenedMission:
     """A plan or a mission file, opened with what is asked for; arguments as of `fly`.  Raises PlanflyError."""
     world, ground = (None if name is None else str(name) for name in (scenario, terrain))
-    fences = fence if isinstance(fence, NamedFences) else named_fences(fence)
+    fences = fence if isinstance(fence, NamedFences) else read_named_fences(fence)
     if isinstance(mission, Plan):
         return open_planned(mission, world, ground, seed=seed, change=change, fences=fences)
     return open_mission(Path(mission), world, ground, seed=seed, change=change, fences=fences)
@@ -451,9 +449,3 @@ def named_program(autopilot: str | Path | None) -> Path | None:
     program = Path(autopilot)
     check_binary(program, program_autopilot(program).title)
     return program
-
-
-def named_fences(files: FencePaths) -> NamedFences:
-    """The fences of one file or of several.  Raises MissionError or ScenarioError."""
-    given = [files] if isinstance(files, str | Path) else files
-    return read_named_fences([str(file) for file in given])

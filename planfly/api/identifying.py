@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft
 from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
-from logs.importers.motion_log import MotionLog, read_motion
+from logs.importers.motion import MotionLog
+from logs.importers.motion_log import read_motion
 from planfly.data_sheets import parse_sheet
 from planfly.first_start import with_warm_up
 from planfly.identification.base_numbers import base_model, scaled

@@ -12,12 +12,12 @@ from logs.recording.recover import recover_log
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from logs.views.report.text import left_lines, refly_lines
-from planfly.api.flying import FencePaths, named_fences
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.first_start import with_warm_up
 from planfly.imported_flights import ImportedFlight, ImportOptions, fly_again, import_flight
 from planfly.kernel_units.unit_kernels import FLYING
+from planfly.open_mission import FencePaths, read_named_fences
 from planfly.stages import stage
 from planfly.targets import REFLOWN, REFLY_FILES, clean_folder, refuse_existing, refuse_folder
 from world.errors import LogError, ScenarioError
@@ -82,7 +82,7 @@ def read_imported(
         datum=datum,
         number=flight,
         wind_given=wind is not None,
-        fences=named_fences(fence),
+        fences=read_named_fences(fence),
     )
     change = partial(changed_scenario, wind=wind, turbulence=turbulence, at=at, aircraft=aircraft)
     return import_flight(Path(log), options, change)

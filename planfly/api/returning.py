@@ -29,13 +29,13 @@ from logs.verdict.returns.returns_text import (
 )
 from logs.verdict.returns.suggest_returns import Remedy, helps, suggest_parameters, suggest_rally
 from logs.views.exports.map_files import glide_shapes, kml_text, map_zones, plan_line, return_lines, track_line
-from planfly.api.flying import FencePaths, FlownMission, named_program, opened_mission, refuse
+from planfly.api.flying import FlownMission, named_program, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.crash_safe_log import INTERRUPTED
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING, GLIDING
-from planfly.open_mission import OpenedMission, is_log
+from planfly.open_mission import FencePaths, OpenedMission, is_log
 from planfly.pipeline import fly_and_judge
 from planfly.program_returns import ProgramReturns, fly_by_program, refuse_program
 from planfly.return_flights import fly_return

@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planfly.api.flying import FencePaths, named_fences
 from planfly.api.planning import flight_entries
 from planfly.arguments import check_arguments
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING
+from planfly.open_mission import FencePaths, read_named_fences
 from world.errors import FlightError, PlanflyError
 from world.extras import needs_extra
 from world.scenario_tables import Guidance, Navigation
@@ -69,7 +69,7 @@ def serve(
     check_arguments(served_speed=speed)
     named = ["" if one is None else str(one) for one in (mission, scenario, terrain)]
     entries = flight_entries(params=params, guidance=guidance, autopilot_law=autopilot_law, nav=nav)
-    fences = named_fences(fence)
+    fences = read_named_fences(fence)
     options = ServeOptions(named[0], named[1] or None, named[2] or None, speed, Path(log), entries, fences, at)
     served = open_served(options)
     if options.logs.exists() and not options.logs.is_dir():

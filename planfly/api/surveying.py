@@ -17,13 +17,13 @@ from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measu
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.views.surveys import survey_chart
-from planfly.api.flying import FencePaths, FlownMission, opened_mission, refuse
+from planfly.api.flying import FlownMission, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import CAMERA, check_arguments, is_camera
 from planfly.crash_safe_log import flight_text
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.open_mission import OpenedMission, is_log
+from planfly.open_mission import FencePaths, OpenedMission, is_log
 from planfly.pipeline import fly_and_judge
 from planfly.stages import stage
 from planfly.survey_remedies import NearMiss, SurveyRemedy, survey_remedies

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 from urllib.parse import urlsplit
 
 from aircraft.catalog import find_aircraft, model_hash
-from planfly import __version__
+from planfly._version import __version__
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.private_cluster import keep_steady_time, private_security

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from planfly import __version__
+from planfly._version import __version__
 from planfly.terminal.command_parser import LineParser
 
 CommandFunction = Callable[[argparse.Namespace], int]

@@ -20,7 +20,7 @@ from flight.autopilots.arduplane.parameters import DEFINITIONS, logged_parameter
 from flight.dynamics.envelope_tables import load_envelope
 from flight.guidance.model_gains import gains_of_model, gains_text
 from flight.mission_files.wpl import waypoints_text
-from logs.importers.motion_log import MotionLog
+from logs.importers.motion import MotionLog
 from planfly.identification.manoeuvres import identification_mission
 from planfly.identification.model_text import identified_xml
 from planfly.identification.servos import ServoOutput

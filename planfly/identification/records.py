@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
-from logs.importers.motion_log import MotionLog, Samples
+from logs.importers.motion import MotionLog, Samples
 from planfly.identification.base_numbers import is_flying_wing
 from planfly.identification.servos import ServoOutput
 from world.errors import LogError

@@ -12,11 +12,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planfly.api.flying import FencePaths
 from planfly.api.planning import Wind, changed_scenario
 from planfly.arguments import check_arguments
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH
+from planfly.open_mission import FencePaths
 from planfly.studio.documents import World
 from planfly.studio.session import open_session
 from world.errors import PlanflyError

@@ -9,8 +9,7 @@ from pathlib import Path
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlaneFromGround
 from flight.autopilots.arduplane.launch import run_up
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
-from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.ground_tick import program_ground_tick
 from flight.autopilots.arduplane_sitl.physics import JsonLockstep, PhysicsPort
 from flight.autopilots.arduplane_sitl.preflight import Preflight, version_text
@@ -21,6 +20,7 @@ from flight.autopilots.arduplane_sitl.process import (
     person_parameters,
 )
 from flight.autopilots.autopilot import AutopilotProgram, Tick
+from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.sitl.conversation import Talk
 from flight.autopilots.sitl.flight import SitlFlight
 from flight.autopilots.sitl.link import AutopilotLink, TcpLink
@@ -36,14 +36,20 @@ _SPOOL = 0.5
 class AutopilotFlight(SitlFlight):
     """One flight of ArduPlane itself; see `SitlFlight`.
 
-    binary: its program.
+    autopilot: flies the setup in place of its own autopilot; has ArduPlane's parameters and the program's file.
     own: a person's parameters, by ArduPlane's names; None takes those of the scenario's file.
     """
 
     def __init__(
-        self, setup: FlightSetup, aircraft: Aircraft, binary: Path, own: Mapping[str, float] | None = None
+        self,
+        setup: FlightSetup,
+        aircraft: Aircraft,
+        autopilot: ProgramAutopilot,
+        own: Mapping[str, float] | None = None,
     ) -> None:
-        autopilot = ArduPlaneSitl(_parameters(setup, aircraft), binary=binary)
+        if not isinstance(autopilot.parameters, ArduPilotParameters):
+            raise TypeError("ArduPlane's program needs ArduPlane's parameters")
+        binary = autopilot.file
         setup = replace(setup, autopilot=autopilot)
         digest = check_binary(binary, autopilot.title)
         servos = load_servo_map(aircraft)
@@ -90,12 +96,6 @@ class AutopilotFlight(SitlFlight):
             yield
 
 
-def _parameters(setup: FlightSetup, aircraft: Aircraft) -> ArduPilotParameters:
-    """The parameters of a setup's ArduPlane; the aircraft's, where another autopilot was to fly."""
-    made = setup.autopilot.parameters
-    return made if isinstance(made, ArduPilotParameters) else load_parameters(aircraft)
-
-
 def _program(link: AutopilotLink, digest: str, given: AutopilotParameters) -> AutopilotProgram:
     """Which program it is, by what it has told."""
     news = link.news
@@ -112,7 +112,7 @@ def _program(link: AutopilotLink, digest: str, given: AutopilotParameters) -> Au
 def fly_autopilot(
     setup: FlightSetup,
     aircraft: Aircraft,
-    binary: Path,
+    autopilot: ProgramAutopilot,
     own: Mapping[str, float] | None = None,
     *,
     sink: Sink | None = None,
@@ -125,7 +125,7 @@ def fly_autopilot(
 
     Returns the flight, and the setup with the program that flew it.
     """
-    with AutopilotFlight(setup, aircraft, binary, own) as flight:
+    with AutopilotFlight(setup, aircraft, autopilot, own) as flight:
         flight.prepare()
         flown = fly_to_end(flight, sink, progress)
         if log is not None:

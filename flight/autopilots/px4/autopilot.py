@@ -1,7 +1,7 @@
 """PX4's law for fixed wing as an autopilot, with the parameters that it flies by."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -33,7 +33,7 @@ from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
 from world.kernels import Record
-from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation
+from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation, Px4Version
 from world.wind import Turbulence
 
 # By RTL_TYPE: what of it is not flown.
@@ -86,6 +86,10 @@ class Px4(Autopilot):
         made = self.parameters
         stored = StoredParameters(made.values, made.unused, made.source)
         return StoredAutopilot(parameters=stored, version=made.version)
+
+    def of_release(self, version: Px4Version) -> Self:
+        """Return the same autopilot with the law of another release of PX4."""
+        return replace(self, parameters=replace(self.parameters, version=version))
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:

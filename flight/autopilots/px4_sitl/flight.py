@@ -8,8 +8,8 @@ from pathlib import Path
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import AutopilotProgram
-from flight.autopilots.px4.parameters import Px4Parameters, load_parameters
-from flight.autopilots.px4_sitl.autopilot import Px4Sitl
+from flight.autopilots.program import ProgramAutopilot
+from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4_sitl.parameters import GivenParameters, given_parameters
 from flight.autopilots.px4_sitl.physics import HilLockstep, SimulatorPort
 from flight.autopilots.px4_sitl.preflight import Px4Preflight, version_text
@@ -37,15 +37,16 @@ _WITHOUT_ANTICIPATION = 0x01110000
 class Px4Flight(SitlFlight):
     """One flight of PX4 itself; see `SitlFlight`.
 
-    binary: its program, with its start-up files beside it.
+    autopilot: flies the setup in place of its own autopilot; has PX4's parameters and the program's file, with the
+        start-up files next to it.
 
     Its MAVLink port (UDP) is open on every interface of this machine, since PX4 has no setting for it.
     """
 
-    def __init__(self, setup: FlightSetup, aircraft: Aircraft, binary: Path) -> None:
-        made = setup.autopilot.parameters
-        parameters = made if isinstance(made, Px4Parameters) else load_parameters(aircraft)
-        autopilot = Px4Sitl(parameters, binary=binary)
+    def __init__(self, setup: FlightSetup, aircraft: Aircraft, autopilot: ProgramAutopilot) -> None:
+        if not isinstance(autopilot, Px4):
+            raise TypeError("PX4's program needs PX4's parameters")
+        parameters, binary = autopilot.parameters, autopilot.file
         setup = replace(setup, autopilot=autopilot)
         digest = check_binary(binary, autopilot.title)
         servos = load_servo_map(aircraft)
@@ -69,9 +70,7 @@ class Px4Flight(SitlFlight):
             version: Px4Version = (
                 "1.16" if (link.news.version or _WITHOUT_ANTICIPATION) < _WITHOUT_ANTICIPATION else NEWEST_PX4
             )
-            flown = replace(
-                autopilot, parameters=replace(parameters, version=version), program=_program(link, digest, given)
-            )
+            flown = replace(autopilot.of_release(version), program=_program(link, digest, given))
             self.setup = replace(setup, autopilot=flown)
             self._stack = stack.pop_all()
 

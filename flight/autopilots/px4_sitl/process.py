@@ -4,17 +4,27 @@ import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from flight.autopilots.px4_sitl.autopilot import STARTUP, startup_files
 from flight.autopilots.sitl.exchange import LOOPBACK
 from flight.autopilots.sitl.process import Launch
 from world.errors import FlightError
 
+# Folder of the start-up files, next to the program or one folder above it, as a build leaves it.
+STARTUP = "etc"
+# The script in that folder that starts the program.
+_SCRIPT = Path("init.d-posix", "rcS")
 # Of our airframe, among PX4's own.
 _AIRFRAME = 22000
 # Its start-up script's last words.
 STARTED = "Startup script returned successfully"
 # What it puts into the system's folder of temporary files, whichever is set, named by its instance.
 _TEMPORARY, _LEFT = Path("/tmp"), ("px4_lock-", "px4-sock-")
+
+
+def startup_files(program: Path) -> Path | None:
+    """Return the folder of a program's start-up files, or None if there is none."""
+    folder = program.resolve().parent
+    places = (folder / STARTUP, folder.parent / STARTUP)
+    return next((place for place in places if (place / _SCRIPT).is_file()), None)
 
 
 def px4_launch(

@@ -9,7 +9,7 @@ from aircraft.catalog import load_aircraft
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.flight_record import FlightRecord
-from logs.importers.motion_log import MotionLog
+from logs.importers.motion import MotionLog
 from planfly.identification.base_numbers import base_model, scaled
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos

@@ -3,7 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs.importers.motion_log import Samples, first_on_ground, read_motion
+from logs.importers.motion import Samples, first_on_ground
+from logs.importers.motion_log import read_motion
 from tests.instrumented_flights import short_motion, write_motion
 from world.errors import LogError
 

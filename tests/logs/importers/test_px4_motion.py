@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from aircraft.identification.estimate import aligned_signals, fit_all
-from logs.importers.motion_log import MotionLog, read_motion
+from logs.importers.motion import MotionLog
+from logs.importers.motion_log import read_motion
 from planfly.identification.records import flight_records
 from tests.aircraft.identification.flown_truth import flown_truth
 from tests.instrumented_flights import PX4_PARAMETERS, px4_topics, short_motion, write_px4

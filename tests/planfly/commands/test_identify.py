@@ -13,7 +13,7 @@ from aircraft.identification.estimate import Estimate
 from aircraft.identification.flight_record import FlightRecord
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.dynamics.fdm import Fdm
-from logs.importers.motion_log import MotionLog, Samples
+from logs.importers.motion import MotionLog, Samples
 from logs.views.report import identification
 from planfly.api import identifying
 from planfly.api.identifying import slow_logs, without_current

@@ -15,7 +15,7 @@ from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import INDEX, prior_means, prior_sds
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import fastest
-from logs.importers.motion_log import MotionLog
+from logs.importers.motion import MotionLog
 from planfly.identification.base_numbers import base_model
 from planfly.identification.folder import Identified, flown_parameters, folder_files, make_identified, posterior_text
 from planfly.identification.records import log_outputs

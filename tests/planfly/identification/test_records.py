@@ -10,7 +10,7 @@ import pytest
 
 import planfly
 from aircraft.catalog import load_aircraft
-from logs.importers.motion_log import MotionLog, Samples
+from logs.importers.motion import MotionLog, Samples
 from planfly.identification.records import flight_records, log_outputs
 from planfly.identification.servos import read_servos
 from tests.aircraft.identification.flown_truth import flown_truth

@@ -18,7 +18,7 @@ from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.simulation.setup import FlightSetup
-from tests.autopilots import shorten_run_in
+from tests.autopilots import arduplane_program, shorten_run_in
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
 from tests.mission_lines import setup_of, wp
 from tests.setups import setup_maker
@@ -71,7 +71,9 @@ def make_setup(way: Floats = SHORT, **keywords: object) -> FlightSetup:
 def test_an_autopilot_flies_the_mission_to_its_end(fake_autopilot: MakeFake, tmp_path: Path, fault: str) -> None:
     before, folders, kept = children(), left_behind(), tmp_path / "flight.BIN"
     rows: list[object] = []
-    flown, setup = fly_autopilot(make_setup(), AEROSONDE, fake_autopilot(fault), {}, sink=rows.append, log=kept)
+    flown, setup = fly_autopilot(
+        make_setup(), AEROSONDE, arduplane_program(fake_autopilot(fault)), {}, sink=rows.append, log=kept
+    )
     track = flown.track
     assert flown.ended == "completed"
     assert (track.time[0], len(rows)) == (0.0, math.ceil(track.time[-1] * 60.0 / 60.0 + 1e-9))
@@ -123,7 +125,7 @@ def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
     before, folders = children(), left_behind()
     program = fake_autopilot(fault)
     with pytest.raises(FlightError) as failed:
-        fly_autopilot(make_setup(), AEROSONDE, program, {})
+        fly_autopilot(make_setup(), AEROSONDE, arduplane_program(program), {})
     assert str(failed.value).startswith(f"{program}: {said}")
     assert "\n" not in str(failed.value)
     assert (children(), left_behind()) == (before, folders)
@@ -133,7 +135,7 @@ def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
 def test_a_loiter_without_end_is_flown_with_its_own_radius_for_a_minute(fake_autopilot: MakeFake) -> None:
     """The program circles on; the flight's clock counts from the circle on, and ends it there."""
     setup = setup_of(wp(0, 0), wp(0, 1000, command=17, p="0 0 -250 0"))
-    flown, _ = fly_autopilot(setup, AEROSONDE, fake_autopilot("none"), {})
+    flown, _ = fly_autopilot(setup, AEROSONDE, arduplane_program(fake_autopilot("none")), {})
     assert flown.ended == "completed"
     away = np.hypot(*(flown.track.position[:, :2] - (0.0, 1000.0)).T)
     # 750 m to the rim at 25 m/s are 30 s, then a minute, in the circle alone once it has settled.
@@ -147,7 +149,7 @@ def test_a_loiter_without_end_is_flown_with_its_own_radius_for_a_minute(fake_aut
 @pytest.mark.usefixtures("short_run_in")
 def test_a_dive_into_the_ground_is_a_flight_that_ended_so(fake_autopilot: MakeFake) -> None:
     way = WAY * [1.0, 3.0, 1.0]
-    flown, _ = fly_autopilot(MAKE(way - [0.0, 0.0, 300.0]), AEROSONDE, fake_autopilot("dive"), {})
+    flown, _ = fly_autopilot(MAKE(way - [0.0, 0.0, 300.0]), AEROSONDE, arduplane_program(fake_autopilot("dive")), {})
     assert flown.ended == "ground contact" or flown.ended.startswith("loss of control")
     assert flown.track.clearance[-1] < 100.0
 
@@ -157,7 +159,7 @@ def test_what_cannot_be_run_is_one_line(tmp_path: Path, write: Callable[[Path], 
     program = tmp_path / "arduplane"
     write(program)
     with pytest.raises(FlightError, match=r"arduplane: (no such file|not a file|not executable)"):
-        AutopilotFlight(make_setup(), AEROSONDE, program, {})
+        AutopilotFlight(make_setup(), AEROSONDE, arduplane_program(program), {})
 
 
 def test_a_file_that_is_no_program_is_one_line(tmp_path: Path) -> None:
@@ -166,7 +168,7 @@ def test_a_file_that_is_no_program_is_one_line(tmp_path: Path) -> None:
     program.chmod(0o755)
     before = left_behind()
     with pytest.raises(FlightError, match=r"arduplane: not an executable program: "):
-        AutopilotFlight(make_setup(), AEROSONDE, program, {})
+        AutopilotFlight(make_setup(), AEROSONDE, arduplane_program(program), {})
     assert left_behind() == before
 
 
@@ -178,7 +180,7 @@ def test_an_exception_ends_the_program_and_removes_its_folder(fake_autopilot: Ma
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        fly_autopilot(make_setup(), AEROSONDE, fake_autopilot(), {}, progress=stop)
+        fly_autopilot(make_setup(), AEROSONDE, arduplane_program(fake_autopilot()), {}, progress=stop)
     assert (children(), left_behind()) == (before, folders)
 
 
@@ -189,7 +191,8 @@ import os, signal
 from pathlib import Path
 from tests.flight.autopilots.arduplane_sitl.test_autopilot_flight import AEROSONDE, make_setup
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight
-with AutopilotFlight(make_setup(), AEROSONDE, Path({str(fake_autopilot())!r}), {{}}) as flight:
+from tests.autopilots import arduplane_program
+with AutopilotFlight(make_setup(), AEROSONDE, arduplane_program(Path({str(fake_autopilot())!r})), {{}}) as flight:
     print(flight._process._process.pid, flight._process._folder, flush=True)
     os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -213,7 +216,9 @@ with AutopilotFlight(make_setup(), AEROSONDE, Path({str(fake_autopilot())!r}), {
 def test_satellites_mistake_the_place_as_the_setup_says(fake_autopilot: MakeFake) -> None:
     def mistakes(nav: str, seconds: int) -> list[tuple[float, ...]]:
         found = []
-        with AutopilotFlight(replace(make_setup(), nav=nav), AEROSONDE, fake_autopilot(), {}) as flight:
+        with AutopilotFlight(
+            replace(make_setup(), nav=nav), AEROSONDE, arduplane_program(fake_autopilot()), {}
+        ) as flight:
             found.append(flight._lockstep.error)
             flight.prepare()
             for _ in range(seconds):
@@ -232,7 +237,9 @@ def test_satellites_mistake_the_place_as_the_setup_says(fake_autopilot: MakeFake
 
 @pytest.mark.client
 def test_arduplane_flies_a_bend_as_its_law_has_it(arduplane: Path, tmp_path: Path) -> None:
-    flown, setup = fly_autopilot(make_setup(WAY, wind=(5.0, 250.0)), AEROSONDE, arduplane, {"WP_RADIUS": 60.0})
+    flown, setup = fly_autopilot(
+        make_setup(WAY, wind=(5.0, 250.0)), AEROSONDE, arduplane_program(arduplane), {"WP_RADIUS": 60.0}
+    )
     track, program = flown.track, setup.autopilot.program
     assert flown.ended == "completed"
     assert program is not None
@@ -251,7 +258,7 @@ def test_arduplane_flies_a_bend_as_its_law_has_it(arduplane: Path, tmp_path: Pat
 @pytest.mark.client
 def test_arduplane_names_what_it_does_not_know(arduplane: Path) -> None:
     own = {"WP_NO_SUCH": 1.0, "SERVO1_REVERSED": 1.0, "NAVL1_PERIOD": 17.0}
-    with AutopilotFlight(make_setup(), AEROSONDE, arduplane, own) as flight:
+    with AutopilotFlight(make_setup(), AEROSONDE, arduplane_program(arduplane), own) as flight:
         program = flight.setup.autopilot.program
     assert program is not None
     assert program.unused == ("SERVO1_REVERSED", "WP_NO_SUCH")

@@ -24,6 +24,7 @@ from flight.mission.items import Command
 from flight.simulation.setup import FlightSetup
 from flight.simulation.start import Release
 from logs.verdict.judge_flight import judge_flight
+from tests.autopilots import arduplane_program
 from tests.flight.autopilots.arduplane.flown_grounds import circuit
 from tests.flight.autopilots.arduplane.kept_sequences import kept_setup
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
@@ -123,7 +124,7 @@ def test_phases_follow_heights_the_programs_item_and_the_landing_point() -> None
 @pytest.mark.skipif(not SOAK, reason="145 s of flight: in a soak")
 def test_a_stand_in_flies_from_the_catapult_to_rest_on_the_strip(fake_autopilot: MakeFake) -> None:
     setup = circuit(RAIL, STRIP)
-    flown, flew = fly_autopilot(setup, AEROSONDE, fake_autopilot("none"), {})
+    flown, flew = fly_autopilot(setup, AEROSONDE, arduplane_program(fake_autopilot("none")), {})
     track = flown.track
     assert flown.ended == "completed"
     assert flew.ground_ways
@@ -147,8 +148,8 @@ def test_whoever_launches_waits_for_all_of_the_motor_where_it_runs_before(
     setup = by_program(circuit(RAIL, STRIP))
     parameters = setup.autopilot.parameters
     assert isinstance(parameters, ArduPilotParameters)
-    setup = replace(setup, autopilot=ArduPlaneSitl(parameters.changed(TKOFF_THR_MINACC=least)))
-    with AutopilotFlight(setup, AEROSONDE, fake_autopilot("none"), {}) as flight:
+    autopilot = ArduPlaneSitl(parameters.changed(TKOFF_THR_MINACC=least), binary=fake_autopilot("none"))
+    with AutopilotFlight(setup, AEROSONDE, autopilot, {}) as flight:
         began = flight.exchanged
         for _ in flight._run_up():
             flight._lockstep.hold(flight._rail)

@@ -14,6 +14,7 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import load_parameters
 from flight.autopilots.px4_sitl import flight as px4_flight
 from flight.autopilots.px4_sitl import physics
+from flight.autopilots.px4_sitl.autopilot import Px4Sitl
 from flight.autopilots.px4_sitl.flight import Px4Flight
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
@@ -62,7 +63,7 @@ def make_setup(way: Floats = SHORT, **keywords: object) -> FlightSetup:
 
 
 def fly(setup: FlightSetup, program: Path, log: Path | None = None) -> tuple[SimulatedFlight, FlightSetup]:
-    with Px4Flight(setup, AEROSONDE, program) as flight:
+    with Px4Flight(setup, AEROSONDE, Px4Sitl(load_parameters(AEROSONDE), binary=program)) as flight:
         flight.prepare()
         flown = fly_to_end(flight, None, None)
         if log is not None:
