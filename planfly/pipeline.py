@@ -18,12 +18,13 @@ from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.make_plan import Advance, make_plan, make_setup, planned_for
-from planfly.reference_flights import judge_with_reference_flights
+from planfly.reference_flights import FlyReference, judge_with_reference_flights
 from planfly.returns_beside import ReturnsBeside, returns_beside
 from planner.plan import Plan
 from world.errors import FlightError, StartError
@@ -80,16 +81,17 @@ class OffNominal:
 class JudgedFlight:
     """A flight from its first tick to its verdict.
 
-    setup: with the program that flew, if one did.
+    setup: with the program that flew, if one did.  requirements: the route requirements that it was judged by.
     track: the rows that are recorded, all of them where there is no log; none of a flight that could not begin.
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
     events: what the log holds beside them.
-    reference: what other flights had to say of it; None where none were flown.
+    reference: the results of reference flights; None if none were flown.
     returns: from a few places of it; None where they were not asked for.
     """
 
     setup: FlightSetup
+    requirements: RouteRequirements
     track: Track
     ended: str
     verdict: Verdict
@@ -125,7 +127,7 @@ def fly_and_judge(
     every: int = 1,
     autopilot: Path | None = None,
     off_nominal: OffNominal | None = None,
-    reference: bool = True,
+    reference: FlyReference = "failed",
     returns: bool = False,
     limits: FlightLimits = _USUAL_LIMITS,
 ) -> JudgedFlight:
@@ -134,12 +136,9 @@ def fly_and_judge(
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     autopilot: the program of ArduPlane or PX4, which then flies; its own log is kept beside ours.
     off_nominal: how the flight differs from what guidance knows; none of a program's.
-    reference: whether the flights below are flown; whether it is flyable does not depend on them.
+    reference: when reference flights are flown, as of `planfly.reference_flights.judge_with_reference_flights`.
     returns: whether returns from a few places are judged and drawn in the log, if one is named.
     limits: how long it may fly, and how large its log may grow.
-
-    An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
-    one passes, flights with other parameters.
 
     A flight that cannot begin, or that needs more than `MAX_ENERGY_RATIO` times the energy carried, has no row and no
     log: its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it
@@ -179,7 +178,7 @@ def _fly_program(
     every: int,
     limits: FlightLimits,
     *,
-    reference: bool,
+    reference: FlyReference,
     returns: bool,
 ) -> JudgedFlight:
     with program.start(setup, airframe.aircraft) as flight:
@@ -215,7 +214,7 @@ def _record_and_judge(
     every: int,
     limits: FlightLimits,
     *,
-    reference: bool = True,
+    reference: FlyReference = "failed",
     returns: bool = False,
 ) -> JudgedFlight:
     flight.max_ticks = min(flight.max_ticks, limits.max_ticks(flight.dt))
@@ -243,13 +242,16 @@ def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
     """A flight without a row, and without a log: none of a flight before it stays there."""
     if log is not None:
         log.unlink(missing_ok=True)
-    return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
+    requirements, track = route_requirements(setup), join_tracks([])
+    verdict = judge_flight(setup, track, ended, requirements=requirements)
+    return JudgedFlight(setup, requirements, track, ended, verdict, ())
 
 
-def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str, *, reference: bool) -> JudgedFlight:
+def _judged(
+    setup: FlightSetup, airframe: Airframe, track: Track, ended: str, *, reference: FlyReference
+) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    if not reference:
-        return JudgedFlight(setup, track, ended, judge_flight(setup, track, ended), (event,))
-    verdict, others = judge_with_reference_flights(setup, airframe.aircraft, track, ended)
-    return JudgedFlight(setup, track, ended, verdict, (event,), others)
+    requirements = route_requirements(setup)
+    verdict, others = judge_with_reference_flights(requirements, airframe.aircraft, track, ended, fly=reference)
+    return JudgedFlight(setup, requirements, track, ended, verdict, (event,), others)

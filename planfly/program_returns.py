@@ -191,7 +191,7 @@ def fly_by_program(
             except MissionError as error:
                 flown.append(ProgramReturn(one, reason=str(error)))
                 continue
-            judged = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference=False)
+            judged = fly_and_judge(setup, airframe, log, advance, autopilot=program, reference="never")
         version = judged.setup.autopilot.version
         found = _as_flown(world, one, starts.rows[k], judged.track, judged.ended)
         reason = "" if found else f"it does not come to where the return begins ({judged.ended})"

@@ -1,9 +1,10 @@
-"""Reference flights of an autopilot's: the aircraft by planfly's guidance, and the law with other parameters."""
+"""Fly reference flights that explain an autopilot's flight: by planfly's guidance, and with other parameters."""
 
 import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Literal
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot
@@ -13,7 +14,7 @@ from flight.simulation.simulate import Progress, simulate
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight
-from logs.verdict.measures.route_requirements import true_route
+from logs.verdict.measures.route_requirements import RouteRequirements, true_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
 from logs.verdict.summary import first_failed
 from world.errors import StartError
@@ -169,32 +170,45 @@ def has_room(flown: Sequence[Finding], failed: Sequence[Finding]) -> bool:
     return True
 
 
-def judge_with_reference_flights(
-    setup: FlightSetup, aircraft: Aircraft, track: Track, ended: str, hurry: Callable[[], bool] | None = None
-) -> tuple[Verdict, ReferenceFlights | None]:
-    """Judge an autopilot's flight beside the aircraft's own, and look for the parameter that decides where they differ.
+# When reference flights are flown.
+FlyReference = Literal["never", "failed", "always"]
 
-    track, ended: of the flight with the setup.  A flight of planfly's own guidance has none beside it.
-    hurry: asked all the time while others fly; once it says yes they are given up, and the verdict holds what was
-    known by then.  Whether the flight is flyable does not depend on them.
+
+def judge_with_reference_flights(
+    requirements: RouteRequirements,
+    aircraft: Aircraft,
+    track: Track,
+    ended: str,
+    *,
+    fly: FlyReference = "failed",
+    hurry: Callable[[], bool] | None = None,
+) -> tuple[Verdict, ReferenceFlights | None]:
+    """Judge a flight, and fly reference flights that explain its verdict; they do not decide whether it is flyable.
+
+    requirements: the route requirements of the setup that was flown.  track, ended: the flight and its end.
+    fly: when the reference flights are flown: "failed" if a finding of the flight fails, "always" also if all pass.
+    A flight of planfly's own guidance has no reference flight.
+    hurry: called throughout the reference flights; once it returns True they are aborted, and the verdict holds what
+    they have shown by then.
     """
+    setup = requirements.setup
+    verdict = judge_flight(setup, track, ended, requirements=requirements)
+    if setup.autopilot.level == "airframe" or fly == "never" or (fly == "failed" and not verdict.failed):
+        return verdict, None
 
     def watch(_done: float, _whole: float) -> None:
         if hurry is not None and hurry():
             raise _GivenUp
 
-    if setup.autopilot.level == "airframe":
-        return judge_flight(setup, track, ended), None
     try:
-        reference = ReferenceFlights(airframe_answer(setup, aircraft, watch))
+        airframe = airframe_answer(setup, aircraft, watch)
     except _GivenUp:
-        return judge_flight(setup, track, ended), None
-    verdict = judge_flight(setup, track, ended, reference=reference)
-    if reference.airframe is not None and reference.airframe.flyable and not verdict.flies:
+        return verdict, None
+    reference = ReferenceFlights(airframe)
+    if airframe.flyable:
         with contextlib.suppress(_GivenUp):
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, watch))
-            verdict = judge_flight(setup, track, ended, reference=reference)
-    return verdict, reference
+    return judge_flight(setup, track, ended, reference=reference, requirements=requirements), reference
 
 
 def _flown_by_law(setup: FlightSetup, law: Autopilot, aircraft: Aircraft, progress: Progress | None = None) -> Verdict:

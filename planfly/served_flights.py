@@ -45,6 +45,7 @@ from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.registry import rule_word
 from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
@@ -258,7 +259,7 @@ class ServedLog:
         self._recorder.flush()
 
     def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
-        """Judge the flight and close the log; hurry: as of `planfly.reference_flights.judge_with_reference_flights`.
+        """Judge the flight and close the log.  hurry: see `planfly.reference_flights.judge_with_reference_flights`.
 
         In a hurry, a way that was left before is not judged: `planfly check` does it.  One that was left within a
         second leaves no log.
@@ -275,7 +276,8 @@ class ServedLog:
             self._recorder.finish(ended)
             return FlightJudged(False, (StatusText(f"log {self._path}, not judged yet", INFO),))
         if ended == "completed":
-            verdict, reference = judge_with_reference_flights(self._setup, self._aircraft, track, ended, hurry)
+            requirements = route_requirements(self._setup)
+            verdict, reference = judge_with_reference_flights(requirements, self._aircraft, track, ended, hurry=hurry)
         else:
             verdict, reference = judge_flight(self._setup, track, ended), None
         self._recorder.finish(ended, verdict, reference)

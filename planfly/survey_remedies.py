@@ -174,7 +174,7 @@ class _Trials:
             setup = self._made(mission, airframe)
         except PlanflyError:
             return None
-        verdict = fly_and_judge(setup, airframe, None, reference=False).verdict
+        verdict = fly_and_judge(setup, airframe, None, reference="never").verdict
         usable, lines = _usable(verdict)
         best, failed = self.nearest, len(verdict.failed)
         before = _usable(self._verdict)[0] if best is None else best.usable

@@ -37,6 +37,7 @@ def judge_flight(
     log_complete: bool = True,
     envelope: bool = True,
     reference: ReferenceFlights | None = None,
+    requirements: RouteRequirements | None = None,
 ) -> Verdict:
     """Judge a flown track: level "flown".
 
@@ -45,7 +46,7 @@ def judge_flight(
 
     ended: how the flight ended, "completed" or what stopped it.  log_complete: the record has its end.
     envelope: whether the aircraft's envelope counts beside what the flight showed, and not that alone.
-    reference: the answers of reference flights of this one.
+    reference: the results of reference flights.  requirements: the setup's route requirements if already known.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -65,25 +66,23 @@ def judge_flight(
     """
     if setup.source is not None:
         return judge_imported_flight(setup, track, log_complete=log_complete)
-    whole = route_requirements(setup, envelope=envelope)
+    whole = requirements or route_requirements(setup, envelope=envelope)
     if not len(track):
         return judge_unflown(whole, ended, log_complete=log_complete)
-    requirements, aligned = flown_phases(whole, track)
-    findings = flown_findings(requirements, aligned, ended, log_complete)
+    in_air, aligned = flown_phases(whole, track)
+    findings = flown_findings(in_air, aligned, ended, log_complete)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not any(item.ok is False for item in findings)
-    findings = with_suggestions(requirements, aligned, findings)
+    findings = with_suggestions(in_air, aligned, findings)
     levels = _levels(whole, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
     conditions = setup_conditions(setup)
     lines = summary_lines(findings, setup, "flown", levels, conditions, deciding)
     return Verdict(
-        *(findings, flyable, complete, lines, "flown"),
-        levels=levels,
-        deciding=deciding,
+        *(findings, flyable, complete, lines, "flown", levels, deciding),
         notes=setup.notes,
-        leg_ends=() if aligned is None else leg_ends(requirements, aligned),
+        leg_ends=() if aligned is None else leg_ends(in_air, aligned),
         program=setup.autopilot.program,
         parameters=setup.autopilot.parameters,
         unjudged=unjudged,

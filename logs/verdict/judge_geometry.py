@@ -148,8 +148,10 @@ def with_suggestions(
 # The verdicts.
 
 
-def judge_geometry(setup: FlightSetup) -> Verdict:
+def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = None) -> Verdict:
     """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric".
+
+    requirements: the route requirements of the setup if they are known already.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -167,7 +169,7 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     >>> [[change.what for change in one] for finding in verdict.findings for one in finding.suggestions]
     [['airspeed'], ['rise'], ['length']]
     """
-    requirements = route_requirements(setup)
+    requirements = requirements or route_requirements(setup)
     findings = (
         *mission_findings(setup),
         *with_suggestions(requirements, None, geometric_findings(requirements)),

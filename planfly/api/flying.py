@@ -189,6 +189,7 @@ def fly(
     log_hz: Literal[10, 20, 30, 60] = 60,
     max_hours: float = MAX_HOURS,
     max_log: float = MAX_MEGABYTES,
+    levels: bool = False,
     overwrite: bool = True,
 ) -> FlownMission:
     """Fly a plan or a mission file in JSBSim, and judge the flight.
@@ -202,10 +203,10 @@ def fly(
     wind, turbulence, at, aircraft, airspeed, params, guidance, autopilot_law, nav: as of `planfly.plan`.
     autopilot: the program of ArduPlane or PX4, which then flies.
     log_hz: rows a second in the log.  max_hours, max_log: where a flight ends that would go on, h and MB.
+    levels: True flies a mission that passes by planfly's guidance, too, as one that fails: both are compared.
 
     A plan that cannot be flown is a verdict, not an error; bad input raises a `planfly.PlanflyError`.
 
-    >>> import planfly
     >>> flown = planfly.fly(planfly.plan("paper-07", seed=1), wind=(4, 270))
     >>> flown.ended, flown.verdict.flyable, flown.setup.scenario.wind.speed
     ('completed', True, 4.0)
@@ -221,8 +222,8 @@ def fly(
     limits = FlightLimits(max_hours, max_log)
     with stage(f"flying {flight_text(opened.setup)}", flight_kind(opened.setup)) as advance:
         flown = fly_and_judge(
-            opened.setup, opened.airframe, target, advance, every=60 // log_hz, autopilot=program,
-            returns=target is not None, limits=limits,
+            opened.setup, opened.airframe, target, advance, every=60 // log_hz, autopilot=program, limits=limits,
+            reference="always" if levels else "failed", returns=target is not None,
         )  # fmt: skip
     target = target if len(flown.track) else None
     own = None if target is None or program is None else autopilot_log(target, program)

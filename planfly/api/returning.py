@@ -270,7 +270,7 @@ def _of_mission(opened: OpenedMission, asked: _Asked) -> ReturnsFound:
     """Of a mission, which is flown first."""
     return_world(opened.setup)  # Raises before it is flown.
     with stage("flying the mission"):
-        flown = fly_and_judge(opened.setup, opened.airframe, None, reference=False)
+        flown = fly_and_judge(opened.setup, opened.airframe, None, reference="never")
     return _judged(flown.setup, flown.track, asked, flown.ended)
 
 

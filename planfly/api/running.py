@@ -24,6 +24,7 @@ from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH, GLIDING
 from planfly.make_plan import make_plan, make_setup, planned_for
 from planfly.pipeline import autopilot_log, fly_and_judge
+from planfly.reference_flights import FlyReference
 from planfly.refine import refine as refine_rounds
 from planfly.returns_beside import returns_beside
 from planfly.stages import say_replaced, stage
@@ -95,6 +96,7 @@ class _Task:
     command: the line that repeats it, for the report.
     folder: where the results go.
     program: of an autopilot, None for planfly's own simulation.
+    reference: when reference flights are flown.
     limits: how long it may fly, and how large its log may grow.
     every: of so many rows one goes into the log.
     """
@@ -107,6 +109,7 @@ class _Task:
     program: Path | None
     limits: FlightLimits
     every: int
+    reference: FlyReference
 
 
 @with_warm_up(*BOTH, *GLIDING)
@@ -129,6 +132,7 @@ def run(
     log_hz: Literal[10, 20, 30, 60] = 60,
     max_hours: float = MAX_HOURS,
     max_log: float = MAX_MEGABYTES,
+    levels: bool = False,
     out: str | Path = RUN_FOLDER,
     overwrite: bool = False,
     on_round: Callable[[Round], None] | None = None,
@@ -162,16 +166,16 @@ def run(
     repeated = {
         "refine": refine, "terrain": terrain, "aircraft": aircraft, "airspeed": airspeed, "wind": wind,
         "turbulence": turbulence, "at": at, "params": params, "guidance": guidance, "nav": nav, "autopilot": autopilot,
-    } | {"autopilot-law": autopilot_law}  # fmt: skip
+    } | {"autopilot-law": autopilot_law, "levels": levels}  # fmt: skip
     name = world.name if isinstance(scenario, Scenario) else str(scenario)
     line, limits = command_line(name, number, repeated), FlightLimits(max_hours, max_log)
-    task = _Task(world, airframe, number, line, folder, program, limits, 60 // log_hz)
+    task = _Task(world, airframe, number, line, folder, program, limits, 60 // log_hz, "always" if levels else "failed")
     with contextlib.ExitStack() as held:
         return _rounds(task, refine, held, on_round)
 
 
 def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
-    """``planfly run`` with options by name, of which those that are None or 0 are left out.
+    """Write the command line of ``planfly run`` with options by name; those that are None, False or 0 are left out.
 
     >>> command_line("tight", 3, {"refine": 0, "wind": (8.0, 270.0), "params": "my file.parm"})
     "planfly run tight --seed 3 --wind 8,270 --params 'my file.parm'"
@@ -179,7 +183,7 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
     given = {name: value for name, value in options.items() if value}
     if "wind" in given:
         given["wind"] = "{:g},{:g}".format(*given["wind"])
-    words = [f"--{name} {shlex.quote(str(value))}" for name, value in given.items()]
+    words = [f"--{name}" if value is True else f"--{name} {shlex.quote(str(value))}" for name, value in given.items()]
     return " ".join([f"planfly run {shlex.quote(scenario)} --seed {seed}", *words])
 
 
@@ -236,7 +240,7 @@ def _fly_round(task: _Task, plan: Plan, number: int) -> Round:
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flown = fly_and_judge(
             setup, airframe, folder / "flight.mcap", advance, every=task.every, autopilot=task.program,
-            returns=True, limits=task.limits,
+            reference=task.reference, returns=True, limits=task.limits,
         )  # fmt: skip
     write_whole(folder / "verdict.json", verdict_json(flown.verdict))
     beside = flown.returns or returns_beside(flown.setup, flown.track)

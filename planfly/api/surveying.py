@@ -14,7 +14,7 @@ from logs.recording.reader import FlightLog, read_log
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
-from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements, surveys_of
 from logs.verdict.measures.track_alignment import align_track
 from logs.views.surveys import survey_chart
 from planfly.api.flying import FlownMission, opened_mission, refuse
@@ -169,7 +169,7 @@ def survey(
         if source is not None and "attitude" not in source.holds:
             raise LogError(f"{source.file}: no attitude: how far photos are banked is not known", file=source.file)
         setup = _with_camera(what.setup.in_scenario(_with_lines(what.setup.scenario)), taken)
-        return _written(_measured(setup, what.track, judge_flight(setup, what.track, what.ended or "")), out, overwrite)
+        return _written(_of_flight(setup, what.track, what.ended or ""), out, overwrite)
 
     def change(world: Scenario) -> Scenario:
         return _with_lines(changed_scenario(world, **changes, nav=nav))
@@ -210,10 +210,10 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
 
 def _flown(opened: OpenedMission, suggest: bool) -> SurveyFound:
     """Fly a mission, measure its lines, and look for what would help."""
-    _found_surveys(opened.setup)
+    _require_survey(opened.setup)
     with stage(f"flying {flight_text(opened.setup)}", "flying a survey") as advance:
-        flown = fly_and_judge(opened.setup, opened.airframe, None, advance, reference=False)
-    found = _measured(flown.setup, flown.track, flown.verdict)
+        flown = fly_and_judge(opened.setup, opened.airframe, None, advance, reference="never")
+    found = _measured(flown.requirements, flown.track, flown.verdict)
     if not suggest or found.usable:
         return found
     with stage("looking for what would help") as advance:
@@ -258,20 +258,25 @@ def _with_lines(scenario: Scenario) -> Scenario:
     return replace(scenario, limits=limits, spec=scenario.spec.model_copy(update={"limits": limits}))
 
 
-def _found_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
-    """The surveys of a mission.  Raises MissionError for one without."""
-    surveys = route_requirements(setup).surveys
-    if not surveys:
+def _require_survey(setup: FlightSetup) -> None:
+    """Raise MissionError for a mission without a survey."""
+    if not surveys_of(setup):
         source = setup.mission.source
         raise MissionError(
             f"{source}: no survey: at least three lines beside each other are expected, or two with photos along them",
             file=source,
         )
-    return surveys
 
 
-def _measured(setup: FlightSetup, track: Track, verdict: Verdict) -> SurveyFound:
-    surveys, requirements = _found_surveys(setup), route_requirements(setup)
+def _of_flight(setup: FlightSetup, track: Track, ended: str) -> SurveyFound:
+    """Judge and measure a flight that was flown already."""
+    _require_survey(setup)
+    requirements = route_requirements(setup)
+    return _measured(requirements, track, judge_flight(setup, track, ended, requirements=requirements))
+
+
+def _measured(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyFound:
+    setup, surveys = requirements.setup, requirements.surveys
     aligned = align_track(requirements, track) if len(track) else None
     lines = tuple(
         tuple(None if aligned is None else measure_line(requirements, aligned, one, line) for line in one.lines)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from flight.mission.items import LANDINGS, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import Change, Suggestion
 from planfly.studio.desk import Desk, Judged
 from planfly.studio.edits import at_height, at_speed, moved, places
@@ -60,7 +59,7 @@ def can_apply(suggestion: Suggestion) -> bool:
     return bool(suggestion) and all(change.what in _PATH for change in suggestion)
 
 
-def apply_suggestion(desk: Desk, judged: Judged, requirements: RouteRequirements, item: Finding, which: int) -> Mission:
+def apply_suggestion(desk: Desk, judged: Judged, item: Finding, which: int) -> Mission:
     """The mission with a suggestion of a finding made, until that finding passes.
 
     A step that the path is to make is the least: where an item moves by so much, its path moves by less.  What is still
@@ -71,16 +70,14 @@ def apply_suggestion(desk: Desk, judged: Judged, requirements: RouteRequirements
     suggestion = item.suggestions[which]
     # One waypoint alone first: each that moves may fail elsewhere.
     counts = (1, None) if any(change.what == "distance" for change in suggestion) else (None,)
-    made = [_mended(desk, judged, requirements, item, suggestion, most) for most in counts]
+    made = [_mended(desk, judged, item, suggestion, most) for most in counts]
     return min(made, key=lambda one: len(one.verdict.failed)).mission
 
 
-def _mended(
-    desk: Desk, judged: Judged, requirements: RouteRequirements, item: Finding, suggestion: Suggestion, most: int | None
-) -> Judged:
+def _mended(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Judged:
     """The mission with a suggestion made as often as its finding needs it, and judged.  most: waypoints that move."""
     kinds = [change.what for change in suggestion]
-    judged = desk.judge(_changed(desk, judged, requirements, item, suggestion, most))
+    judged = desk.judge(_changed(desk, judged, item, suggestion, most))
     for _ in range(_MOST_STEPS if set(kinds) <= _STEPS else 0):
         left = [one for one in judged.verdict.failed if (one.rule, one.place) == (item.rule, item.place)]
         alike = [(one, more) for one in left for more in one.suggestions if [change.what for change in more] == kinds]
@@ -88,15 +85,13 @@ def _mended(
             break
         one, more = alike[0]
         further = tuple(replace(change, wanted=_FURTHER * change.wanted + _AND) for change in more)
-        judged = desk.judge(_changed(desk, judged, route_requirements(judged.setup), one, further, most))
+        judged = desk.judge(_changed(desk, judged, one, further, most))
     return judged
 
 
-def _changed(
-    desk: Desk, judged: Judged, requirements: RouteRequirements, item: Finding, suggestion: Suggestion, most: int | None
-) -> Mission:
+def _changed(desk: Desk, judged: Judged, item: Finding, suggestion: Suggestion, most: int | None) -> Mission:
     """The mission with each change of a suggestion made once.  Raises MissionError where none moves an item."""
-    sheet = _Sheet(desk, judged, requirements, most)
+    sheet = _Sheet(desk, judged, most)
     for change in suggestion:
         _CHANGES[change.what](sheet, change, item)
     if not sheet.changed:
@@ -109,9 +104,9 @@ def _changed(
 class _Sheet:
     """A mission whose items are moved one after the other."""
 
-    def __init__(self, desk: Desk, judged: Judged, requirements: RouteRequirements, most: int | None) -> None:
+    def __init__(self, desk: Desk, judged: Judged, most: int | None) -> None:
         self.desk, self.mission, self.route = desk, judged.mission, judged.setup.route
-        self.requirements, self.most, self.changed = requirements, most, False
+        self.requirements, self.most, self.changed = judged.requirements, most, False
 
     def index_of(self, waypoint: int) -> int | None:
         """The item of a waypoint of the route, by its place in the mission's list; None where it is of none."""

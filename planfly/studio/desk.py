@@ -18,6 +18,7 @@ from flight.mission.route import Route, lay_route, with_end_courses
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.airframe import Airframe
 from planfly.make_plan import make_setup
 from planfly.open_mission import NamedFences, OpenedMission
@@ -36,10 +37,11 @@ _NONE_SET = SetParameters()
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A mission, its setup and its geometric verdict."""
+    """A mission, its setup with the route requirements, and its geometric verdict."""
 
     mission: Mission
     setup: FlightSetup
+    requirements: RouteRequirements
     verdict: Verdict
 
 
@@ -196,7 +198,8 @@ class Desk:
     def judge(self, mission: Mission) -> Judged:
         """The whole geometric verdict on a mission."""
         setup = self.setup(mission)
-        return Judged(mission, setup, judge_geometry(setup))
+        requirements = route_requirements(setup)
+        return Judged(mission, setup, requirements, judge_geometry(setup, requirements))
 
     def route(self, mission: Mission) -> Route:
         """The route that a mission comes to, without the notes that are made for people."""

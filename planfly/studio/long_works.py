@@ -32,7 +32,7 @@ def returns(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
         raise MissionError(f"{mission.source}: returns are not judged without a {lacks}", field=lacks)
     world = return_world(setup)
     flown = fly_and_judge(
-        setup, desk.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference=False
+        setup, desk.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
     )
     every = max(1.0, (float(flown.track.time[-1]) if len(flown.track) else 0.0) / _RETURNS)
     starts = return_starts(setup, flown.track, every)

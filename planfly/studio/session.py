@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from flight.mission.items import LANDINGS, Mission
-from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.open_mission import read_named_fences
 from planfly.studio import edits
 from planfly.studio.applied import apply_suggestion
@@ -42,7 +41,7 @@ class Session:
     """One mission under edit.
 
     document: as opened.  desk: what it is judged with.  history: what was done to it.
-    rev: grows with every change.  judged, requirements: of the mission as it is.
+    rev: grows with every change.  judged: the mission as it is.
     plans: paths that were planned and may be chosen, with the items that they would replace.
     world_rev: grows with every change of the world.  document_rev: with every other document.
     named: the file that the command named, the only one that is written over.  written: the mission as saved last.
@@ -54,7 +53,6 @@ class Session:
     desk: Desk
     history: History
     judged: Judged
-    requirements: RouteRequirements
     rev: int = 1
     world_rev: int = 1
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
@@ -72,7 +70,7 @@ class Session:
         judged = desk.judge(document.opened.setup.mission)
         history = History(document.opened.setup.mission)
         named = None if document.path is None else document.path.resolve()
-        return cls(document, world, desk, history, judged, route_requirements(judged.setup), named=named)
+        return cls(document, world, desk, history, judged, named=named)
 
     def open(self, document: Document) -> None:
         """Begin anew with another document; an undo before its first edit brings back what was there."""
@@ -88,7 +86,6 @@ class Session:
         """Show another document as it was left; nothing is changed where it cannot be judged."""
         _, desk, history = place
         judged = desk.judge(history.mission)
-        self.requirements = route_requirements(judged.setup)
         self.document, self.desk, self.history = place
         self.judged, self.plans = judged, ([], None)
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
@@ -168,7 +165,7 @@ class Session:
         if not message.whole:
             return window_json(mission, *judge_windows(self.desk, mission, message.k, self.judged.setup))
         judged = self.desk.judge(mission)
-        return {"sheet": sheet_json(self.desk, judged, route_requirements(judged.setup))}
+        return {"sheet": sheet_json(self.desk, judged)}
 
     def replace_plan(self, message: Choose) -> None:
         """Take one of the planned paths: all of the mission, or the items between two.  Raises StaleEdit."""
@@ -192,10 +189,9 @@ class Session:
         """
         desk = (self.desk if desk is None else desk).around(mission)
         judged = desk.judge(mission)
-        requirements = route_requirements(judged.setup)
         if desk is not self.desk:
             self.world_rev += 1
-        self.desk, self.judged, self.requirements = desk, judged, requirements
+        self.desk, self.judged = desk, judged
         self.plans = ([], None)
         self.rev += 1
 
@@ -266,7 +262,7 @@ class Session:
         if not message.finding < len(findings):
             raise MissionError(f"{self.document.name}: that finding is not there any more", field="finding")
         item = findings[message.finding]
-        mission = apply_suggestion(self.desk, self.judged, self.requirements, item, message.which)
+        mission = apply_suggestion(self.desk, self.judged, item, message.which)
         return mission, f"apply a suggestion of {item.rule}"
 
     def _joined(self, plan: Plan, first: int, last: int) -> Mission:
@@ -301,7 +297,6 @@ class Session:
         desk = self.desk.flown_as(scenario, changed_parameters(self.desk.parameters, scenario, asked))
         mission = self.mission
         judged = desk.judge(mission)
-        self.requirements = route_requirements(judged.setup)
         self.desk, self.judged, self.plans = desk, judged, ([], None)
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
 
@@ -326,7 +321,7 @@ class Session:
             "over": self.document.kind if self.document.path is not None else "",
             "planned": self.judged.setup.plan is not None,
             "notes": [*self.mission.warnings, *self.judged.setup.notes],
-            **sheet_json(self.desk, self.judged, self.requirements),
+            **sheet_json(self.desk, self.judged),
         }
 
     def world_shown(self) -> Json:

@@ -11,7 +11,7 @@ from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, left_open
-from logs.verdict.measures.route_requirements import RouteRequirements, airspace_of
+from logs.verdict.measures.route_requirements import airspace_of
 from logs.verdict.rules.registry import RULES
 from logs.verdict.wording import place_text, suggestion_text
 from logs.views.failures import route_distance, route_samples
@@ -105,11 +105,11 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 # The mission.
 
 
-def sheet_json(desk: Desk, judged: Judged, requirements: RouteRequirements) -> Json:
+def sheet_json(desk: Desk, judged: Judged) -> Json:
     """A mission with its whole geometric verdict: items, route, path, states, findings, profile."""
     verdict, setup = judged.verdict, judged.setup
-    states = place_states(requirements, verdict.findings)
-    path = requirements.path
+    states = place_states(judged.requirements, verdict.findings)
+    path = judged.requirements.path
     return {
         "items": items_json(desk, judged.mission),
         **route_json(judged.mission, setup.route, 0, setup.route.legs),

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from flight.mission.items import Mission
 from flight.simulation.track import Track
-from logs.verdict.measures.route_requirements import route_requirements
 from logs.views.failures import track_distance
 from planfly.airframe import Airframe
 from planfly.choice_of_ways import make_front
@@ -40,8 +39,8 @@ def fly(payload: tuple[Desk, Mission], advance: Advance) -> dict[str, Any]:
     """Fly a mission by the law of its autopilot, and judge the flight."""
     desk, mission = payload
     setup = desk.setup(mission)
-    flown = fly_and_judge(setup, desk.airframe, None, advance, reference=False)
-    states = place_states(route_requirements(setup), flown.verdict.findings)
+    flown = fly_and_judge(setup, desk.airframe, None, advance, reference="never")
+    states = place_states(flown.requirements, flown.verdict.findings)
     seconds = round(float(flown.track.time[-1]), 1) if len(flown.track) else 0.0
     return {
         "verdict": verdict_json(flown.verdict),

@@ -197,13 +197,19 @@ def program_option(group: OptionTaker, does: str) -> None:
 
 
 def flight_options(parser: CommandParser) -> None:
-    """What decides a flight beside its mission: aircraft, weather, autopilot, and when it is stopped."""
+    """Add what decides a flight in addition to its mission: aircraft, weather, autopilot, and when it is stopped."""
     flown_by_options(parser)
+    group = steering_options(parser)
     program_option(
-        steering_options(parser),
+        group,
         "fly ArduPlane or PX4 itself in planfly's physics: the path of its program, built for software in the"
         " loop (extra planfly[live])",
     )
+    group.add_argument(
+        "--levels", action="store_true",
+        help="if the flight passes, also fly the mission by planfly's guidance, and say whether the two flights agree "
+        "(default: only if the flight fails, to find out why)",
+    )  # fmt: skip
     limits = parser.group("limits of the flight")
     limits.add_argument(
         "--max-hours", metavar="H", type=number("max_hours"), default=6.0,

@@ -24,7 +24,13 @@ from logs.verdict.wording import deciding_text
 from planfly.airframe import load_airframe
 from planfly.open_mission import judge_log
 from planfly.pipeline import JudgedFlight, fly_and_judge
-from planfly.reference_flights import airframe_answer, deciding_parameter, find_deciding_parameter, has_room
+from planfly.reference_flights import (
+    airframe_answer,
+    deciding_parameter,
+    find_deciding_parameter,
+    has_room,
+    judge_with_reference_flights,
+)
 from planfly.served_flights import ServedLog
 from tests.setups import setup_maker
 
@@ -241,14 +247,29 @@ def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Pa
     assert verdict_json(judge_log(log)) == verdict_json(judged.verdict)
 
 
-def test_nothing_is_looked_for_where_nothing_failed() -> None:
+def test_a_flight_that_passes_has_a_reference_flight_only_on_request() -> None:
     setup = over_a_hill(30.0)
-    judged = fly_and_judge(setup, load_airframe(setup.scenario), None)
-    assert judged.verdict.flyable
-    assert judged.reference is not None
-    assert judged.reference.airframe == airframe_answer(setup, AIRCRAFT)
-    assert judged.reference.deciding is None
-    assert find_deciding_parameter(setup, AIRCRAFT, judged.verdict) is None
+    airframe = load_airframe(setup.scenario)
+    usual = fly_and_judge(setup, airframe, None)
+    assert usual.reference is None
+    assert usual.verdict.flyable
+    assert [level.name for level in usual.verdict.levels] == ["geometry", "autopilot"]
+    asked = fly_and_judge(setup, airframe, None, reference="always")
+    assert asked.reference is not None
+    assert asked.reference.airframe == airframe_answer(setup, AIRCRAFT)
+    assert asked.reference.deciding is None
+    assert asked.verdict.findings == usual.verdict.findings
+    assert [line for line in asked.verdict.lines if line not in usual.verdict.lines] == [
+        "By the airframe (planfly's guidance, exact navigation): flyable; both flights agree"
+    ]
+    assert find_deciding_parameter(setup, AIRCRAFT, usual.verdict) is None
+
+
+def test_campaigns_fly_no_reference_flight_of_a_flight_that_fails(flown: tuple[JudgedFlight, Path]) -> None:
+    judged, _ = flown
+    alone, none = judge_with_reference_flights(judged.requirements, AIRCRAFT, judged.track, judged.ended, fly="never")
+    assert none is None
+    assert alone.findings == judged.verdict.findings
 
 
 def test_planflys_guidance_has_no_flight_beside_it() -> None:

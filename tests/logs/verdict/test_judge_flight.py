@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import make_finding, verdict_json
-from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.judge_geometry import geometric_findings
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Place
@@ -36,6 +36,16 @@ def test_a_clean_flight_is_flyable_and_every_rule_speaks(setup: FlightSetup, tra
     assert all(item.ok for item in verdict.findings)
     assert len([item for item in verdict.findings if item.rule == "turn"]) == 3
     assert len([item for item in verdict.findings if item.rule == "slope"]) == 4
+
+
+def test_route_requirements_that_are_known_are_not_computed_again(
+    setup: FlightSetup, track: Track, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    requirements, flown, drawn = route_requirements(setup), judge(setup, track), judge_geometry(setup)
+    for module in ("judge_flight", "judge_geometry"):
+        monkeypatch.setattr(f"logs.verdict.{module}.route_requirements", None)
+    assert judge_flight(setup, track, "completed", requirements=requirements) == flown
+    assert judge_geometry(setup, requirements) == drawn
 
 
 def test_flown_angles_and_slopes_are_the_planned_ones(setup: FlightSetup, track: Track) -> None:

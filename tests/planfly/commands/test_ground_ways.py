@@ -32,7 +32,7 @@ def test_a_first_waypoint_behind_a_ridge_is_not_judged_in_full(
     first = "not judged in full: the way up from home to item 1 meets the ground"
     assert main(["check", mission, "--terrain", "jacksboro"]) == 3
     assert capsys.readouterr().out.splitlines()[0] == first
-    assert main(["fly", mission, "--terrain", "jacksboro", "--log", str(tmp_path / "f.mcap")]) == 3
+    assert main(["fly", mission, "--terrain", "jacksboro", "--levels", "--log", str(tmp_path / "f.mcap")]) == 3
     out = capsys.readouterr().out
     assert out.splitlines()[0] == first
     assert "  open    climb-out at waypoint 0 (item 1): the way up from home to item 1 meets the ground, " in out

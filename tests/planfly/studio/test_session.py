@@ -278,7 +278,7 @@ def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:
     findings = session.judged.verdict.findings
     number = next(n for n, one in enumerate(findings) if (one.place.kind, one.place.index) == ("missile", m))
     session.edit(messages.Apply(kind="apply", rev=session.rev, finding=number, which=0))
-    points = np.asarray(session.requirements.path.points)
+    points = np.asarray(session.judged.requirements.path.points)
     assert np.linalg.norm(points - centre, axis=1).min() - radius > 4.5
 
 
