@@ -12,20 +12,18 @@ class ElevationFormat(NamedTuple):
     name: in messages.
     suffix: of its files, in lower case.
     begins: what its files begin with, one of these; none for a kind that is known by its suffix alone.
-    opener: function of `world.raster` that opens a file by its path and the path as it was given.
     """
 
     name: str
     suffix: str
     begins: tuple[bytes, ...]
-    opener: str
 
 
 # All that are read: by what a file begins with (four bytes, for two may be a height), else by its suffix.
 FORMATS = (
-    ElevationFormat("a GeoTIFF", ".tif", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), "open_geotiff"),
-    ElevationFormat("an SRTM .hgt", ".hgt", (), "open_hgt"),
-    ElevationFormat("an .npz with `elevation`", ".npz", (b"PK\x03\x04",), "open_npz"),
+    ElevationFormat("a GeoTIFF", ".tif", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
+    ElevationFormat("an SRTM .hgt", ".hgt", ()),
+    ElevationFormat("an .npz with `elevation`", ".npz", (b"PK\x03\x04",)),
 )
 SUFFIXES = tuple(known.suffix for known in FORMATS)
 # A list of such files, of which only their names are read (`world.elevation_tiles`).

@@ -1,15 +1,16 @@
 """Several elevation files as one: the tiles of a folder, of a GDAL virtual raster (.vrt), or of a list.
 
-All tiles lie on one grid: the same reference system, the same pitch, their pixels on each other's where they overlap.
-What no tile covers is a gap.  Of a virtual raster only the names of its files are read, never what else it asks for.
+All tiles lie on one grid: the same reference system, the same pitch, and pixels that coincide where tiles overlap.
+Ground that no tile covers is a gap.  Of a virtual raster only the names of its files are read: GDAL's own driver would
+open whatever it names, servers and commands included, by any of GDAL's drivers.
 """
 
 import hashlib
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,31 +18,16 @@ from numpy.typing import NDArray
 
 from world.elevation_formats import MAX_TILES, SUFFIXES, VIRTUAL
 from world.errors import TerrainError
-
-if TYPE_CHECKING:
-    from world.raster import RasterFile
+from world.raster_file import RasterFile, is_ground, moved_grid
 
 # Bytes of a virtual raster at most.
 _MAX_BYTES = 4 * 2**20
-# Data that is missing without a stated nodata value: these, and what is lower or higher than any ground, m.
-UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
-LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
 # Pixels by which a tile may lie off the grid of the first.
 OFF_GRID = 0.01
 
 
-def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Which heights, m, are of ground, and not of missing data, stated or not.
-
-    >>> is_ground(np.array([-9999.0, 480.0, np.nan], dtype=np.float32)).tolist()
-    [False, True, False]
-    """
-    found: NDArray[np.bool_] = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND)
-    return found & ~np.isin(heights, UNSTATED_NODATA)
-
-
 def tile_files(path: Path) -> list[Path] | None:
-    """The files of a folder or of a virtual raster, sorted by name; None for a file that is neither.
+    """Return the files of a folder or of a virtual raster, sorted by name; None for a file that is neither.
 
     Raises TerrainError for a folder without elevation files, and for a virtual raster that cannot be read.
     """
@@ -60,7 +46,7 @@ def tile_files(path: Path) -> list[Path] | None:
 
 
 def _virtual_files(path: Path) -> list[Path]:
-    """The files that a virtual raster is made of."""
+    """Return the files that a virtual raster is made of, all in its folder or below."""
     try:
         if path.stat().st_size > _MAX_BYTES:
             raise TerrainError(f"{path}: a virtual raster has at most {_MAX_BYTES:,} bytes", file=path)
@@ -80,18 +66,22 @@ def _virtual_files(path: Path) -> list[Path]:
     if root.get("subClass") is not None:
         message = f"{path}: a {root.get('subClass')} computes its pixels: only a mosaic of files is read"
         raise TerrainError(message, file=path)
-    found = []
+    found, folder = [], os.path.normpath(path.parent.absolute())
     for element in sources:
         name = str(element.text).strip()
         if name.startswith("/vsi") or "://" in name or Path(name).suffix.lower() not in SUFFIXES:
             allowed = f"only local {', '.join(SUFFIXES)} files are read"
             raise TerrainError.at(path, "SourceFilename", name, allowed)
-        found.append(path.parent / name if element.get("relativeToVRT") == "1" else Path(name))
+        file = Path(os.path.normpath(Path(folder, name)))
+        if not file.is_relative_to(folder):
+            allowed = f"files in the folder of {path.name} or below are expected"
+            raise TerrainError.at(path, "SourceFilename", name, allowed)
+        found.append(path.parent / file.relative_to(folder))
     return sorted(set(found))
 
 
-def joined(tiles: Sequence["RasterFile"], name: str) -> "RasterFile":
-    """Tiles as one raster.  name: in messages.
+def joined(tiles: Sequence[RasterFile], name: str) -> RasterFile:
+    """Join tiles into one raster.  name: in messages.
 
     Where tiles overlap, the first that has data counts.  Raises TerrainError for tiles that are not on one grid.
     """
@@ -131,48 +121,13 @@ def joined(tiles: Sequence["RasterFile"], name: str) -> "RasterFile":
     )
 
 
-class Affine(NamedTuple):
-    """From columns and rows to coordinates: x = a col + b row + c, y = d col + e row + f."""
-
-    a: float
-    b: float
-    c: float
-    d: float
-    e: float
-    f: float
-
-    @property
-    def determinant(self) -> float:
-        """Area of a pixel, with the sign of its turn; 0 where it is none."""
-        return self.a * self.e - self.b * self.d
-
-    def inverse(self) -> "Affine":
-        """From coordinates to columns and rows."""
-        a, b, d, e = (value / self.determinant for value in (self.e, -self.b, -self.d, self.a))
-        return Affine(a, b, -a * self.c - b * self.f, d, e, -d * self.c - e * self.f)
-
-    def applied(self, x: Any, y: Any) -> tuple[Any, Any]:
-        """Apply it to numbers or arrays."""
-        return self.a * x + self.b * y + self.c, self.d * x + self.e * y + self.f
-
-
-def moved_grid(grid: tuple[float, ...], rows: int, cols: int) -> tuple[float, ...]:
-    """The affine coefficients (a, b, c, d, e, f) of a grid that begins so many rows and columns further on.
-
-    >>> moved_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
-    (30.0, 0.0, 460.0, 0.0, -30.0, 870.0)
-    """
-    a, b, c, d, e, f = grid
-    return a, b, c + a * cols + b * rows, d, e, f + d * cols + e * rows
-
-
 def _moved(
     place: tuple[NDArray[np.float64], NDArray[np.float64]], cols: int, rows: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return place[0] + cols, place[1] + rows
 
 
-def _place(first: "RasterFile", tile: "RasterFile") -> tuple[int, int]:
+def _place(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
     """Row and column of a tile's first pixel on the grid of the first tile.  Raises TerrainError."""
     if tile.crs != first.crs:
         allowed = f"the reference system of {first.name} is expected: tiles lie on one grid"

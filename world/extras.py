@@ -55,7 +55,6 @@ EXTRAS = {
             ("pandas", "pyarrow"),
         ),
         Extra("px4-logs", "logs of PX4 need", "reading `.ulg` files", ("pyulog",)),
-        Extra("gdal", "GDAL's formats need", "GeoTIFFs of rare kinds (docs/your-dem.md)", ("rasterio",)),
         Extra(
             "identification",
             "identifying an aircraft needs",

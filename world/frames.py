@@ -126,11 +126,15 @@ def height_unit(crs: str) -> tuple[str, float]:
     )
 
 
-def wkt_of(crs: str) -> str:
-    """A CRS that PROJ knows, such as "EPSG:4326", as well-known text."""
+def wkt_of(crs: str, *, with_height: bool = False) -> str:
+    """Return a CRS that PROJ knows, such as "EPSG:4326", as well-known text.
+
+    with_height: give a two-dimensional CRS the height above its ellipsoid.
+    """
     from pyproj import CRS
 
-    return str(CRS.from_user_input(crs).to_wkt())
+    found = CRS.from_user_input(crs)
+    return str((found.to_3d() if with_height else found).to_wkt())
 
 
 def is_geographic(crs: str) -> bool:

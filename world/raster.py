@@ -5,44 +5,37 @@ driver is explicit, so that nothing that merely names another file (VRT, a URL, 
 `world.height_datum` says what its heights count from; as terrain they count from mean sea level.
 """
 
-import hashlib
 import lzma
 import math
-import os
-import re
-import warnings
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from world.address_space import AddressSpaceError
 from world.elevation_formats import EMBEDDED, FORMATS, SUFFIXES
-from world.elevation_tiles import Affine, is_ground, joined, tile_files
+from world.elevation_tiles import joined, tile_files
 from world.errors import TerrainError
-from world.extras import need_extra
 from world.files import did_you_mean
-from world.frames import (
-    GeoOrigin,
-    crs_transformer,
-    fit_polymap,
-    height_unit,
-    is_geographic,
-    to_geo,
-    to_map,
-    transform_points,
-    wkt_of,
+from world.frames import GeoOrigin, fit_polymap, to_geo, to_map
+from world.gdal_raster import PIXELS_AT_ONCE, open_geotiff, open_hgt
+from world.height_datum import HeightDatum, StatedDatum, height_datum
+from world.raster_file import (
+    Floats,
+    RasterFile,
+    ToSource,
+    file_sha256,
+    is_ground,
+    longitude_near,
+    one_line,
+    outline,
+    refuse_few_pixels,
 )
-from world.height_datum import UNSTATED, HeightDatum, StatedDatum, height_datum
 from world.terrain import Terrain
-
-Floats = NDArray[np.float64]
-ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 # A window with more pixels than this, or a file of more that is read as one array, is refused.
 MAX_PIXELS = 120_000_000
@@ -51,75 +44,8 @@ _OWN_FILES = Path(__file__).parent / "elevation"
 _UNZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
 
 
-@dataclass(frozen=True, slots=True)
-class RasterFile:
-    """An elevation file that was opened and understood, not yet read.
-
-    to_source: longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: the other way.
-    shape: (rows, cols).
-    corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
-    grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference system, degrees
-    where there is none.
-    read: rows and columns half-open to a float32 block with NaN for nodata, heights as the file has them.
-    crs: the file's reference system as WKT; None where it has none.
-    datum: what the heights count from.
-    """
-
-    name: str
-    shape: tuple[int, int]
-    to_source: ToSource
-    to_place: ToSource
-    corners: Floats
-    sha256: str
-    read: Callable[[int, int, int, int], NDArray[np.float32]]
-    grid: tuple[float, ...]
-    crs: str | None = None
-    datum: HeightDatum = field(default=HeightDatum(UNSTATED))
-
-    @property
-    def centre(self) -> GeoOrigin:
-        """The middle of the tile, its longitude in -180..180 also where the tile lies across the 180th meridian."""
-        lat = (self.corners[:, 1].min() + self.corners[:, 1].max()) / 2
-        lon = longitude_near(self.corners[:, 0], float(self.corners[0, 0]))
-        return GeoOrigin(float(lat), float(longitude_near((lon.min() + lon.max()) / 2, 0.0)))
-
-
-def longitude_near(lon: NDArray[np.float64] | float, middle: float) -> Floats:
-    """Return the same longitudes (deg) within 180 degrees of ``middle``; one that is there already is unchanged."""
-    return np.asarray(lon - 360.0 * np.round((np.asarray(lon) - middle) / 360.0))
-
-
-def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
-    """Columns and rows, (84,) each, along the outline of a raster's pixel centres."""
-    ramp = np.linspace(0.0, 1.0, 21)
-    zero, one = np.zeros(21), np.ones(21)
-    col = np.concatenate([ramp, ramp, zero, one]) * (cols - 1)
-    row = np.concatenate([zero, one, ramp, ramp]) * (rows - 1)
-    return col, row
-
-
-def file_sha256(path: Path) -> str:
-    """SHA-256 of a file's bytes, in hex."""
-    digest = hashlib.sha256()
-    with path.open("rb") as handle:
-        while block := handle.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
-
-
-def one_line(error: BaseException) -> str:
-    """First line of an error's text, or its type where it has none."""
-    return str(error).splitlines()[0] if str(error) else type(error).__name__
-
-
 # ----------------------------------------------------------------------
 # What every format has to be.
-
-
-def _refuse_few(name: str | Path, shape: tuple[int, int]) -> None:
-    """Raise TerrainError for fewer rows or columns than heights can be interpolated between."""
-    if min(shape) < 2:
-        raise TerrainError.at(name, "rows, columns", shape, "at least 2 x 2 pixels are expected")
 
 
 def grid_in_degrees(
@@ -132,7 +58,7 @@ def grid_in_degrees(
     Raises TerrainError for too few or too many pixels, and for edges that are not on the globe.
     """
     rows, cols = heights.shape
-    _refuse_few(name, (rows, cols))
+    refuse_few_pixels(name, (rows, cols))
     if heights.size > MAX_PIXELS:
         allowed = f"at most {MAX_PIXELS:,} are read"
         raise TerrainError.at(name, "pixels", heights.size, allowed, shown=f"{heights.size:,}")
@@ -224,207 +150,10 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
 
 
 # ----------------------------------------------------------------------
-# Files with a place on Earth and a reference system: GeoTIFF, and the tiles of SRTM.
-
-METRES = ("m", "metre", "metres", "meter", "meters")
-# Words of a unit that are feet; what a tag of a unit across the ground has in its name.
-_FEET, _ACROSS = {"ft", "feet", "foot", "ftus", "usft"}, re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
-# Codes of EPSG.
-_METRE, _UNITS = 9001, {9002: "foot", 9003: "US survey foot"}
-# A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
-MAX_BLOCK = 32 * 2**20
-
-
-class _Placed(NamedTuple):
-    """What a file states of its heights.
-
-    shape: (rows, cols).  kind: numpy's letter of the numbers.  block: pixels of one.  unit: of the heights.
-    """
-
-    shape: tuple[int, int]
-    bands: int
-    kind: str
-    block: int
-    unit: str
-    transform: Affine | None
-    crs: str | None
-
-
-def _placed_file(file: Path, placed: _Placed, read: Callable[[int, int, int, int], NDArray[np.float32]]) -> RasterFile:
-    """A file of heights in metres on a grid of its reference system.  Raises TerrainError."""
-    if placed.bands != 1 or placed.kind not in "iuf":
-        allowed = "an elevation file has 1 band of numbers"
-        raise TerrainError.at(file, "bands", placed.bands, allowed, shown=f"{placed.bands} of kind {placed.kind!r}")
-    forward = placed.transform
-    if placed.crs is None or forward is None or forward.determinant == 0.0:
-        beside = file.with_name(f"{file.name}.aux.xml")
-        unread = f" in the file itself; {beside.name} is not read" if beside.exists() else ""
-        raise TerrainError(f"{file}: no coordinate reference system and position are stated{unread}", file=file)
-    try:
-        transformer, (stated, metres) = crs_transformer(placed.crs), height_unit(placed.crs)
-    except ValueError as error:
-        raise TerrainError(f"{file}: its reference system cannot be read: {one_line(error)}", file=file) from error
-    if (placed.unit or "m").lower() not in METRES or metres != 1.0:
-        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else placed.unit, "metres are expected")
-    if placed.block > MAX_BLOCK:
-        allowed = f"at most {MAX_BLOCK:,} are; tile the file"
-        raise TerrainError.at(file, "pixels of a block, read whole", placed.block, allowed, shown=f"{placed.block:,}")
-    _refuse_few(file, placed.shape)
-    rows, cols = placed.shape
-    inverse = forward.inverse()
-    middle = forward.applied(cols / 2, rows / 2)[0] if is_geographic(placed.crs) else math.nan
-
-    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
-        x, y = transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
-        if not math.isnan(middle):
-            x = longitude_near(np.asarray(x), middle)
-        col, row = inverse.applied(np.asarray(x), np.asarray(y))
-        return np.asarray(col) - 0.5, np.asarray(row) - 0.5
-
-    def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
-        x, y = forward.applied(col + 0.5, row + 0.5)
-        lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
-        return np.asarray(lon), np.asarray(lat)
-
-    corners = np.stack(to_place(*outline(cols, rows)), axis=1)
-    return RasterFile(
-        str(file), placed.shape, to_source, to_place, corners, file_sha256(file), read, tuple(forward), placed.crs
-    )
-
-
-def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
-    """The unit of a file's heights: its band's, or feet that a tag of file or band names; "" for none.
-
-    GDAL takes what other programs write as a tag for a remark, and gives the heights in metres, which they are not.
-    """
-    for key, value in tags:
-        if "unit" in key.lower() and not _ACROSS.search(key) and _FEET & set(re.split("[^a-z]+", value.lower())):
-            return f"{value} (tag {key})"
-    return unit
-
-
-def open_geotiff(file: Path, _name: str) -> RasterFile:
-    """Open a GeoTIFF in any reference system, with heights in metres.  Raises TerrainError and MissingExtraError."""
-    # Imported here: a tile that we ship needs none of it.
-    from world.geotiff import BadTiffError, UnreadTiffError, read_geotiff
-
-    try:
-        found = read_geotiff(file)
-        crs = None if found.crs is None else wkt_of(found.crs)
-    except UnreadTiffError as why:
-        need_extra("gdal", f"{file}: {why}: reading it needs")
-        return _open_by_gdal(file)
-    except (BadTiffError, OSError) as error:
-        raise TerrainError(f"{file}: not a readable GeoTIFF file: {one_line(error)}", file=file) from error
-
-    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
-        try:
-            return found.read(top, bottom, left, right)
-        except (BadTiffError, OSError) as error:
-            raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
-
-    unit = _unit_of(found.unit, found.tags)
-    if found.vertical_unit not in (0, _METRE):
-        unit = _UNITS.get(found.vertical_unit, f"EPSG's unit {found.vertical_unit}")
-    block = found.blocks.rows * found.blocks.cols
-    return _placed_file(
-        file, _Placed(found.shape, found.bands, found.dtype.kind, block, unit, found.transform, crs), read
-    )
-
-
-# The name of a tile is its south-west corner's; its outer pixels lie on whole degrees.  Rows and columns by bytes.
-_TILE_NAME = re.compile(r"([NS])(\d\d)([EW])(\d\d\d)", re.IGNORECASE)
-_TILE_SHAPES = {
-    2 * rows * cols: (rows, cols) for rows, cols in ((1201, 1201), (3601, 1801), (3601, 3601), (7201, 7201))
-}
-
-
-def open_hgt(file: Path, _name: str) -> RasterFile:
-    """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
-    named, shape = _TILE_NAME.match(file.name), _TILE_SHAPES.get(file.stat().st_size)
-    if named is None or shape is None:
-        allowed = "a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights are expected"
-        raise TerrainError(f"{file}: not a readable SRTM tile: {allowed}", file=file, allowed=allowed)
-    rows, cols = shape
-    south = int(named[2]) * (1 if named[1].upper() == "N" else -1)
-    west = int(named[4]) * (1 if named[3].upper() == "E" else -1)
-    dx, dy = 1.0 / (cols - 1), 1.0 / (rows - 1)
-
-    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
-        try:
-            return np.memmap(file, ">i2", "r", shape=shape)[top:bottom, left:right].astype(np.float32)
-        except (OSError, ValueError) as error:
-            raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
-
-    transform = Affine(dx, 0.0, west - dx / 2, 0.0, -dy, south + 1.0 + dy / 2)
-    return _placed_file(file, _Placed(shape, 1, "i", cols, "m", transform, wkt_of("EPSG:4326")), read)
-
-
-# ----------------------------------------------------------------------
-# What GDAL reads, where the extra is installed.
-
-# Pixels of a window that are read before the next ones: numbers and masks take several times the heights' own memory.
-_PIXELS_AT_ONCE = 2**22
-
-
-def _read_strips(opened: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
-    """Heights of a window (top, bottom, left, right) of an open file, some rows at a time; NaN where it has no data."""
-    top, bottom, left, right = window
-    heights = np.empty((bottom - top, right - left), dtype=np.float32)
-    at_once = max(1, _PIXELS_AT_ONCE // (right - left))
-    for row in range(top, bottom, at_once):
-        rows = min(at_once, bottom - row)
-        # Numbers that a file stores scaled are rare, and silently wrong if read as they stand.
-        strip = opened.read(1, window=((row, row + rows), (left, right)), masked=True)
-        whole = np.ma.filled(strip.astype(np.float64), np.nan) * scale + offset
-        heights[row - top : row - top + rows] = whole
-    return heights
-
-
-# What GDAL may do: read the one file, and nothing that lies beside it or is named in it.
-GUARD: dict[str, Any] = {
-    "GDAL_PAM_ENABLED": "NO",
-    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
-    "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
-    # The vertical part of the reference system too, for its unit and for what heights count from.
-    "GTIFF_REPORT_COMPD_CS": "YES",
-    # Of blocks once unpacked, bytes; the default is a share of the machine's memory.
-    "GDAL_CACHEMAX": 64 * 2**20,
-}
-
-
-def _open_by_gdal(file: Path) -> RasterFile:
-    import rasterio
-    from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
-
-    failures = (RasterioError, RasterioIOError, ValueError, TypeError, OSError)
-    try:
-        with warnings.catch_warnings(), rasterio.Env(**GUARD):
-            # Without georeferencing there is no reference system either, and that is refused in one line.
-            warnings.simplefilter("ignore", NotGeoreferencedWarning)
-            with rasterio.open(os.fspath(file.resolve()), driver="GTiff") as source:
-                scale, offset = float(source.scales[0]), float(source.offsets[0])
-                placed = _Placed(
-                    (source.height, source.width), source.count, np.dtype(source.dtypes[0]).kind,
-                    math.prod(source.block_shapes[0]),
-                    _unit_of(source.units[0] or "", {**source.tags(), **source.tags(1)}.items()),
-                    Affine(*tuple(source.transform)[:6]), None if source.crs is None else source.crs.to_wkt(),
-                )  # fmt: skip
-    except failures as error:
-        raise TerrainError(f"{file}: not a readable GeoTIFF file: {one_line(error)}", file=file) from error
-
-    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
-        try:
-            with rasterio.Env(**GUARD), rasterio.open(os.fspath(file.resolve()), driver="GTiff") as opened:
-                return _read_strips(opened, (top, bottom, left, right), scale, offset)
-        except (RasterioError, RasterioIOError, OSError) as error:
-            raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
-
-    return _placed_file(file, placed, read)
-
-
-# ----------------------------------------------------------------------
 # A file of any format.
+
+# Functions that open a file by its path and the path as it was given.
+_OPENERS: dict[str, Callable[[Path, str], RasterFile]] = {".tif": open_geotiff, ".hgt": open_hgt, ".npz": open_npz}
 
 
 def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
@@ -461,8 +190,7 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
         raise TerrainError(f"{file}: cannot be read: {error.strerror}", file=file) from error
     by_suffix = [one for one in FORMATS if not one.begins and one.suffix == file.suffix.lower()]
     for one in (*(one for one in FORMATS if head.startswith(one.begins)), *by_suffix):
-        opener: Callable[[Path, str], RasterFile] = globals()[one.opener]
-        raster = opener(file, path)
+        raster = _OPENERS[one.suffix](file, path)
         return replace(raster, datum=_datum_of(raster, datum))
     expected = _listed([one.name for one in FORMATS])
     raise TerrainError(f"{file}: not an elevation file: {expected} is expected", file=file)
@@ -595,7 +323,7 @@ def _count_from_sea_level(heights: NDArray[np.float32], raster: RasterFile, top:
     at = np.interp(rows, row, np.arange(row.size))
     above = np.minimum(at.astype(np.intp), row.size - 2)
     share = (at - above)[:, None]
-    at_once = max(1, _PIXELS_AT_ONCE // cols.size)
+    at_once = max(1, PIXELS_AT_ONCE // cols.size)
     for first in range(0, rows.size, at_once):
         part = slice(first, first + at_once)
         upper, lower = lines[above[part]], lines[above[part] + 1]

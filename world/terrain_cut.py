@@ -7,7 +7,7 @@ Heights are above EGM2008 (Copernicus DEM Product Handbook, GEO.2018-1988-2, "Ve
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,12 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from world.elevation_tiles import is_ground, moved_grid
 from world.errors import TerrainError
-from world.extras import need_extra
 from world.files import write_whole
-from world.geotiff import BadTiffError, UnreadTiffError, geotiff_bytes, read_geotiff
-from world.raster import MAX_PIXELS, RasterFile, open_geotiff, open_raster
+from world.gdal_raster import block_spans, geotiff_bytes, open_geotiff
+from world.raster import MAX_PIXELS, open_raster
+from world.raster_file import RasterFile, is_ground, moved_grid
 from world.remote_files import RemoteFile, find_remote
 
 Heights = NDArray[np.float32]
@@ -115,28 +114,7 @@ def _write(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None
     if _empty(heights) == heights.size:
         raise TerrainError(f"{out}: no data in the area: the tiles have none there", file=out)
     stored = np.where(is_ground(heights), heights, np.float32(_NODATA))
-    try:
-        data = geotiff_bytes(stored, grid, crs, _NODATA)
-    except UnreadTiffError as why:
-        need_extra("gdal", f"{out}: {why}: writing it needs")
-        data = _by_gdal(stored, grid, crs)
-    write_whole(out, data)
-
-
-def _by_gdal(stored: Heights, grid: Sequence[float], crs: str) -> bytes:
-    import rasterio
-    from rasterio.io import MemoryFile
-
-    rows, cols = stored.shape
-    profile: dict[str, Any] = {
-        "driver": "GTiff", "height": rows, "width": cols, "count": 1, "dtype": "float32", "crs": crs,
-        "transform": rasterio.Affine(*grid), "nodata": _NODATA, "compress": "deflate", "predictor": 3,
-    }  # fmt: skip
-    with MemoryFile() as memory:
-        with memory.open(**profile) as file:
-            file.write(stored, 1)
-            file.units = ("m",)
-        return bytes(memory.getbuffer())
+    write_whole(out, geotiff_bytes(stored, tuple(grid), crs, _NODATA))
 
 
 # ----------------------------------------------------------------------
@@ -216,7 +194,7 @@ def _fetched_tile(remote: RemoteFile, box: Box, count: Callable[[int], None]) ->
         try:
             tile = _opened_copy(remote, count, (_DIRECTORY, remote.size) if is_last else (_DIRECTORY,))
             window = _touched(tile, box)
-            for begin, end in _blocks(remote.copy, window):
+            for begin, end in block_spans(remote.copy, window):
                 remote.fetch(begin, end, count)
             if window[0] < window[1] and window[2] < window[3]:
                 tile.read(*window)
@@ -264,23 +242,6 @@ def _touched(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
     top, bottom = (int(np.clip(value, 0, rows)) for value in ends[0])
     left, right = (int(np.clip(value, 0, cols)) for value in ends[1])
     return top, bottom, left, right
-
-
-def _blocks(copy: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int, int]]:
-    """Bytes [begin, end) of the blocks of a window.  Raises TerrainError for a file that does not state them."""
-    top, bottom, left, right = window
-    if top >= bottom or left >= right:
-        return
-    try:
-        file = read_geotiff(copy)
-    except (BadTiffError, UnreadTiffError) as why:
-        raise TerrainError(f"{copy}: its blocks are not known: {why}", file=copy) from why
-    high, wide = file.blocks.rows, file.blocks.cols
-    for down in range(top // high, (bottom - 1) // high + 1):
-        for across in range(left // wide, (right - 1) // wide + 1):
-            # A block without data is not there.
-            if (span := file.span(down, across)) is not None:
-                yield span
 
 
 # Degrees by which a tile may lie off its own; pixels that are none.

@@ -13,7 +13,6 @@ from email.message import Message
 from importlib.metadata import distributions, packages_distributions
 from pathlib import Path
 
-import numpy as np
 import pytest
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
@@ -21,7 +20,6 @@ from packaging.utils import canonicalize_name
 
 from tests.packaging.conftest import PACKAGES, ROOT
 from tests.soak import SOAK
-from tests.world.made.elevation_files import from_origin, write_raster
 from world.extras import EXTRAS
 
 VERSIONS = ("3.11", "3.12", "3.13")
@@ -186,7 +184,7 @@ def interpreters() -> dict[str, Path]:
 
 # What the base may take, MB, with the bytecode that pip compiles of it all, and without pip and setuptools themselves,
 # which an environment brings.
-MAX_MEGABYTES = 500
+MAX_MEGABYTES = 570
 # A command of each extra, by which it is missed.
 MISSED = {
     "campaigns": "campaign paper-07",
@@ -197,7 +195,6 @@ MISSED = {
     "tables": "export out/flight.mcap a.parquet",
     "px4-logs": "check a.ulg",
     "identification": "aircraft --identify a.BIN --mass 13 --span 2.9 --out mine",
-    "gdal": "check out/mission.waypoints --terrain odd.tif",
 }
 
 
@@ -235,7 +232,6 @@ def test_the_base_installs_flies_and_misses_each_extra_on(version: str, wheel: P
     there = json.loads((folder / "out" / "verdict.json").read_text())
     assert there["flyable"]
     assert {file.name for file in folder.iterdir()} == {"out"}
-    write_raster(folder / "odd.tif", np.zeros((9, 9), np.float32), "+proj=laea", from_origin(0.0, 0.0, 10.0, 10.0))
     (folder / "a.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8))
     before = sorted(folder.rglob("*"))
     assert set(MISSED) == set(EXTRAS)

@@ -169,6 +169,12 @@ VIRTUAL = {
     "a virtual path": (b"<VRTDataset><SourceFilename>/vsizip/a.tif</SourceFilename></VRTDataset>", "only local .tif"),
     "another's file": (b"<VRTDataset><SourceFilename>/etc/passwd</SourceFilename></VRTDataset>", "only local .tif"),
     "another list": (b"<VRTDataset><SourceFilename>b.vrt</SourceFilename></VRTDataset>", "only local .tif"),
+    "a file above": (
+        b"<VRTDataset><SourceFilename relativeToVRT='1'>../a.tif</SourceFilename></VRTDataset>",
+        "below are",
+    ),
+    "a file above, later": (b"<VRTDataset><SourceFilename>b/../../a.tif</SourceFilename></VRTDataset>", "below are"),
+    "a file elsewhere": (b"<VRTDataset><SourceFilename>/etc/a.tif</SourceFilename></VRTDataset>", "below are"),
     "a file that is not there": (b"<VRTDataset><SourceFilename>a.tif</SourceFilename></VRTDataset>", "no such file"),
 }
 

@@ -1,0 +1,259 @@
+"""Elevation files that GDAL reads through rasterio, GeoTIFF and SRTM tiles, and GeoTIFF files that it writes.
+
+GDAL knows some 150 formats, among them lists of other files and addresses of servers.  Each file here is opened by the
+one driver that it is for, by its absolute path, and with `GUARD`: GDAL then reads this file and no other.
+"""
+
+import math
+import os
+import re
+import warnings
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.errors import TerrainError
+from world.frames import crs_transformer, height_unit, is_geographic, transform_points, wkt_of
+from world.raster_file import (
+    Floats,
+    Grid,
+    RasterFile,
+    file_sha256,
+    longitude_near,
+    one_line,
+    outline,
+    refuse_few_pixels,
+)
+
+# Options of GDAL: read the one file, and nothing that lies beside it or is named in it.
+GUARD: dict[str, Any] = {
+    "GDAL_PAM_ENABLED": "NO",
+    "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
+    "GTIFF_GEOREF_SOURCES": "INTERNAL",
+    "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
+    # The vertical part of the reference system too, for its unit and its datum.
+    "GTIFF_REPORT_COMPD_CS": "YES",
+    # Unpacked blocks that are kept, bytes; the default is a share of the machine's memory.
+    "GDAL_CACHEMAX": 16 * 2**20,
+}
+# A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused.
+MAX_BLOCK_PIXELS = 32 * 2**20
+# Pixels of a window that are read at a time: numbers and masks take several times the memory of the heights.
+PIXELS_AT_ONCE = 2**22
+
+METRES = ("m", "metre", "metres", "meter", "meters")
+# Words of a unit that are feet.
+_FEET = {"ft", "feet", "foot", "ftus", "usft"}
+# Words in the name of a tag whose unit is one of distances, not of heights.
+_HORIZONTAL = re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
+
+
+def open_geotiff(file: Path, _name: str) -> RasterFile:
+    """Open a GeoTIFF in any reference system, with heights in metres.  Raises TerrainError."""
+    return _open(file, "GTiff", "not a readable GeoTIFF file")
+
+
+def open_hgt(file: Path, _name: str) -> RasterFile:
+    """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
+    expected = "a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights are expected"
+    return _open(file, "SRTMHGT", f"not a readable SRTM tile: {expected}")
+
+
+def _dataset(file: Path, driver: str) -> Any:
+    """Open a file in GDAL, by one driver; in `GUARD` alone."""
+    import rasterio
+
+    return rasterio.open(os.fspath(file.resolve()), driver=driver)
+
+
+def _open(file: Path, driver: str, unreadable: str) -> RasterFile:
+    import rasterio
+    from rasterio.errors import NotGeoreferencedWarning, RasterioError
+
+    try:
+        with warnings.catch_warnings(), rasterio.Env(**GUARD):
+            # Of a file without a place GDAL would give columns and rows.
+            warnings.simplefilter("error", NotGeoreferencedWarning)
+            with _dataset(file, driver) as source:
+                _refuse_layout(file, source)
+                shape, grid = (source.height, source.width), tuple(source.transform)[:6]
+                scale, crs = (source.scales[0], source.offsets[0]), _crs_of(file, driver, source)
+                unit = _unit_of(source.units[0] or "", {**source.tags(), **source.tags(1)}.items())
+                unwritten = driver == "GTiff" and source.nodata is None
+    except NotGeoreferencedWarning:
+        _refuse_unplaced(file)
+    except (RasterioError, ValueError, TypeError, OSError) as error:
+        raise TerrainError(f"{file}: {unreadable}: {_cause(error)}", file=file) from error
+
+    def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
+        try:
+            with rasterio.Env(**GUARD), _dataset(file, driver) as source:
+                heights = _read_strips(source, (top, bottom, left, right), *scale)
+                if unwritten:
+                    _clear_unwritten(source, heights, top, left)
+                return heights
+        except (RasterioError, OSError) as error:
+            raise TerrainError(f"{file}: cannot be read: {_cause(error)}", file=file) from error
+
+    return _place(file, shape, grid, crs, unit, read)
+
+
+def _cause(error: BaseException) -> str:
+    """Return the first error's text in a line: rasterio's own says to see the previous one."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return one_line(error)
+
+
+def _refuse_layout(file: Path, source: Any) -> None:
+    """Raise TerrainError for other than one band of real numbers in blocks that can be unpacked."""
+    kind = np.dtype(source.dtypes[0]).kind
+    if source.count != 1 or kind not in "iuf":
+        allowed = "an elevation file has 1 band of numbers"
+        raise TerrainError.at(file, "bands", source.count, allowed, shown=f"{source.count} of kind {kind!r}")
+    block = math.prod(source.block_shapes[0])
+    if block > MAX_BLOCK_PIXELS:
+        allowed = f"at most {MAX_BLOCK_PIXELS:,} are; tile the file"
+        raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
+    refuse_few_pixels(file, (source.height, source.width))
+
+
+def _refuse_unplaced(file: Path) -> NoReturn:
+    """Raise TerrainError for a file without a place on Earth."""
+    beside = file.with_name(f"{file.name}.aux.xml")
+    unread = f" in the file itself; {beside.name} is not read" if beside.exists() else ""
+    raise TerrainError(f"{file}: no coordinate reference system and position are stated{unread}", file=file)
+
+
+def _crs_of(file: Path, driver: str, source: Any) -> str | None:
+    """Return the reference system of an open file as WKT; None where it has none."""
+    import rasterio
+
+    if source.crs is None:
+        return None
+    found = source.crs.to_wkt(version="WKT2_2019")
+    # Of a three-dimensional system in a file of GeoTIFF 1.0 GDAL drops the height, but for EPSG's own definition.
+    with rasterio.Env(GTIFF_SRS_SOURCE="EPSG"), _dataset(file, driver) as by_code:
+        has_height = "CS[ellipsoidal,3]" in by_code.crs.to_wkt(version="WKT2_2019")
+    return wkt_of(found, with_height=has_height)
+
+
+def _unit_of(unit: str, tags: Iterable[tuple[str, str]]) -> str:
+    """Return the unit of a file's heights: its band's, or feet that a tag of file or band names; "" for none.
+
+    GDAL takes what other programs write as a tag for a remark, and gives the heights in metres, which they are not.
+    """
+    for key, value in tags:
+        if "unit" in key.lower() and not _HORIZONTAL.search(key) and _FEET & set(re.split("[^a-z]+", value.lower())):
+            return f"{value} (tag {key})"
+    return unit
+
+
+def _place(file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any) -> RasterFile:
+    """Make a file of heights in metres on a grid of its reference system.  Raises TerrainError."""
+    a, b, c, d, e, f = grid
+    determinant = a * e - b * d
+    if crs is None or determinant == 0.0:
+        _refuse_unplaced(file)
+    try:
+        transformer, (stated, metres) = crs_transformer(crs), height_unit(crs)
+    except ValueError as error:
+        raise TerrainError(f"{file}: its reference system cannot be read: {one_line(error)}", file=file) from error
+    if (unit or "m").lower() not in METRES or metres != 1.0:
+        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "metres are expected")
+    rows, cols = shape
+    middle = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan
+
+    def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+        x, y = (np.asarray(one) for one in transform_points(transformer.transform, np.asarray(lon), np.asarray(lat)))
+        if not math.isnan(middle):
+            x = longitude_near(x, middle)
+        col, row = (e * (x - c) - b * (y - f)) / determinant, (a * (y - f) - d * (x - c)) / determinant
+        return col - 0.5, row - 0.5
+
+    def to_place(col: Floats, row: Floats) -> tuple[Floats, Floats]:
+        across, down = col + 0.5, row + 0.5
+        x, y = a * across + b * down + c, d * across + e * down + f
+        lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
+        return np.asarray(lon), np.asarray(lat)
+
+    # A damaged place may be larger than numbers are.
+    with np.errstate(all="ignore"):
+        corners = np.stack(to_place(*outline(cols, rows)), axis=1)
+    if not (np.isfinite(corners).all() and np.abs(corners[:, 1]).max() <= 90.0):
+        raise TerrainError(f"{file}: its outline does not lie on Earth", file=file)
+    return RasterFile(str(file), shape, to_source, to_place, corners, file_sha256(file), read, grid, crs)
+
+
+# ----------------------------------------------------------------------
+# Windows of heights.
+
+
+def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
+    """Return the heights of a window (top, bottom, left, right), some rows at a time; NaN where it has no data."""
+    top, bottom, left, right = window
+    heights = np.empty((bottom - top, right - left), dtype=np.float32)
+    at_once = max(1, PIXELS_AT_ONCE // (right - left))
+    for row in range(top, bottom, at_once):
+        rows = min(at_once, bottom - row)
+        strip = source.read(1, window=((row, row + rows), (left, right)), masked=True)
+        # Numbers that a damaged file holds need not fit.
+        with np.errstate(all="ignore"):
+            heights[row - top : row - top + rows] = np.ma.filled(strip.astype(np.float64), np.nan) * scale + offset
+    return heights
+
+
+def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
+    """Put NaN where a GeoTIFF has no block: GDAL reads 0 there if the file states no value for missing data."""
+    rows, cols = source.block_shapes[0]
+    bottom, right = top + len(heights), left + heights.shape[1]
+    for down in range(top // rows, -(-bottom // rows)):
+        for across in range(left // cols, -(-right // cols)):
+            if _span(source, down, across) is None:
+                above, before = max(0, down * rows - top), max(0, across * cols - left)
+                heights[above : (down + 1) * rows - top, before : (across + 1) * cols - left] = np.nan
+
+
+def _span(source: Any, down: int, across: int) -> tuple[int, int] | None:
+    """Return the bytes [begin, end) of a block of an open GeoTIFF; None for a block that was never written."""
+    at, size = (source.get_tag_item(f"BLOCK_{what}_{across}_{down}", "TIFF", bidx=1) for what in ("OFFSET", "SIZE"))
+    return None if at is None or size is None else (int(at), int(at) + int(size))
+
+
+def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int, int]]:
+    """Yield the bytes [begin, end) of the blocks of a GeoTIFF that a window (top, bottom, left, right) touches."""
+    import rasterio
+
+    top, bottom, left, right = window
+    if top >= bottom or left >= right:
+        return
+    with rasterio.Env(**GUARD), _dataset(file, "GTiff") as source:
+        rows, cols = source.block_shapes[0]
+        for down in range(top // rows, -(-bottom // rows)):
+            for across in range(left // cols, -(-right // cols)):
+                if (span := _span(source, down, across)) is not None:
+                    yield span
+
+
+# ----------------------------------------------------------------------
+# Writing.
+
+
+def geotiff_bytes(heights: NDArray[np.float32], grid: Grid, crs: str, nodata: float) -> bytes:
+    """Return a GeoTIFF of heights in metres, packed by deflate.  crs: as PROJ takes it."""
+    import rasterio
+    from rasterio.io import MemoryFile
+
+    rows, cols = heights.shape
+    profile: dict[str, Any] = {
+        "driver": "GTiff", "height": rows, "width": cols, "count": 1, "dtype": "float32", "crs": crs,
+        "transform": rasterio.Affine(*grid), "nodata": nodata, "compress": "deflate", "predictor": 3,
+    }  # fmt: skip
+    with rasterio.Env(**GUARD), MemoryFile() as memory:
+        with memory.open(**profile) as file:
+            file.write(heights, 1)
+            file.units = ("m",)
+        return bytes(memory.getbuffer())

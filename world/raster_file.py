@@ -1,0 +1,110 @@
+"""An elevation file that was opened and checked: its grid, its place on Earth and its heights, read as windows."""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.errors import TerrainError
+from world.frames import GeoOrigin
+from world.height_datum import UNSTATED, HeightDatum
+
+Floats = NDArray[np.float64]
+ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
+# Affine coefficients (a, b, c, d, e, f) from columns and rows: x = a col + b row + c, y = d col + e row + f.
+Grid = tuple[float, ...]
+ReadWindow = Callable[[int, int, int, int], NDArray[np.float32]]
+
+# Values that stand for missing data where a file states none.
+UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
+# Range of ground on Earth; heights beyond it are missing data.
+LOWEST_GROUND_M = -12_000.0
+HIGHEST_GROUND_M = 9000.0
+
+
+@dataclass(frozen=True, slots=True)
+class RasterFile:
+    """An elevation file that was opened and understood, not yet read.
+
+    to_source: longitude, latitude (deg) to fractional (col, row) of pixel centres; to_place: the other way.
+    shape: (rows, cols).
+    corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
+    grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference system, degrees
+    where there is none.
+    read: rows and columns (top, bottom, left, right), half-open, to a float32 block with NaN for missing data, heights
+    as the file has them.
+    crs: the file's reference system as WKT; None where it has none.
+    datum: the surface that the heights are measured from.
+    """
+
+    name: str
+    shape: tuple[int, int]
+    to_source: ToSource
+    to_place: ToSource
+    corners: Floats
+    sha256: str
+    read: ReadWindow
+    grid: Grid
+    crs: str | None = None
+    datum: HeightDatum = field(default=HeightDatum(UNSTATED))
+
+    @property
+    def centre(self) -> GeoOrigin:
+        """The middle of the tile, its longitude in -180..180 also where the tile lies across the 180th meridian."""
+        lat = (self.corners[:, 1].min() + self.corners[:, 1].max()) / 2
+        lon = longitude_near(self.corners[:, 0], float(self.corners[0, 0]))
+        return GeoOrigin(float(lat), float(longitude_near((lon.min() + lon.max()) / 2, 0.0)))
+
+
+def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Return a mask of the heights, m, that are ground and not missing data, stated or not.
+
+    >>> is_ground(np.array([-9999.0, 480.0, np.nan], dtype=np.float32)).tolist()
+    [False, True, False]
+    """
+    found: NDArray[np.bool_] = (heights >= LOWEST_GROUND_M) & (heights <= HIGHEST_GROUND_M)
+    return found & ~np.isin(heights, UNSTATED_NODATA)
+
+
+def longitude_near(lon: NDArray[np.float64] | float, middle: float) -> Floats:
+    """Return the same longitudes (deg) within 180 degrees of ``middle``; one that is there already is unchanged."""
+    return np.asarray(lon - 360.0 * np.round((np.asarray(lon) - middle) / 360.0))
+
+
+def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
+    """Return columns and rows, (84,) each, along the outline of a raster's pixel centres."""
+    ramp = np.linspace(0.0, 1.0, 21)
+    zero, one = np.zeros(21), np.ones(21)
+    col = np.concatenate([ramp, ramp, zero, one]) * (cols - 1)
+    row = np.concatenate([zero, one, ramp, ramp]) * (rows - 1)
+    return col, row
+
+
+def moved_grid(grid: Grid, rows: int, cols: int) -> Grid:
+    """Return the grid whose first pixel lies ``rows`` and ``cols`` further on.
+
+    >>> moved_grid((30.0, 0.0, 400.0, 0.0, -30.0, 900.0), 1, 2)
+    (30.0, 0.0, 460.0, 0.0, -30.0, 870.0)
+    """
+    a, b, c, d, e, f = grid
+    return a, b, c + a * cols + b * rows, d, e, f + d * cols + e * rows
+
+
+def refuse_few_pixels(name: str | Path, shape: tuple[int, int]) -> None:
+    """Raise TerrainError for fewer rows or columns than heights can be interpolated between."""
+    if min(shape) < 2:
+        raise TerrainError.at(name, "rows, columns", shape, "at least 2 x 2 pixels are expected")
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes, in hex."""
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()
+
+
+def one_line(error: BaseException) -> str:
+    """Return the first line of an error's text, or its type where it has none."""
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
