@@ -230,6 +230,7 @@ class Autopilot(ABC):
     cruise_parameter: that states its cruise airspeed; "" for none.
     equivalent_airspeeds: whether commanded airspeeds count as equivalent ones, which are less than true ones at height;
     it then takes over in level flight.
+    acceptance_limit: largest acceptance radius that it reads of an item, m.
     refuses: whether it takes no mission that PX4's feasibility checks refuse.
     refuses_as_arduplane: whether it takes no mission with a command that ArduPlane refuses.
     reads_as_px4: whether it reads nothing but the value of a mission's change of speed, goes back to its own airspeed
@@ -246,6 +247,7 @@ class Autopilot(ABC):
     own: ClassVar[np.dtype[np.record] | None] = None
     cruise_parameter: ClassVar[str] = ""
     equivalent_airspeeds: ClassVar[bool] = False
+    acceptance_limit: ClassVar[float] = math.inf
     refuses: ClassVar[bool] = False
     refuses_as_arduplane: ClassVar[bool] = False
     reads_as_px4: ClassVar[bool] = False
@@ -458,7 +460,8 @@ class Autopilot(ABC):
     def route_rules(self) -> RouteRules:
         """Rules by which it flies the route of a mission."""
         turn_distance = None if self.follows_path else self.turn_distance
-        return RouteRules(self.return_rules, self.loiter_rules, self.reads_as_px4, turn_distance)
+        limit = self.acceptance_limit
+        return RouteRules(self.return_rules, self.loiter_rules, self.reads_as_px4, turn_distance, limit)
 
     @property
     def mission_checks(self) -> MissionChecks:

@@ -175,16 +175,23 @@ class FlyByPath:
         self.nodes.setflags(write=False)
 
 
+# Turns within this angle of 180 degrees may go to either side, rad: a navigation error of 5 m over ArduPlane's L1
+# distance of 60 m at 25 m/s.
+REVERSAL_SIDE_TOLERANCE_RAD = math.radians(5.0)
+
 # Corners of the height profile along a leg that follows the ground are this far apart, m: ArduPlane's TERRAIN_SPACING.
 GROUND_STEP_M = 100.0
 
 
-def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, *, swings: bool = True) -> FlyByPath:
+def fly_by_path(
+    route: Route, limits: Limits, terrain: Terrain | None = None, *, swings: bool = True, other_side: bool = False
+) -> FlyByPath:
     """Join the legs of a route.  The route has at least one leg; only the first may have no length.
 
     An arc leads by each waypoint; behind one that is flown over, arcs lead back to the next leg.
     terrain: what legs follow that are flown above ground; None flies them straight.
     swings: False leaves such corners sharp, as the reference of an autopilot that turns by a law of its own.
+    other_side: True turns at `reversals` to the side of the longer turn.
 
     A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
 
@@ -200,15 +207,14 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, *,
     ([883.0, 183.0, 883.0], 117)
     """
     points = route.waypoints
-    courses, runs, turns = leg_courses(points), leg_runs(points), signed_turns(points)
+    courses, runs, turns = leg_courses(points), leg_runs(points), _turns(route, other_side)
     tangents, radii, back = _arcs(route, limits, courses, runs, turns)
     back *= swings
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
     # A circle that the flight begins on may end where it begins.
     slopes = np.divide(np.diff(points[:, 2]), runs, out=np.zeros_like(runs), where=runs > 0.0)
-    at = 0.0
-    begin = points[0, :2].copy()
+    at, begin = 0.0, points[0, :2].copy()
     for leg in range(route.legs):
         straight = runs[leg] - tangents[leg] - back[leg] - tangents[leg + 1]
         course = float(courses[leg])
@@ -239,6 +245,27 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, *,
         begin = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
         nodes.append((at, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
     return FlyByPath(np.array(pieces, PIECE), _profile(nodes, limits, route), float(at))
+
+
+def reversals(route: Route) -> NDArray[np.int64]:
+    """Return the indices of the waypoints that are flown over and reverse the course, so that either side is turned to.
+
+    >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
+    >>> over = np.array([False, True, True, False])
+    >>> reversals(Route(way, np.full(3, 25.0), np.zeros(4), over, np.arange(4), "")).tolist()
+    [1]
+    """
+    turns = np.concatenate([[0.0], np.abs(signed_turns(route.waypoints)), [0.0]])
+    return np.flatnonzero(route.fly_over & (turns > math.pi - REVERSAL_SIDE_TOLERANCE_RAD))
+
+
+def _turns(route: Route, other_side: bool) -> Floats:
+    """Return the turn at each inner waypoint, (w - 2,) rad, positive to the right; as of `fly_by_path`."""
+    turns = signed_turns(route.waypoints)
+    if other_side:
+        corners = reversals(route) - 1
+        turns[corners] -= np.copysign(2.0 * math.pi, turns[corners])
+    return turns
 
 
 def _above_ground(

@@ -179,12 +179,14 @@ class RouteRules(NamedTuple):
     reads_as_px4: True if it reads nothing but the value of a change of speed, and reads gates, as PX4 does.
     turn_distance: distance before a waypoint at which it turns to the next leg, m, by the turn (rad, positive) and the
         waypoint's altitude (m AMSL); None for guidance that follows the fly-by path.
+    acceptance_limit: largest acceptance radius that it reads of an item, m.
     """
 
     returns: ReturnRules = USUAL_RULES
     loiters: LoiterRules = USUAL_LOITERS
     reads_as_px4: bool = False
     turn_distance: Callable[[float, float], float] | None = None
+    acceptance_limit: float = math.inf
 
 
 # Rules of guidance that follows the fly-by path.
@@ -388,7 +390,7 @@ def lay_route(
     [25.0]
     """
     mission, notes = placed.mission, Notes()
-    returns, loiters, reads_as_px4, turn_distance = rules
+    returns, loiters, reads_as_px4, turn_distance, acceptance_limit = rules
     places = _with_gates(placed, notes) if reads_as_px4 else list(placed.stops)
     kept = [_with_airspeed(place, default_airspeed, reads_as_px4) for place in places]
     returning = kept.pop() if placed.itinerary.returns else None
@@ -408,7 +410,7 @@ def lay_route(
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
     airspeed = np.array([stop.airspeed for stop in stops[1:]])
-    acceptance = np.array([stop.acceptance for stop in stops])
+    acceptance = np.minimum([stop.acceptance for stop in stops], acceptance_limit)
     _note_cruise_speed(mission, default_airspeed, stops[1], notes)
     over = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
     return Route(

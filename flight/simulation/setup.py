@@ -294,6 +294,13 @@ class FlightSetup:
         object.__setattr__(moved, "scenario", scenario)
         return moved
 
+    def turned_to_other_side(self) -> "FlightSetup":
+        """Set the same flight with its reversals turned to the side of the longer turn; all else stays as it is."""
+        turned = copy.copy(self)
+        path = fly_by_path(self.route, self.limits, self.scenario.terrain, other_side=True)
+        object.__setattr__(turned, "path", path)
+        return turned
+
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
     """Limits of a path: the scenario's, with the aircraft's where the scenario leaves them to it.

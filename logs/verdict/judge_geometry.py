@@ -4,9 +4,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from flight.guidance.path import reversals
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, setup_conditions
 from logs.verdict.findings import (
+    NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
     Finding,
     Verdict,
@@ -22,6 +24,7 @@ from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
 from logs.verdict.rule import Judge, Rule
 from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines, undecided_text
+from logs.verdict.wording import place_text
 from planner.plan import Plan, Violation
 
 # ----------------------------------------------------------------------
@@ -102,7 +105,44 @@ def _judged(
     for rule in RULES.values():
         if rule.merge is not None:
             findings = rule.merge(requirements, aligned, findings)
-    return one_per_stop(findings) if whole else findings
+    if whole:
+        findings = (*one_per_stop(findings), *_other_sides(requirements, findings))
+    return findings
+
+
+# Rules that judge where the aircraft is, and so depend on the side that a reversal is turned to.
+_RULES_OF_PLACE = ("clearance", "threat", "fence")
+
+
+def _other_sides(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
+    """Return what stays open because a reversal of the course can be turned to either side and one side fails.
+
+    A flight shows one side.  The navigation error of the day decides which: of 12 ArduPlane flights through a turn of
+    180 degrees, 4 turned left.
+    """
+    setup = requirements.setup
+    corners = reversals(setup.route)
+    if setup.source is not None or not corners.size:
+        return []
+    sides = [
+        {
+            (item.rule, item.place): item
+            for name in _RULES_OF_PLACE
+            if (judge := RULES[name].judge) is not None
+            for item in judge(side, None, geometric=True)
+            if item.ok is False
+        }
+        for side in (route_requirements(setup), route_requirements(setup.turned_to_other_side()))
+    ]
+    failed = {(item.rule, item.place) for item in findings if item.ok is False}
+    where = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)
+    out = []
+    for key in (sides[0].keys() ^ sides[1].keys()) - failed:
+        item = sides[0].get(key) or sides[1][key]
+        brief = f"a reversal of the course at {where} may turn to either side, and one side fails"
+        fault = message(brief, f": {item.reason}")
+        out.append(make_finding(item.rule, item.place, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN))
+    return sorted(out, key=lambda item: (item.rule, str(item.place)))
 
 
 def one_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:

@@ -44,6 +44,7 @@ def moved_route(route: Route, before: Mission, now: Mission, scenario: Scenario,
         return None
     rows = {seq: row for row, seq in enumerate(route.items.tolist())}
     waypoints = {one.seq for one in now.items if one.command == Command.NAV_WAYPOINT}
+    rules = frame.autopilot.route_rules
     points, acceptance, changed = np.array(route.waypoints), np.array(route.acceptance), set[int]()
     for old, new in pairs:
         row, was, place = rows[new.seq], _placed(old, before, scenario), _placed(new, now, scenario)
@@ -52,12 +53,11 @@ def moved_route(route: Route, before: Mission, now: Mission, scenario: Scenario,
             return None
         if any(int(route.items[k]) not in waypoints or route.arcs[k] for k in beside):
             return None
-        points[row], acceptance[row] = place, max(0.0, new.params[1])
+        points[row], acceptance[row] = place, min(max(0.0, new.params[1]), rules.acceptance_limit)
         changed |= {row, *beside}
     if any(_is_near(one, k) for one in (points, route.waypoints) for k in changed if k):
         return None
-    turn_distance = frame.autopilot.route_rules.turn_distance
-    over = fly_over_waypoints(points, route.airspeed, acceptance, frame.limits, turn_distance)
+    over = fly_over_waypoints(points, route.airspeed, acceptance, frame.limits, rules.turn_distance)
     fly_over = np.where(route.arcs > 0.0, False, scenario.flight.fly_over | over)
     return replace(route, waypoints=points, acceptance=acceptance, fly_over=fly_over)
 

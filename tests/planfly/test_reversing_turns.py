@@ -3,6 +3,7 @@
 A fly-by arc that turns by 174 degrees begins 2 km before its waypoint; ArduPlane and PX4 fly on to the waypoint.
 """
 
+import json
 import math
 from pathlib import Path
 
@@ -86,3 +87,38 @@ def test_ground_steeper_than_the_aircraft_climbs_is_not_flyable_on_a_leg_above_g
     places = (0.0, 0.0, 60.0), (0.0, 1000.0, 60.0), (0.0, 6500.0, 60.0)
     terrain = write_hill(tmp_path, 4000.0, 900.0, slope=0.9)
     assert main(["check", write_mission(tmp_path, *places, frame=10), "--terrain", terrain]) == 4
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_zone_on_one_side_of_a_reversal_is_never_flyable(side: float, law: str, tmp_path: Path) -> None:
+    """The turn of 180 degrees needs 230 m or more to one side, and navigation errors decide which."""
+    mission = write_mission(tmp_path, (0.0, 0.0, 200.0), (0.0, 2500.0, 200.0), (0.0, 0.0, 200.0))
+    corners = ((100.0, 2200.0), (700.0, 2200.0), (700.0, 3200.0), (100.0, 3200.0), (100.0, 2200.0))
+    ring = [[HOME[1] + side * east / EAST, HOME[0] + north / NORTH] for east, north in corners]
+    zone = {
+        "type": "FeatureCollection",
+        "features": [
+            {
+                "type": "Feature",
+                "properties": {"name": "yard"},
+                "geometry": {"type": "Polygon", "coordinates": [ring]},
+            }
+        ],
+    }
+    file = tmp_path / "yard.geojson"
+    file.write_text(json.dumps(zone), encoding="utf-8")
+    given = {"terrain": write_hill(tmp_path, 7000.0, 1.0), "fence": [str(file)], "autopilot_law": law}
+    for geometry in (False, True):
+        assert not planfly.check(mission, **given, geometry=geometry).flyable
+
+
+@pytest.mark.parametrize(("law", "reads"), [("ardupilot", 255.0), ("px4", 300.0)])
+def test_arduplane_reads_an_acceptance_radius_as_a_byte(law: str, reads: float, tmp_path: Path) -> None:
+    """`AP_Mission` stores the radius of a waypoint in eight bits."""
+    mission = write_mission(tmp_path, (0.0, 0.0, 200.0), (0.0, 2500.0, 200.0), (2500.0, 2500.0, 200.0))
+    text = Path(mission).read_text(encoding="utf-8").replace("16 0 0 0 0", "16 0 300 0 0")
+    Path(mission).write_text(text, encoding="utf-8")
+    verdict = planfly.check(mission, terrain=write_hill(tmp_path, 7000.0, 1.0), autopilot_law=law)
+    passed = [item.limit for item in verdict.findings if item.rule == "waypoint" and item.place.item == 2]
+    assert passed == [reads]

@@ -14,7 +14,7 @@ from flight.autopilots.arduplane.ground_law import ARDUPLANE_GROUND, CONTACTS, I
 from flight.autopilots.arduplane.landing import go_around_height, landing_airspeed, landing_glide
 from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_tick
-from flight.autopilots.arduplane.navigator import REACHED_HEIGHT, turn_distance
+from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE, REACHED_HEIGHT, turn_distance
 from flight.autopilots.arduplane.parameters import (
     HEIGHT_CANDIDATES,
     RELEASE,
@@ -68,6 +68,7 @@ class ArduPlane(Autopilot):
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE
     cruise_parameter: ClassVar = "AIRSPEED_CRUISE"
     equivalent_airspeeds: ClassVar = True
+    acceptance_limit: ClassVar = MAX_ACCEPTANCE
     refuses_as_arduplane: ClassVar = True
     flies_ground: ClassVar[bool] = True
     height_candidates: ClassVar = HEIGHT_CANDIDATES

@@ -56,7 +56,7 @@ def imported_lines(
         return (own.headline,)
     lines = [own.headline, *condition_lines(conditions)]
     lines.append(f"{autopilot_line(conditions, flown=True)} ({source.format} {source.file}{_when(source)})")
-    lines += [*_judged_lines(source, flown), *_unjudged_lines(findings)]
+    lines += [*_judged_lines(source, flown, setup.route.leg_numbers.tolist()), *_unjudged_lines(findings)]
     lines += [line] if (line := corridor_line(setup)) else []
     if source.mission:
         lines.append(f"Mission: {source.mission}")
@@ -73,8 +73,11 @@ def imported_lines(
     return tuple(lines)
 
 
-def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs]) -> list[str]:
-    """What is judged: each stretch, with its time and its legs."""
+def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs], numbers: Sequence[int]) -> list[str]:
+    """Return a line for each stretch that is judged, with its time and the numbers of its legs.
+
+    numbers: of each leg of the route, as `flight.mission.route.Route.leg_numbers`.
+    """
     if not source.stretches:
         return ["Judged: nothing, for no stretch followed the mission"]
     by_start = {legs.stretch.start: legs for legs in flown}
@@ -86,9 +89,10 @@ def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs]) -> list[str]:
         if legs is None:
             lines.append(f"Judged: nothing of {times}: it passed no two waypoints in order")
             continue
-        part = f", leg {legs.last - 1} in part" if legs.partial else ""
+        first, last = numbers[legs.first], numbers[legs.last - 1]
+        part = f", leg {last} in part" if legs.partial else ""
         begins = float(legs.aligned.track.time[0])
-        lines.append(f"Judged: {times}, legs {legs.first} to {legs.last - 1}{part}, from {begins:.1f} s on")
+        lines.append(f"Judged: {times}, legs {first} to {last}{part}, from {begins:.1f} s on")
     return lines
 
 

@@ -161,13 +161,17 @@ def _past_arrivals(
 ) -> RouteProgress:
     """Add the waypoints that a track ends at to those that it set out for.
 
-    Who is within reach of a waypoint is on the way to the next one.
+    A flight within reach of a waypoint is on the way to the next one, from where it came within reach.
     """
-    points, end, target = requirements.points, track.position[-1], progress.target
+    points, last, target = requirements.points, len(track) - 1, progress.target
     first, until = progress.first.copy(), progress.last.copy()
-    while target + 1 < len(points) and math.dist(end[:2], points[target, :2]) <= arrived[target]:
+    while target + 1 < len(points):
+        beyond = np.flatnonzero(np.hypot(*(track.position[:, :2] - points[target, :2]).T) > arrived[target])
+        entry = int(beyond[-1]) + 1 if beyond.size else 0
+        if entry > last:
+            break
         target += 1
-        first[target], until[target] = first[target - 1], len(track) - 1
+        first[target], until[target] = max(int(first[target - 1]), entry), last
     return replace(progress, first=first, last=until, target=target)
 
 

@@ -1,6 +1,6 @@
 """The completion rule: planned feasibly, flown to the last waypoint, recorded in full and without contradiction."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -91,8 +91,10 @@ _RETURN = "RTL"
 
 def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_complete: bool) -> Finding:
     """How much of the mission the log shows; a log that ends on the way says nothing of what came after."""
-    legs, faults, unknown, known = setup.route.legs, [], [], []
+    last_leg, faults, unknown, known = setup.route.legs - 1, [], [], []
     done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
+    every = len(set(setup.route.leg_numbers.tolist()))
+    finished = every - len(_numbers(setup, set(range(setup.route.legs)) - done))
     missing = None if setup.source is None else setup.source.missing
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
@@ -104,19 +106,21 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
             unknown.append(f"none of the legs that the log holds was flown: {_lacking(missing)}")
         else:
             faults.append(message(why))
-    elif legs - 1 in done and missing is not None and missing.beyond:
+    elif last_leg in done and missing is not None and missing.beyond:
         unknown.append(
-            f"{len(done)} of {legs} legs flown that the log holds, the last of them to its end: {_lacking(missing)}"
+            f"{finished} of {every} legs flown that the log holds, the last of them to its end: {_lacking(missing)}"
         )
-    elif legs - 1 in done:
-        counted = f"{len(done)} of {legs} legs flown, the last of them to its end"
+    elif last_leg in done:
+        counted = f"{finished} of {every} legs flown, the last of them to its end"
         absent, doubts = _not_flown(setup, flown, done)
-        faults += [message(f"{_legs_text(absent)} not flown along the mission", f": {counted}")] if absent else []
+        faults += (
+            [message(f"{_legs_text(setup, absent)} not flown along the mission", f": {counted}")] if absent else []
+        )
         unknown += [f"{'; '.join(doubts)}: {counted}"] if doubts else []
         known += [] if absent or doubts else [counted]
     else:
         last = flown[-1]
-        what = f"{len(done)} of {legs} legs flown"
+        what = f"{finished} of {every} legs flown"
         if _returns(setup, last):
             known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
         elif last.stretch.ended == "log":
@@ -126,25 +130,19 @@ def imported_completion(setup: FlightSetup, flown: Sequence[FlownLegs], log_comp
                 message(f"{stretch_end_text(last.stretch)}, on the way to {_named(setup, last)}", f": {what}")
             )
     unknown += [f"the way to item {stop.item} is not judged: it is not laid out" for stop in setup.route.unjoined]
-    gaps = [gap for one in flown for gap in gaps_between(one, one.stretch.start, one.stretch.end)]
-    if gaps:
-        longest = max(gaps, key=lambda gap: gap.end - gap.start)
-        seconds = sum(gap.end - gap.start for gap in gaps)
-        known.append(
-            f"{len(gaps)} gaps of {seconds:.1f} s in all, the longest from {longest.start:.1f} s to {longest.end:.1f} s"
-        )
+    known += _gaps_text(flown)
     return make_finding(
         "completion",
         FLIGHT,
         ok=False if faults else None if unknown else True,
         reason=reason_of(faults, [*unknown, *known]),
         faults=faults,
-        planned=legs,
-        flown=len(done),
-        limit=legs,
+        planned=every,
+        flown=finished,
+        limit=every,
         source="route",
         tolerance=0.0,
-        margin=len(done) - legs,
+        margin=finished - every,
         unit="legs",
         method="waypoints passed in order, in the stretches that followed the mission",
     )
@@ -156,17 +154,36 @@ def _not_flown(setup: FlightSetup, flown: Sequence[FlownLegs], done: set[int]) -
     unseen = setup.source is not None and setup.source.begins_in_flight
     before = [leg for leg in absent if unseen and leg < flown[0].first]
     begun = [leg for leg in absent if leg not in before and any(one.partial and one.last - 1 == leg for one in flown)]
-    doubts = [f"the log begins in flight, and {_legs_text(before)} not in it"] if before else []
-    doubts += [f"{_legs_text(begun)} flown along the mission in part"] if begun else []
+    doubts = [f"the log begins in flight, and {_legs_text(setup, before)} not in it"] if before else []
+    doubts += [f"{_legs_text(setup, begun)} flown along the mission in part"] if begun else []
     return [leg for leg in absent if leg not in before and leg not in begun], doubts
 
 
-def _legs_text(legs: Sequence[int]) -> str:
-    """Legs in words: "leg 3 is", "legs 3 to 10 are", "8 legs from 1 to 12 are"."""
-    first, last = legs[0], legs[-1]
+def _gaps_text(flown: Sequence[FlownLegs]) -> list[str]:
+    """Return a line on the gaps between the rows of the judged stretches, if there are any."""
+    gaps = [gap for one in flown for gap in gaps_between(one, one.stretch.start, one.stretch.end)]
+    if not gaps:
+        return []
+    longest = max(gaps, key=lambda gap: gap.end - gap.start)
+    seconds = sum(gap.end - gap.start for gap in gaps)
+    return [
+        f"{len(gaps)} gaps of {seconds:.1f} s in all, the longest from {longest.start:.1f} s to {longest.end:.1f} s"
+    ]
+
+
+def _numbers(setup: FlightSetup, legs: Iterable[int]) -> list[int]:
+    """Return the numbers of some legs, each once: all legs around a loiter have one number."""
+    return sorted({int(setup.route.leg_numbers[leg]) for leg in legs})
+
+
+def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
+    """Return the numbers of legs in words: "leg 3 is", "legs 3 to 10 are", "8 legs from 1 to 12 are"."""
+    numbers = _numbers(setup, legs)
+    first, last = numbers[0], numbers[-1]
     if first == last:
         return f"leg {first} is"
-    several = f"legs {first} to {last}" if last - first + 1 == len(legs) else f"{len(legs)} legs from {first} to {last}"
+    unbroken = last - first + 1 == len(numbers)
+    several = f"legs {first} to {last}" if unbroken else f"{len(numbers)} legs from {first} to {last}"
     return f"{several} are"
 
 

@@ -97,3 +97,16 @@ def test_a_flight_that_ends_within_reach_of_a_waypoint_is_on_the_next_leg() -> N
     assert aligned.passed.tolist() == [True, True, False, False]
     assert aligned.leg_at(len(aligned.track) - 1) == 1
     assert aligned.track.position[aligned.rows[1], 1] == pytest.approx(2800.0, abs=3.0)
+
+
+def test_a_flight_that_ends_within_reach_of_a_turning_point_did_not_fly_back() -> None:
+    """The flight ends 50 m before the turning point of a way there and back; ArduPlane's WP_RADIUS is 90 m."""
+    there_and_back = [[0, 0, 300], [0, 3000, 300], [0, 0, 300], [1500, 0, 300]]
+    setup = make_setup(there_and_back)
+    turns_at_waypoint = np.array([False, True, False, False])
+    setup = replace(setup, route=replace(setup.route, acceptance=np.full(4, 90.0), fly_over=turns_at_waypoint))
+    flown = fly_path(make_setup([[0, 0, 300], [0, 4000, 300]]), rate=10.0)
+    aligned = align_track(route_requirements(setup), flown.rows(0, int(np.argmax(flown.position[:, 1] > 2950.0))))
+    assert aligned is not None
+    assert aligned.passed.tolist() == [True, True, False, False]
+    assert aligned.leg_at(len(aligned.track) - 1) == 1
