@@ -8,6 +8,7 @@ stays sharp, as do U-turns.
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,6 +176,8 @@ class FlyByPath:
         self.nodes.setflags(write=False)
 
 
+# Sides of the turn behind a waypoint that is flown over.
+Swing = Literal["none", "short", "long"]
 # Turns within this angle of 180 degrees may go to either side, rad: a navigation error of 5 m over ArduPlane's L1
 # distance of 60 m at 25 m/s.
 REVERSAL_SIDE_TOLERANCE_RAD = math.radians(5.0)
@@ -183,15 +186,13 @@ REVERSAL_SIDE_TOLERANCE_RAD = math.radians(5.0)
 GROUND_STEP_M = 100.0
 
 
-def fly_by_path(
-    route: Route, limits: Limits, terrain: Terrain | None = None, *, swings: bool = True, other_side: bool = False
-) -> FlyByPath:
+def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, swing: Swing = "short") -> FlyByPath:
     """Join the legs of a route.  The route has at least one leg; only the first may have no length.
 
     An arc leads by each waypoint; behind one that is flown over, arcs lead back to the next leg.
     terrain: what legs follow that are flown above ground; None flies them straight.
-    swings: False leaves such corners sharp, as the reference of an autopilot that turns by a law of its own.
-    other_side: True turns at `reversals` to the side of the longer turn.
+    swing: "none" leaves such corners sharp, as the reference of an autopilot that turns by a law of its own; "long"
+        turns at `reversals` to the side of the longer turn.
 
     A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
 
@@ -207,9 +208,9 @@ def fly_by_path(
     ([883.0, 183.0, 883.0], 117)
     """
     points = route.waypoints
-    courses, runs, turns = leg_courses(points), leg_runs(points), _turns(route, other_side)
+    courses, runs, turns = leg_courses(points), leg_runs(points), _turns(route, swing)
     tangents, radii, back = _arcs(route, limits, courses, runs, turns)
-    back *= swings
+    back *= swing != "none"
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
     # A circle that the flight begins on may end where it begins.
@@ -259,10 +260,10 @@ def reversals(route: Route) -> NDArray[np.int64]:
     return np.flatnonzero(route.fly_over & (turns > math.pi - REVERSAL_SIDE_TOLERANCE_RAD))
 
 
-def _turns(route: Route, other_side: bool) -> Floats:
+def _turns(route: Route, swing: Swing) -> Floats:
     """Return the turn at each inner waypoint, (w - 2,) rad, positive to the right; as of `fly_by_path`."""
     turns = signed_turns(route.waypoints)
-    if other_side:
+    if swing == "long":
         corners = reversals(route) - 1
         turns[corners] -= np.copysign(2.0 * math.pi, turns[corners])
     return turns

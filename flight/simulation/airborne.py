@@ -82,7 +82,7 @@ class Airborne(ABC):
         follows = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
         follows = follows or not setup.route.fly_over.any()
         self.path = (
-            setup.path if follows else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, swings=False)
+            setup.path if follows else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, swing="none")
         )
         waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
         waypoints["ends"] &= setup.autopilot.loiter_rules.ends_in_circle

@@ -297,7 +297,7 @@ class FlightSetup:
     def turned_to_other_side(self) -> "FlightSetup":
         """Set the same flight with its reversals turned to the side of the longer turn; all else stays as it is."""
         turned = copy.copy(self)
-        path = fly_by_path(self.route, self.limits, self.scenario.terrain, other_side=True)
+        path = fly_by_path(self.route, self.limits, self.scenario.terrain, swing="long")
         object.__setattr__(turned, "path", path)
         return turned
 

@@ -206,7 +206,7 @@ def test_collinear_u_turn_and_fly_over(make_setup: MakeSetup) -> None:
     assert (path.pieces[4].east, path.pieces[4].north) == pytest.approx((RADIUS * (1.0 + math.sqrt(3.0)), 1000.0))
     _whole(path, over)
     # As the reference of an autopilot that turns by a law of its own, the corner stays sharp.
-    sharp = fly_by_path(over.route, over.limits, swings=False)
+    sharp = fly_by_path(over.route, over.limits, swing="none")
     assert sharp.pieces["length"][0] == 1000.0
     _whole(sharp, over, corners=1)
 
