@@ -17,8 +17,8 @@ import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
+from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, load_airframe
 from planfly.api.planning import flight_entries
 from planfly.arguments import CHOICES

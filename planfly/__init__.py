@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from flight.simulation.track import Track as Track
     from logs.recording.reader import FlightLog as FlightLog
     from logs.recording.reader import read_log as read_log
-    from logs.verdict.findings import Verdict as Verdict
+    from logs.verdict.verdict import Verdict as Verdict
     from logs.views.replay.instruments import Instruments as Instruments
     from logs.views.replay.timeline import TimelineEntry as TimelineEntry
     from logs.views.report.compare import Comparison as Comparison
@@ -141,7 +141,7 @@ _HOMES = {
         "logs.views.replay.instruments": ("Instruments",),
         "logs.views.replay.timeline": ("TimelineEntry",),
         "logs.views.report.compare": ("Comparison",),
-        "logs.verdict.findings": ("Verdict",),
+        "logs.verdict.verdict": ("Verdict",),
         "planfly.api.aircraft": (
             "AircraftNumbers",
             "aircraft",

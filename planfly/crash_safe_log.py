@@ -10,9 +10,9 @@ from types import TracebackType
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Rows
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import Verdict
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.returns.drawn_returns import DrawnReturns
+from logs.verdict.verdict import Verdict
 from world.files import hold
 from world.geometry import leg_runs
 from world.interruption import uninterrupted

@@ -26,11 +26,11 @@ from logs.importers.clean_places import LONGEST_STEP
 from logs.importers.imported_flight import LoggedFlight, make_flight, mean_wind, track_of_flight, with_flown_heights
 from logs.importers.open_log import open_log
 from logs.recording.reader import LogEvent
-from logs.verdict.findings import Verdict
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, plan_mismatch
 from logs.verdict.imported.judge_imported_flight import missing_text
 from logs.verdict.imported.model_comparison import Reflight, compare_with_model
 from logs.verdict.judge_flight import judge_flight
+from logs.verdict.verdict import Verdict
 from planfly.airframe import find_airframe
 from planfly.make_plan import Advance
 from planfly.open_mission import NamedFences, ScenarioChange, open_plan

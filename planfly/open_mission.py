@@ -12,9 +12,9 @@ from flight.mission.placing import place_stops
 from flight.mission_files.formats import read_fence, read_mission
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import FlightLog
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.rules.fence_rule import zone_test
+from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.file_autopilots import with_file_autopilot
 from planfly.make_plan import make_setup

@@ -16,11 +16,11 @@ from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.rules.energy_rule import needed_energy
+from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.crash_safe_log import CrashSafeLog, FlightLimits
 from planfly.make_plan import Advance, make_plan, make_setup, planned_for

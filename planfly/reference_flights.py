@@ -12,11 +12,12 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Progress, simulate
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import RouteRequirements, true_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
 from logs.verdict.summary import first_failed
+from logs.verdict.verdict import Verdict
 from world.errors import StartError
 
 # ----------------------------------------------------------------------

@@ -8,9 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.places import Change
 from logs.verdict.tolerances import ROUNDING
+from logs.verdict.verdict import Verdict
 from logs.verdict.wording import threat_text
 from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN
 from world.scenario import Scenario, from_spec

@@ -43,10 +43,11 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight
 from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
-from logs.verdict.rules.registry import rule_word
+from logs.verdict.rule_words import rule_word
+from logs.verdict.verdict import Verdict
 from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.file_autopilots import with_file_autopilot

@@ -12,9 +12,9 @@ from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Verdict
 from logs.verdict.measures.route_requirements import surveys_of
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, load_airframe
 from planfly.make_plan import make_setup
 from planfly.pipeline import fly_and_judge
@@ -185,7 +185,7 @@ class _Trials:
     def _passes(self, verdict: Verdict) -> bool:
         """Whether all lines of a flight can be used, and nothing else fails that did not, or noticeably worse."""
         return _whole(verdict) and all(
-            rule in self._worst and worst >= self._worst[rule] - (RULES[rule].scale or math.inf)
+            rule in self._worst and worst >= self._worst[rule] - (RULE_WORDS[rule].scale or math.inf)
             for rule, worst in _worst_margins(verdict).items()
         )
 

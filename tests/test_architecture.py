@@ -6,7 +6,7 @@ import string
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -105,6 +105,61 @@ def test_nothing_that_is_installed_imports_tests_or_benchmarks() -> None:
         or (isinstance(node, ast.Import) and apart & {alias.name.partition(".")[0] for alias in node.names})
     ]
     assert found == []
+
+
+def imports_of_ours() -> dict[str, set[str]]:
+    """Modules of ours that each module of ours imports: at its top, within functions, and for types alone."""
+    names = {name_of(file).removesuffix(".py").replace("/", ".").removesuffix(".__init__"): file for file in OURS}
+    graph: dict[str, set[str]] = {}
+    for name, file in names.items():
+        found: set[str] = set()
+        for node in nodes_of(file):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                found |= {f"{node.module}.{alias.name}" for alias in node.names} & names.keys()
+                # `from package import name` imports the package itself, unless every name is a module of it.
+                found |= {node.module} if any(f"{node.module}.{a.name}" not in names for a in node.names) else set()
+            elif isinstance(node, ast.Import):
+                found |= {alias.name for alias in node.names}
+        graph[name] = found & names.keys() - {name}
+    return graph
+
+
+def cycles_of(graph: Mapping[str, set[str]]) -> list[set[str]]:
+    """Find the groups of modules that import one another, by leaving out again and again what is in none."""
+    left = {name: set(found) for name, found in graph.items()}
+    while True:
+        imported = set().union(*left.values()) if left else set()
+        apart = {name for name, found in left.items() if not found or name not in imported}
+        if not apart:
+            break
+        left = {name: found - apart for name, found in left.items() if name not in apart}
+
+    def reached(start: str) -> set[str]:
+        seen, todo = set(), [start]
+        while todo:
+            new = left[todo.pop()] - seen
+            seen |= new
+            todo += new
+        return seen
+
+    reach = {name: reached(name) for name in left}
+    groups = {frozenset(other for other in reach[name] if name in reach[other]) for name in left if name in reach[name]}
+    return sorted(map(set, groups), key=sorted)
+
+
+def test_cycles_are_found_however_long_and_what_hangs_on_them_is_not() -> None:
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "leaf"}, "leaf": set(), "d": {"e", "a"}, "e": {"d"}, "top": {"d"}}
+    assert cycles_of(graph) == [{"a", "b", "c"}, {"d", "e"}]
+    assert cycles_of({"a": {"b"}, "b": {"c"}, "c": set()}) == []
+
+
+# The cycle that goes with the worker pool of dask.
+BEING_CUT = ({"planfly.campaigns.campaign_worker", "planfly.campaigns.worker_pool"},)
+
+
+def test_no_modules_import_one_another() -> None:
+    """Deferred imports and imports for types alone count: a cycle is read as one piece, whenever it is imported."""
+    assert [cycle for cycle in cycles_of(imports_of_ours()) if cycle not in BEING_CUT] == []
 
 
 def test_help_answers_in_half_a_second() -> None:

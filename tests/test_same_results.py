@@ -9,7 +9,7 @@ import pytest
 import planfly
 from flight.mission_files.formats import mission_text
 from logs.recording.reader import read_log
-from logs.verdict.findings import verdict_json
+from logs.verdict.verdict import verdict_json
 from planfly.cli import main
 from planner.plan import plan_json
 from tests.authorities.make_digests import FILE, PAPER_FILES, RUNS, digest, track_digests, verdict_digest

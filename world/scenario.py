@@ -21,7 +21,8 @@ from world.errors import ScenarioError, TerrainError
 from world.files import did_you_mean, whole_path
 from world.frames import GeoOrigin, to_geo
 from world.map_positions import check_inside, make_threats, map_position
-from world.raster import RasterFile, open_tiles, read_terrain, tile_bounds
+from world.raster import open_tiles, read_terrain, tile_bounds
+from world.raster_file import RasterFile
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
 from world.scenario_tables import (
     MAX_ZONES,

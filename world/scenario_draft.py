@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
-from world.raster import RasterFile, cover_text, is_covered, read_terrain, tile_bounds
+from world.raster import cover_text, is_covered, read_terrain, tile_bounds
+from world.raster_file import RasterFile
 
 Floats = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import SimulatedFlight, simulate
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
+from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, load_airframe
 from planfly.make_plan import make_setup
 from tests.field_missions import FieldMission, close_mission, ordinary_mission

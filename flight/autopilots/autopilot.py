@@ -27,6 +27,7 @@ from flight.mission.loiter_circles import USUAL_LOITERS, LoiterRules
 from flight.mission.return_path import USUAL_RULES, ReturnRules
 from flight.mission.route import RouteRules
 from world.errors import ScenarioError
+from world.json_schema import DocumentConfig
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Guidance, Navigation
 from world.terrain import Heights
@@ -176,21 +177,19 @@ class Candidate(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class AutopilotProgram:
-    """Which program steered a flight.
-
-    version: what it calls itself.
-    sha256: of its file, hex.
-    parameters: by name, what it was given over its own defaults, as it had them.
-    changed: those of them that a person's file stated otherwise than the aircraft's.
-    unused: names in the person's file that it does not know, or that belong to other hardware.
-    """
+class AutopilotProgram(DocumentConfig):
+    """The SITL program that flew."""
 
     version: str
+    """The version that the program states."""
     sha256: str
+    """Of its file."""
     parameters: Mapping[str, float]
+    """Values that the program was given over its own defaults, as it had them."""
     changed: Mapping[str, float]
+    """Those of the parameters for which a person's file states another value than the aircraft's."""
     unused: tuple[str, ...] = ()
+    """Names in the person's file that the program does not know, or that belong to other hardware."""
 
 
 class StoredParameters(NamedTuple):

@@ -51,11 +51,11 @@ from logs.recording.state_channel import (
     state_schema,
     times_ns,
 )
-from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.places import ReferenceFlights
 from logs.verdict.reference_flights import reference_flights_json
 from logs.verdict.returns.drawn_returns import DrawnReturns
+from logs.verdict.verdict import Verdict, verdict_json
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"

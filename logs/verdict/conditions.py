@@ -14,6 +14,7 @@ from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import airspace_of, surveys_of
 from world.errors import FlightError
+from world.json_schema import DocumentConfig
 from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, Navigation
 from world.wind import Turbulence
@@ -33,37 +34,35 @@ _WHOSE_AIRSPEED: dict[AirspeedSource, str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Conditions:
-    """What a verdict is for; of an imported flight as far as its log tells.
-
-    aircraft: its name, or its folder; "" for an imported flight whose aircraft nobody named.
-    mass_kg: None where the aircraft is not on this machine.
-    aircraft_named: whether anybody named it; if not, it is the default.
-    airspeed_mps: until the mission sets another.  airspeed_kind: equivalent is less than true at height.
-    airspeed_source: who states it: "scenario" (or an option), "parameters" (of the autopilot), "aircraft" (its cruise);
-    "flight" of an imported one by what it flew.
-    wind_mps, wind_from_deg: the mean wind, and where it comes from; None where the answer is about the wind.
-    turbulence, navigation: None where it was not simulated.
-    autopilot: who steers, with the settings that decide most.  autopilot_version: "" for planfly's own guidance.
-    terrain: its file or name, None for none.  height_datum: what the terrain's heights count from.
-    zones: of airspace that it is judged by: the scenario's and the mission's fence's.
-    """
+class Conditions(DocumentConfig):
+    """What a verdict or a plan is for; of an imported flight as far as its log tells."""
 
     aircraft: str
+    """Its name or folder; empty for an imported flight whose aircraft nobody named."""
     mass_kg: float | None
     aircraft_named: bool
+    """Whether anybody named it; if not, it is the default."""
     airspeed_mps: float
+    """Until the mission sets another."""
     airspeed_kind: Literal["true", "equivalent"]
+    """true or equivalent."""
     airspeed_source: AirspeedSource
+    """scenario (or an option), parameters, aircraft (its cruise speed) or flight (as it was flown)."""
     wind_mps: float | None
     wind_from_deg: float | None
+    """Both null where the wind is what is asked for."""
     turbulence: Turbulence | None
+    """null where it was not simulated, as navigation."""
     navigation: Navigation | None
+    """perfect, rtk or gnss."""
     autopilot: str
+    """With the settings that decide most."""
     autopilot_version: str
+    """Empty for planfly's own guidance, and where a log's program states it."""
     terrain: str | None
     height_datum: str | None
     zones: int = 0
+    """Of airspace that it is judged by: the scenario's and the mission's fence's."""
 
 
 def conditions_of(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.conditions import setup_conditions
-from logs.verdict.findings import Finding, Verdict, left_open
+from logs.verdict.findings import Finding, left_open
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
     deciding_items,
@@ -25,6 +25,7 @@ from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.places import Disagreement, LevelAnswer, Place, ReferenceFlights
 from logs.verdict.summary import headline, summary_lines, undecided_text
+from logs.verdict.verdict import Verdict
 
 __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 

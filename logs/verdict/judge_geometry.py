@@ -11,7 +11,6 @@ from logs.verdict.findings import (
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
     Finding,
-    Verdict,
     badness,
     left_open,
     make_finding,
@@ -24,6 +23,7 @@ from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
 from logs.verdict.rule import Judge, Rule
 from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, summary_lines, undecided_text
+from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text
 from planner.plan import Plan, Violation
 

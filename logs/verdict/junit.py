@@ -1,23 +1,21 @@
-"""A verdict as JUnit XML, as continuous integration shows test results: a case for each finding, one for the answer."""
+"""A verdict as JUnit XML, which continuous integration shows: a case for each finding, one for the answer."""
 
 from collections import Counter
 from collections.abc import Mapping
 from xml.etree import ElementTree
 
-from logs.verdict.findings import Finding, Verdict
-from logs.verdict.rules.registry import rule_word
-from logs.verdict.wording import place_text, suggestions_text
+from logs.verdict.findings import Finding
+from logs.verdict.presentation import Presentation
+from logs.verdict.rule_words import rule_word
 
 
-def junit_text(verdicts: Mapping[str, Verdict]) -> str:
-    """The text of the file, a test suite for each verdict.  verdicts: by the name of what was judged.
+def junit_text(verdicts: Mapping[str, Presentation]) -> str:
+    """Write the text of the file, a test suite for each verdict.  verdicts: by the name of what was judged.
 
     A finding that fails is a failure, and one that was not judged is skipped.  The case ``verdict`` fails where the
     answer is not "flyable", also where nothing failed but a part was not judged.
 
-    >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown")
-    >>> "<testcase" in junit_text({"m.waypoints": verdict}), "<failure" in junit_text({"m.waypoints": verdict})
-    (True, False)
+    `logs.verdict.verdict.Verdict.to_junit` writes one verdict.
     """
     root = ElementTree.Element("testsuites")
     for name, verdict in verdicts.items():
@@ -28,14 +26,16 @@ def junit_text(verdicts: Mapping[str, Verdict]) -> str:
             errors="0", skipped=str(counts["skipped"]),
         )  # fmt: skip
         suite.extend(cases)
-        ElementTree.SubElement(suite, "system-out").text = _plain(verdict.summary, keep="\n")
+        ElementTree.SubElement(suite, "system-out").text = _plain(
+            "\n".join([verdict.headline, *verdict.details]), keep="\n"
+        )
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _answer_case(verdict: Verdict) -> ElementTree.Element:
+def _answer_case(verdict: Presentation) -> ElementTree.Element:
     case = ElementTree.Element("testcase", classname="planfly", name="verdict")
-    if not verdict.flyable:
+    if verdict.state != "ok":
         ElementTree.SubElement(case, "failure", message=_plain(verdict.headline))
     return case
 
@@ -44,7 +44,7 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
     seen: Counter[tuple[str, str]] = Counter()
     cases = []
     for finding in findings:
-        place = _plain(place_text(finding.place))
+        place = _plain(finding.where)
         seen[finding.rule, place] += 1
         # Names of cases are unique.
         number = seen[finding.rule, place]
@@ -54,7 +54,7 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
             said = _plain(f"{rule_word(finding.rule)}: {finding.reason}")
             failure = ElementTree.SubElement(case, "failure", message=said)
             if finding.suggestions:
-                failure.text = _plain(f"would pass: {suggestions_text(finding.suggestions)}")
+                failure.text = _plain(f"would pass: {finding.suggestion}")
         elif finding.ok is None:
             ElementTree.SubElement(case, "skipped", message=_plain(f"not judged: {finding.reason}"))
         cases.append(case)
@@ -62,5 +62,5 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
 
 
 def _plain(text: str, keep: str = "") -> str:
-    """Text without what XML 1.0 cannot hold."""
+    """Replace each character that XML 1.0 cannot hold by a space."""
     return "".join(letter if letter.isprintable() or letter in keep else " " for letter in text)

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from world.json_schema import DocumentConfig
+
 # ----------------------------------------------------------------------
 # Where a finding lies, what of a plan could be changed, and where two levels differ, as data.
 #
@@ -26,57 +28,42 @@ Quantity = Literal[
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """Where something was judged.
+class Place(DocumentConfig):
+    """Where something was judged."""
 
-    kind: what it is.
-    index: of the leg, waypoint, threat or zone, from 0 as the route and the scenario have them, the zones of a
-    mission's fence after the scenario's; None for the whole.
-    item: number of the mission item that a waypoint comes from, or that a check names; None where there is none.
-    name: that the scenario gives the threat or the zone; "" where it gives none, and for every other kind.
-    to_item: of a leg, the mission item that it leads to, None where it leads to none; a mission that jumps has several
-    legs to one item.  It is no part of what makes two places the same: the index is enough, and older logs have none.
-    number: of a leg or a waypoint, as people count them: corners of one loiter are one stop.  None where it is the
-    index, as in older logs.  No part of what makes two places the same, either.
-
-    >>> Place("waypoint", 3, item=4)
-    Place(kind='waypoint', index=3, item=4, name='', to_item=None, number=None)
-    >>> Place("leg", 3, to_item=5) == Place("leg", 3)
-    True
-    """
+    # Which leg an item or a number names is no part of what makes two places the same: the index is enough, and older
+    # logs have neither.
 
     kind: PlaceKind
+    """flight, mission, plan, leg, waypoint, missile, radar, exclusion or inclusion."""
     index: int | None = None
+    """Of the leg, waypoint, threat or zone, from 0, a fence's zones after the scenario's; null for the whole."""
     item: int | None = None
+    """The mission item that a waypoint comes from, or that a check names."""
     name: str = ""
+    """The name that the scenario gives a threat or a zone; empty for none."""
     to_item: int | None = field(default=None, compare=False)
+    """Of a leg: the mission item that it leads to; several legs may lead to one item."""
     number: int | None = field(default=None, compare=False)
+    """Of a leg or waypoint, as the text counts them: corners of one loiter are one stop."""
 
 
 FLIGHT, MISSION, PLAN = Place("flight"), Place("mission"), Place("plan")
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
-    """One change of a plan: of what, where, from which value, to which.
-
-    what: the quantity.
-    place: where it is to change.
-    current: its value now; None where `wanted` is a step or a factor, or the value now does not matter.
-    wanted: the value that passes, the step (higher, further, shorter, positive), or the factor.
-    unit: of both.
-    most: where a range passes, its upper end; `wanted` is then the lower one.
-
-    >>> Change("length", Place("leg", 1), 300.0, 400.0, "m").wanted
-    400.0
-    """
+class Change(DocumentConfig):
+    """One change of the plan."""
 
     what: Quantity
     place: Place
     current: float | None
+    """The value now; null where wanted is a step or a factor, or the value now does not matter."""
     wanted: float
+    """The value that passes, the step (higher, further, shorter: positive), or the factor."""
     unit: str
     most: float | None = None
+    """The upper end of a range that passes, of which wanted is the lower end."""
 
 
 # Changes to make together; a finding holds alternatives of these, any of which would pass.
@@ -84,18 +71,17 @@ Suggestion = tuple[Change, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Disagreement:
-    """A rule at a place that another level and the verdict judge differently.
-
-    level: the other level, a `LevelName`.
-    there, here: whether it passes at that level, and in the verdict.
-    """
+class Disagreement(DocumentConfig):
+    """A rule at a place that another level and the verdict judge differently."""
 
     rule: str
     place: Place
     level: str
+    """The other level."""
     there: bool
+    """True if the place passes at the other level."""
     here: bool
+    """True if the place passes in the verdict."""
 
 
 # ----------------------------------------------------------------------

@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from logs.verdict.places import AirframeAnswer, DecidingParameter, Place, PlaceKind, ReferenceFlights
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
 from world.errors import LogError
 from world.scenario_file import first_fault
 
@@ -88,7 +88,7 @@ def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
         raise LogError(**first_fault(error).at(source)) from error
     airframe, deciding = file.airframe, file.deciding
     rules = [rule for rule, _ in airframe.failed] if airframe is not None else []
-    unknown = [rule for rule in (*rules, *([deciding.rule] if deciding else [])) if rule not in RULES]
+    unknown = [rule for rule in (*rules, *([deciding.rule] if deciding else [])) if rule not in RULE_WORDS]
     if unknown:
         raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source, field="rule", value=unknown[0])
     return ReferenceFlights(

@@ -6,21 +6,11 @@ from collections.abc import Sequence
 from flight.autopilots.parameter_files import LONGEST_NAME
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
-from logs.verdict.findings import (
-    BESIDE_FLIGHT,
-    NOT_FLOWN,
-    UNKNOWN_AIRCRAFT,
-    UNKNOWN_WAY,
-    Finding,
-    Verdict,
-    left_open,
-)
+from logs.verdict.findings import BESIDE_FLIGHT, NOT_FLOWN, UNKNOWN_AIRCRAFT, UNKNOWN_WAY, Finding, left_open
+from logs.verdict.measures.mission_ends import missing_ends_text
 from logs.verdict.places import DecidingParameter, LevelAnswer
-from logs.verdict.rule import Rule, beyond_limit
-from logs.verdict.rules.mission_rule import lacks_landing
-from logs.verdict.rules.registry import RULES
-from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
-from world.html_table import html_table
+from logs.verdict.rule_words import RULE_WORDS, RuleWords
+from logs.verdict.wording import deciding_text, disagreement_text, place_text
 
 # Failed findings that the first line names.
 _NAMED = 4
@@ -38,7 +28,7 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
     """
     whose = [f"an aircraft from {source}"] if source else []
     if flyable:
-        silent = [_not_judged(findings, rule) for rule in RULES.values() if rule.unjudged]
+        silent = [_not_judged(findings, rule) for rule in RULE_WORDS.values() if rule.unjudged]
         return "; ".join(["flyable", *filter(None, silent), *_by_luck(findings), *whose])
     failed = _failed(findings)
     if not failed and (open_text := undecided_text(findings)):
@@ -110,30 +100,14 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
     return _most_telling(failed)[0] if failed else None
 
 
-def failed_by_rule(findings: Sequence[Finding]) -> list[list[Finding]]:
-    """The failed findings of each rule, the worst first; rules in the order of the first line.
-
-    >>> from logs.verdict.findings import make_finding
-    >>> from logs.verdict.places import Place
-    >>> beyond = {0: 2.0, 1: 5.0}
-    >>> slopes = [make_finding("slope", Place("leg", k), ok=False, reason="", margin=-m) for k, m in beyond.items()]
-    >>> [[finding.place.index for finding in group] for group in failed_by_rule(slopes)]
-    [[1, 0]]
-    """
-    groups: dict[str, list[Finding]] = {}
-    for item in _failed(findings):
-        groups.setdefault(item.rule, []).append(item)
-    return [sorted(group, key=lambda item: item.margin or 0.0) for group in groups.values()]
-
-
 def _failed(findings: Sequence[Finding]) -> list[Finding]:
     """What failed: what ends a flight first, then what a plan may be mended by, then in the verdict's order."""
-    order = {name: k for k, name in enumerate(RULES)}
+    order = {name: k for k, name in enumerate(RULE_WORDS)}
     failed = (item for item in findings if item.ok is False)
-    return sorted(failed, key=lambda item: (-RULES[item.rule].urgency, order[item.rule]))
+    return sorted(failed, key=lambda item: (-RULE_WORDS[item.rule].urgency, order[item.rule]))
 
 
-def _not_judged(findings: Sequence[Finding], rule: Rule) -> str:
+def _not_judged(findings: Sequence[Finding], rule: RuleWords) -> str:
     """What of a rule was not judged, in words; "" for nothing."""
     mine = [item for item in findings if item.rule == rule.name]
     silent = sum(item.ok is None for item in mine)
@@ -166,8 +140,8 @@ def _most_telling(failed: list[Finding]) -> list[Finding]:
 
 def _phrase(item: Finding) -> str:
     """One failed finding in a few words."""
-    rule = RULES[item.rule]
-    return (rule.phrase(item) if rule.phrase is not None else "") or beyond_limit(rule.word, item)
+    words = RULE_WORDS[item.rule]
+    return words.phrase(words.word, item)
 
 
 def summary_lines(
@@ -190,22 +164,22 @@ def summary_lines(
     lines += _unheeded_lines(setup)
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and RULES[item.rule].explained:
+        if item.ok is None and RULE_WORDS[item.rule].explained:
             silent.setdefault(item.rule, item.reason)
-    lines += [f"Not judged: {RULES[rule].title} ({reason})" for rule, reason in silent.items()]
+    lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in silent.items()]
     # Limits of that autopilot's own, which say nothing of the aircraft.
     lines += [
         f"PX4 would not take it: {item.reason}"
         for item in findings
         if item.rule == "mission" and item.ok is None and item.check != NOT_FLOWN
     ]
-    lack = lacks_landing(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
+    lack = missing_ends_text(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
     if lack and not any(item.rule == "mission" for item in findings):
         lines.append(f"PX4 would not take it: {lack}")
     lines += [
-        f"{RULES[item.rule].title.capitalize()}: {item.reason}"
+        f"{RULE_WORDS[item.rule].title.capitalize()}: {item.reason}"
         for item in findings
-        if RULES[item.rule].warns and item.ok is None
+        if RULE_WORDS[item.rule].warns and item.ok is None
     ]
     lines += _less_error(findings, setup)
     if setup.notes:
@@ -299,33 +273,3 @@ def _agreement(other: LevelAnswer) -> str:
         return "flight and geometry agree on every finding that both have" if geometry else "both flights agree"
     more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
     return "; ".join(map(disagreement_text, differing[:_NAMED])) + more
-
-
-# ----------------------------------------------------------------------
-# The verdict as a small table for a notebook.
-
-
-def verdict_html(verdict: Verdict) -> str:
-    """The headline, a row for each rule, and one for each finding that fails, with what would pass.
-
-    >>> verdict_html(Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown"))
-    '<div><strong>flyable</strong><table>...<tbody></tbody></table></div>'
-    """
-    rows: list[tuple[str, ...]] = []
-    for rule in RULES.values():
-        mine = [finding for finding in verdict.findings if finding.rule == rule.name]
-        if mine:
-            rows.append((rule.title, _count(mine), "", ""))
-            rows += [
-                ("", place_text(one.place), one.reason, suggestions_text(one.suggestions))
-                for one in mine
-                if one.ok is False
-            ]
-    return html_table(verdict.headline, rows, ("rule", "result", "reason", "would pass"))
-
-
-def _count(findings: list[Finding]) -> str:
-    judged = [finding for finding in findings if finding.ok is not None]
-    if not judged:
-        return "not judged"
-    return f"{sum(finding.ok is True for finding in judged)} of {len(judged)} ok"

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.places import Place, PlaceKind
-from logs.verdict.rules.registry import rule_word
+from logs.verdict.rule_words import rule_word
+from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text
 from logs.views.charts import Floats, Label
 from world.geometry import leg_runs

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Verdict
 from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.returns.glides_text import glides_headline
 from logs.verdict.returns.returns_text import headline
+from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, chart_json
 from logs.views.envelope import envelope_chart
 from logs.views.failures import failures

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.simulation.track import Track
-from logs.verdict.findings import Verdict
+from logs.verdict.verdict import Verdict
 from logs.views.charts import Floats, Json, Label, Layer, Panel, numbers, panel_json, shorten
 from logs.views.failures import Failures, fail_labels, failures, inside_threats, paths_differ, stop_rows
 from logs.views.threats_and_zones import threat_circles, threat_names, zone_names, zone_shapes

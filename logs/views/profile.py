@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flight.simulation.track import Track
-from logs.verdict.findings import Verdict
+from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, Floats, Label, Layer, Panel, outline_rows, shorten
 from logs.views.failures import (
     Failures,

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
+from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, Floats, Layer, Panel, shorten
 
 # Margin above and below what a panel shows, of its span; and a limit so many times as high is left out of it.

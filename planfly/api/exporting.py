@@ -13,7 +13,7 @@ from flight.mission_files.formats import KINDS, mission_kind, mission_text, read
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
-from logs.verdict.rules.mission_rule import lacks_landing
+from logs.verdict.measures.mission_ends import missing_ends_text
 from logs.views.exports.map_files import (
     MapLine,
     MapZone,
@@ -218,7 +218,7 @@ def _read_mission(path: Path, fences: NamedFences, at: str | None, *, placed: bo
     if not is_plan:
         return _with_zones(source, setup.scenario)
     mission, notes = fence_of_plan(setup)
-    lack = lacks_landing(mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
+    lack = missing_ends_text(mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
     return replace(source, mission=mission, notes=(*notes, *([lack] if lack else [])))
 
 

@@ -13,8 +13,8 @@ from flight.simulation.setup import FlightSetup, VerticalDatum
 from flight.simulation.track import Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.reader import FlightLog, LogEvent, read_log
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.verdict import Verdict
 from planfly import pipeline
 from planfly.api.planning import Wind, changed_scenario, opened_scenario
 from planfly.arguments import check_arguments

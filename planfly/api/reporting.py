@@ -8,8 +8,8 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.foxglove_scene import layout_text
 from logs.recording.reader import FlightLog, LogEvent, read_log
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
+from logs.verdict.verdict import Verdict
 from logs.views.report.compare import Comparison, compare_logs, write_comparison
 from planfly.api.flying import FlownMission
 from planfly.first_start import with_warm_up

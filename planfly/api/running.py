@@ -12,8 +12,8 @@ from typing import Any, Literal
 from flight.mission.from_plan import plan_mission
 from flight.mission_files.formats import mission_kind, mission_text
 from logs.recording.setup_attachments import package_versions
-from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.judge_flight import judge_plan_only
+from logs.verdict.verdict import Verdict, verdict_json
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.api.exporting import judged_parameters
 from planfly.api.flying import named_program

@@ -11,11 +11,11 @@ from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements, surveys_of
 from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.verdict import Verdict
 from logs.views.surveys import survey_chart
 from planfly.api.flying import FlownMission, opened_mission, refuse
 from planfly.api.planning import Wind, changed_scenario

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from flight.mission.route import Route
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, Verdict, closest_to_limit
+from logs.verdict.findings import Finding, closest_to_limit
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, vary
 from planfly.campaigns.dispersions import Draw, draw_flight
 from planfly.pipeline import fly_and_judge
@@ -32,7 +33,7 @@ Singles = NDArray[np.float32]
 # ----------------------------------------------------------------------
 # Where a flight passed narrowly, and by how much: that tells more of the risk than that it did not fail.
 #
-# A pass is narrow where less than the scale of the rule's margin (`logs.verdict.rule.Margin`) is left to where the rule
+# A pass is narrow where less than the scale of the rule's margin is left to where the rule
 # fails, its tolerance counted; of a missile, where the flight stayed closer than `SPHERE_SCALE` outside its sphere.
 
 # Of a missile's sphere, by the distance outside it, m.
@@ -51,7 +52,7 @@ def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track)
     failed = {(item.rule, item.place) for item in findings if item.ok is False}
     for item in findings:
         at = item.rule, item.place
-        scale = RULES[item.rule].scale
+        scale = RULE_WORDS[item.rule].scale
         if at in failed or not item.ok or item.margin is None or scale is None:
             continue
         share = max(0.0, item.margin + (item.tolerance or 0.0)) / scale
@@ -219,7 +220,7 @@ class FlightRow:
 
 def scaled(rule: str, margin: LeastMargin) -> float | None:
     """A margin in the scale of its rule; None where either has no number."""
-    scale = RULES[rule].scale
+    scale = RULE_WORDS[rule].scale
     return None if margin.value is None or scale is None else margin.value / scale
 
 
@@ -277,7 +278,7 @@ def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin
     """
     by_rule: dict[str, list[Finding]] = {}
     for item in findings:
-        if item.ok is not None and RULES[item.rule].scale is not None:
+        if item.ok is not None and RULE_WORDS[item.rule].scale is not None:
             by_rule.setdefault(item.rule, []).append(item)
     closest = [closest_to_limit(mine) for mine in by_rule.values()]
     # A rule that fails by other evidence than its number has none.

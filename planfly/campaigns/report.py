@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from logs.theme import css_variables
 from logs.verdict.conditions import flown_lines
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
 from logs.views.drawing import page_svg, png_bytes
 from logs.views.report.page import page_template
@@ -60,7 +60,7 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
         answer=summary.estimate.answer,
         lines=lines,
         failures=[
-            (RULES[one.rule].title, place_text(place), number)
+            (RULE_WORDS[one.rule].title, place_text(place), number)
             for one in summary.by_rule
             for place, number in one.places
         ],
@@ -69,7 +69,8 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
             (
                 row.draw.index,
                 row.outcome,
-                "; ".join(f"{RULES[rule].title} at {place_text(place)}" for rule, place in row.failed[:4]) or row.ended,
+                "; ".join(f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failed[:4])
+                or row.ended,
                 closest_text(row),
                 log_name(row) if row.duration > 0.0 else "",
             )
@@ -117,13 +118,13 @@ def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> lis
     flyable = np.array([outcome == "flyable" for outcome in store.outcomes().values()])
     speed = np.maximum(0.0, base.scenario.wind.speed + store.column("wind_speed"))
     bins = speed_bins(speed, flyable, summary.goal.confidence)
-    counts = [(RULES[one.rule].title, place_text(place), n) for one in summary.by_rule for place, n in one.places]
+    counts = [(RULE_WORDS[one.rule].title, place_text(place), n) for one in summary.by_rule for place, n in one.places]
     out = [
         (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
     ]
     if summary.deciding:
         bars = [Bar(BY_NAME[one.quantity].title, one.index, one.slope) for one in summary.sensitivities]
-        out.append((draw_tornado(bars, RULES[summary.deciding].title), "What the deciding margin depends on"))
+        out.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the deciding margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
         out.append((failures, "In how many flights each rule failed, and where"))

@@ -10,7 +10,7 @@ import numpy as np
 
 from logs.verdict.conditions import Conditions, flown_lines
 from logs.verdict.places import Place
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import BY_NAME
@@ -105,14 +105,14 @@ def _failures(store: Store) -> tuple[RuleFailures, ...]:
         for rule, place in failed:
             places.setdefault(rule, Counter())[place] += 1
     return tuple(
-        RuleFailures(rule, flights[rule], tuple(places[rule].most_common())) for rule in RULES if flights[rule]
+        RuleFailures(rule, flights[rule], tuple(places[rule].most_common())) for rule in RULE_WORDS if flights[rule]
     )
 
 
 def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:
     lows, indices = {}, {}
-    for rule in RULES:
-        margins = store.column(RULES[rule].margin_column)
+    for rule in RULE_WORDS:
+        margins = store.column(RULE_WORDS[rule].margin_column)
         known = margins[np.isfinite(margins)]
         if known.size:
             lows[rule] = float(np.quantile(known, 0.05))
@@ -131,7 +131,7 @@ def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensiti
     """Of the rule's least margin to each quantity that varies, the strongest first."""
     if not rule:
         return ()
-    margin = store.column(RULES[rule].margin_column)
+    margin = store.column(RULE_WORDS[rule].margin_column)
     known = np.isfinite(margin)
     found = []
     for varying in base.dispersions.varying:
@@ -202,7 +202,7 @@ def closest_text(row: FlightRow) -> str:
     if not known:
         return ""
     _, rule, margin = min(known, key=lambda one: one[0])
-    return f"{RULES[rule].title} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
+    return f"{RULE_WORDS[rule].title} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
 
 
 def log_name(row: FlightRow) -> str:
@@ -222,13 +222,13 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
     ]
     for one in summary.by_rule:
         where = ", ".join(f"{place_text(place)} in {n}" for place, n in one.places[:3])
-        lines.append(f"  failed  {RULES[one.rule].title} in {one.flights}: {where}")
+        lines.append(f"  failed  {RULE_WORDS[one.rule].title} in {one.flights}: {where}")
     if summary.lost:
         named = ", ".join(map(str, summary.lost[:10]))
         lines.append(f"  lost    {len(summary.lost)} could not be flown, their workers died: {named}")
     if summary.deciding and summary.low_margin is not None:
         lines.append(
-            f"  decides {RULES[summary.deciding].title}: one flight in twenty has a margin below"
+            f"  decides {RULE_WORDS[summary.deciding].title}: one flight in twenty has a margin below"
             f" {summary.low_margin:.1f} {summary.unit}; {_drivers_text(summary)}"
         )
     return lines

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.places import Place
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
 from planfly.campaigns.dispersions import NAMES, Draw
 from planfly.campaigns.flight_row import FIELDS, FlightRow, LeastMargin, NarrowPass, Outcome, failed_of
 from planfly.campaigns.mended_table import HELD, checksum, copy_whole, examine, stored
@@ -30,7 +30,7 @@ from planfly.stages import say
 from world.errors import PlanflyError
 
 # ----------------------------------------------------------------------
-# A flight's row as values of the table's columns, and back: all follows from `FlightRow`, `RULES` and `NAMES`.
+# A flight's row as values of the table's columns, and back: all follows from `FlightRow`, `RULE_WORDS` and `NAMES`.
 
 # Columns that a second campaign of the same flights may have otherwise.
 NOT_THE_SAME = tuple(name for name, column in FIELDS.items() if not column.same)
@@ -45,7 +45,7 @@ def _row_columns() -> dict[str, str]:
         if name in FIELDS:
             columns[name] = FIELDS[name].kind
         elif name == "margins":
-            for rule in RULES.values():
+            for rule in RULE_WORDS.values():
                 columns |= {rule.margin_column: "REAL", rule.place_column: "TEXT"}
             columns["closeness"] = "REAL"
     return columns
@@ -62,7 +62,7 @@ def row_values(row: FlightRow) -> dict[str, Any]:
     values |= {name: column.write(getattr(row, name)) for name, column in FIELDS.items()}
     values["closeness"] = row.closeness if math.isfinite(row.closeness) else None
     for name, margin in row.margins:
-        rule = RULES[name]
+        rule = RULE_WORDS[name]
         values[rule.margin_column] = margin.value
         values[rule.place_column] = json.dumps({"unit": margin.unit, **asdict(margin.place)})
     return values
@@ -71,7 +71,7 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
     """The row of a draw's index and its values by column."""
     margins = []
-    for rule in RULES.values():
+    for rule in RULE_WORDS.values():
         if (place := known[rule.place_column]) is not None:
             data = json.loads(place)
             margins.append((rule.name, LeastMargin(known[rule.margin_column], data.pop("unit"), Place(**data))))

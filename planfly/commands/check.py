@@ -98,13 +98,13 @@ def _check_for(args: argparse.Namespace) -> int:
 
 
 def _documents(verdicts: Mapping[str, "Verdict"], mission: str, code: int) -> "VerdictsDocument":
-    from planfly.terminal.verdict_answers import VerdictsDocument, verdict_document
+    from planfly.terminal.verdict_answers import VerdictsDocument
 
-    documents = {name: verdict_document(verdict) for name, verdict in verdicts.items()}
+    documents = {name: verdict.document() for name, verdict in verdicts.items()}
     return VerdictsDocument(exit_code=code, mission=mission, verdicts=documents)
 
 
 def _document(judged: "Judged") -> str:
-    from logs.verdict.findings import verdict_json
+    from logs.verdict.verdict import verdict_json
 
     return verdict_json(judged.verdict)

@@ -63,7 +63,6 @@ def fly(args: argparse.Namespace) -> int:
 
 def _answer(mission: str, flown: "FlownMission", code: int) -> object:
     from planfly.terminal.answers import FlyAnswer
-    from planfly.terminal.verdict_answers import verdict_document
 
     return FlyAnswer(
         exit_code=code,
@@ -72,5 +71,5 @@ def _answer(mission: str, flown: "FlownMission", code: int) -> object:
         log=None if flown.log is None else str(flown.log),
         autopilot_log=None if flown.autopilot_log is None else str(flown.autopilot_log),
         warnings=[*flown.mission.warnings, *flown.setup.scenario.notes],
-        verdict=verdict_document(flown.verdict),
+        verdict=flown.verdict.document(),
     )

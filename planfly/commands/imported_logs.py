@@ -59,9 +59,8 @@ def import_log(args: argparse.Namespace) -> int:
 
 def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
     from planfly.terminal.answers import ImportAnswer
-    from planfly.terminal.verdict_answers import verdict_document
 
-    verdict = verdict_document(flight.verdict)
+    verdict = flight.verdict.document()
     return ImportAnswer(exit_code=code, log=str(target), rows=len(flight.track), verdict=verdict)
 
 

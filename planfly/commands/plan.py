@@ -127,7 +127,6 @@ def _front(args: argparse.Namespace) -> int:
 def _answer(made: "Plan", target: "Path", code: int) -> object:
     from planfly.api.planning import conditions_of_plan
     from planfly.terminal.plan_answers import PlanAnswer
-    from planfly.terminal.verdict_answers import conditions_document
     from planner.plan import Objective
 
     return PlanAnswer(
@@ -143,7 +142,7 @@ def _answer(made: "Plan", target: "Path", code: int) -> object:
         evaluations=made.evaluations,
         ended=made.ended,
         problems=list(made.certificate.problems),
-        conditions=conditions_document(conditions_of_plan(made)),
+        conditions=conditions_of_plan(made),
     )
 
 

@@ -57,9 +57,8 @@ def report(args: argparse.Namespace) -> int:
 
 def _answer(written: Sequence[Path], verdict: "Verdict | None", code: int) -> object:
     from planfly.terminal.answers import ReportAnswer
-    from planfly.terminal.verdict_answers import verdict_document
 
-    document = None if verdict is None else verdict_document(verdict)
+    document = None if verdict is None else verdict.document()
     return ReportAnswer(exit_code=code, files=[str(file) for file in written], verdict=document)
 
 

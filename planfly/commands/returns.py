@@ -118,7 +118,6 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         return_entry,
         suggestion_entry,
     )
-    from planfly.terminal.verdict_answers import conditions_document
 
     returns, no_return = found.returns, found.returns.point_of_no_return
     return ReturnsAnswer(
@@ -126,7 +125,7 @@ def _answer(what: str, found: "ReturnsFound", code: int) -> object:
         what=what,
         headline=found.headline,
         safe=found.safe,
-        conditions=conditions_document(setup_conditions(found.setup)),
+        conditions=setup_conditions(found.setup),
         every_s=returns.every,
         least_clearance_m=returns.limit,
         causes=[

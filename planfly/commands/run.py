@@ -59,7 +59,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _answer(result: "RunResult", refined: bool, code: int) -> object:
     from planfly.terminal.answers import RoundAnswer, RunAnswer
-    from planfly.terminal.verdict_answers import verdict_document
 
     rounds = [
         RoundAnswer(round=one.number, changes=list(one.changes), summary=one.verdict.headline) for one in result.rounds
@@ -71,7 +70,7 @@ def _answer(result: "RunResult", refined: bool, code: int) -> object:
         folder=str(result.folder),
         files=[file.name for file in result.files],
         rounds=rounds if refined else [],
-        verdict=verdict_document(result.verdict),
+        verdict=result.verdict.document(),
     )
 
 

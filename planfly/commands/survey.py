@@ -89,14 +89,13 @@ def _answer(what: str, found: "SurveyFound", code: int) -> object:
         photo_line_entry,
         survey_remedy_entry,
     )
-    from planfly.terminal.verdict_answers import conditions_document
 
     return SurveyAnswer(
         exit_code=code,
         what=what,
         headline=found.headline,
         usable=found.usable,
-        conditions=conditions_document(setup_conditions(found.setup)),
+        conditions=setup_conditions(found.setup),
         surveys=[
             [photo_line_entry(found.setup, line, one) for line, one in zip(survey.lines, lines, strict=True)]
             for survey, lines in zip(found.surveys, found.lines, strict=True)

@@ -12,7 +12,7 @@ from flight.mission.items import Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.places import Place
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.wording import place_text, quantity_text
 
 # A place: its kind, and the items that it is at, by their order in the mission, or its number; None for what is none.
@@ -64,7 +64,7 @@ def flight_figures(mission: Mission, route: Route, findings: Iterable[Finding], 
     for item in findings:
         key, words = _place(item.place, route.items.tolist(), order)
         value = item.planned if item.flown is None else item.flown
-        figure = Figure(item.ok, value, item.margin, item.unit, words, RULES[item.rule].scale)
+        figure = Figure(item.ok, value, item.margin, item.unit, words, RULE_WORDS[item.rule].scale)
         old = found.get((item.rule, key))
         if old is None or _badness(figure) < _badness(old):
             found[item.rule, key] = figure
@@ -169,7 +169,7 @@ def _changed_states(old: _Found, new: _Found) -> list[str]:
 def _said(rule: str, now: Figure, was: Figure | None, end: str) -> str:
     values = dict.fromkeys(one.text for one in (was, now) if one is not None and one.text)
     figures = " \u2192 ".join(values)
-    return f"{now.place}: {RULES[rule].word} {figures}".rstrip() + f", {end}"
+    return f"{now.place}: {RULE_WORDS[rule].word} {figures}".rstrip() + f", {end}"
 
 
 def _changed_figures(old: _Found, new: _Found) -> list[str]:
@@ -184,7 +184,7 @@ def _changed_figures(old: _Found, new: _Found) -> list[str]:
             continue
         moved = abs((now.margin or 0.0) - (was.margin or 0.0)) / was.scale
         there = now.place if was.place == now.place else f"{was.place}, now {now.place}"
-        found.append((moved, f"closest to its limit: {RULES[rule].word} {was.text} \u2192 {now.text} ({there})"))
+        found.append((moved, f"closest to its limit: {RULE_WORDS[rule].word} {was.text} \u2192 {now.text} ({there})"))
     return still[:_FIGURES] + [text for _, text in sorted(found, reverse=True)[:_FIGURES]]
 
 

@@ -16,9 +16,9 @@ from flight.mission.items import AMSL, LANDINGS, OVER_HOME, Command, Mission, Mi
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import Route, lay_route, with_end_courses
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe
 from planfly.make_plan import make_setup
 from planfly.open_mission import NamedFences, OpenedMission

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict, left_open
+from logs.verdict.findings import Finding
 from logs.verdict.measures.route_requirements import airspace_of
-from logs.verdict.rules.registry import RULES
-from logs.verdict.wording import place_text, suggestion_text
+from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.verdict import Verdict
+from logs.verdict.wording import suggestion_text
 from logs.views.failures import route_distance, route_samples
 from logs.views.map import map_extent
 from logs.views.profile import ground_under
@@ -198,35 +199,28 @@ def _state(state: State) -> list[str]:
 
 def verdict_json(verdict: Verdict) -> Json:
     """The answer and its lines."""
-    state = "ok" if verdict.flyable else "open" if verdict.undecided else "fail"
-    _, *lines = verdict.lines
+    shown = verdict.present()
     return {
-        "state": state,
+        "state": shown.state,
         "answer": verdict.answer,
-        "headline": verdict.headline,
-        "lines": lines,
+        "headline": shown.headline,
+        "lines": list(shown.details),
         "level": verdict.level,
         "failed": len(verdict.failed),
     }
 
 
 def findings_json(verdict: Verdict) -> list[Json]:
-    """What failed and what was left open, then of each rule what is closest to its limit."""
-    undecided = {id(item) for item in left_open(verdict.findings)}
-    numbered = list(enumerate(verdict.findings))
-    bad = [(k, item) for k, item in numbered if item.ok is False or id(item) in undecided]
-    shown = {id(item) for _, item in bad}
-    closest = {id(item) for item in verdict.closest.values()}
-    rest = [(k, item) for k, item in numbered if id(item) in closest - shown and item.ok is not None]
-    return [_finding(k, item) for k, item in [*bad[:_LISTED], *rest]]
+    """List the findings that failed or are left open, then the finding closest to its limit of each rule."""
+    return [_finding(number, item) for number, item in verdict.present().worth_listing(_LISTED)]
 
 
 def _finding(number: int, item: Finding) -> Json:
     return {
         "number": number,
-        "rule": RULES[item.rule].title,
+        "rule": RULE_WORDS[item.rule].title,
         "ok": item.ok,
-        "where": place_text(item.place),
+        "where": item.where,
         "kind": item.place.kind,
         "index": item.place.index,
         "text": item.reason,

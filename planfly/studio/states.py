@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding, left_open
 from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.tolerances import ROUNDING
 from logs.verdict.wording import UNITS
 from world.threats import Threats
@@ -107,11 +107,11 @@ def state_of(item: Finding, *, unjudged: bool = False) -> State | None:
 
 
 def _word(item: Finding) -> str:
-    return RULES[item.rule].word
+    return RULE_WORDS[item.rule].word
 
 
 def _closeness(item: Finding) -> float:
-    scale, margin = RULES[item.rule].scale, item.margin or 0.0
+    scale, margin = RULE_WORDS[item.rule].scale, item.margin or 0.0
     if scale is None:
         if item.limit is None or not item.limit:
             return math.inf

@@ -6,8 +6,10 @@ from typing import Any, Literal
 from pydantic.dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
+from logs.verdict.conditions import Conditions
+from logs.verdict.document import VerdictDocument
 from planfly.api.aircraft import AircraftNumbers
-from planfly.terminal.verdict_answers import STRICT, ConditionsDocument, VerdictDocument
+from planfly.terminal.verdict_answers import STRICT
 
 # ----------------------------------------------------------------------
 # What ``planfly aircraft`` answers with ``--json``.
@@ -191,7 +193,7 @@ class CampaignDocument:
     sensitivities: list[SensitivityEntry]
     worst: list[dict[str, Any]]
     spread: dict[str, Any]
-    conditions: ConditionsDocument
+    conditions: Conditions
     """What each flight is drawn about."""
     made_of: str
     """What the campaign was made of, as a hash."""
@@ -234,7 +236,7 @@ class WindsDocument:
     """Flights without an outcome, from 0 in the order in which they were asked for; they count as not flyable."""
     directions: list[WindDirection]
     spread: dict[str, Any]
-    conditions: ConditionsDocument
+    conditions: Conditions
     """Without the wind, which is what is asked for."""
 
 

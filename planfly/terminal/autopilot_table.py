@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 
 from logs.verdict.conditions import flown_lines
-from logs.verdict.findings import Finding, Verdict
-from logs.verdict.rules.registry import RULES
+from logs.verdict.presentation import RuleFindings
+from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.verdict import Verdict
 from planfly.terminal.command_parser import coloured
 
 _GAP = "  "
@@ -25,10 +26,11 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
     px4: not flyable: speed; NAV_ACC_RAD 10
     """
     rows = [("", *verdicts), ("verdict", *(_answer(verdict) for verdict in verdicts.values()))]
-    for rule in RULES.values():
-        found = [[one for one in verdict.findings if one.rule == rule.name] for verdict in verdicts.values()]
+    by_rule = [{rule.words.name: rule for rule in verdict.present().rules} for verdict in verdicts.values()]
+    for words in RULE_WORDS.values():
+        found = [rules.get(words.name) for rules in by_rule]
         if any(found):
-            rows.append((rule.title, *map(_state, found)))
+            rows.append((words.title, *map(_state, found)))
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     lines = []
     for title, *cells in rows:
@@ -51,10 +53,8 @@ def _answer(verdict: Verdict) -> str:
     return "flyable" if verdict.flyable else "not flyable"
 
 
-def _state(findings: list[Finding]) -> str:
-    """How the findings of a rule stand."""
-    judged = [finding for finding in findings if finding.ok is not None]
-    if not judged:
-        return "not judged" if findings else ""
-    failed = sum(not finding.ok for finding in judged)
-    return f"{failed} of {len(judged)} failed" if failed else f"{len(judged)} ok"
+def _state(rule: RuleFindings | None) -> str:
+    """Count the findings of a rule that failed, or that pass."""
+    if rule is None or not rule.judged:
+        return "not judged" if rule else ""
+    return f"{len(rule.failed)} of {rule.judged} failed" if rule.failed else f"{rule.judged} ok"

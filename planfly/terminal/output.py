@@ -22,7 +22,7 @@ from world.errors import PlanflyError
 from world.files import read_at_most, write_whole
 
 if TYPE_CHECKING:
-    from logs.verdict.findings import Verdict
+    from logs.verdict.verdict import Verdict
 
 # ----------------------------------------------------------------------
 # Standard output that outlives its reader: ``planfly check M | head -1`` still ends with the verdict's exit code.
@@ -456,7 +456,7 @@ def give_junit(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> N
     if args.junit is not None:
         from logs.verdict.junit import junit_text
 
-        write_whole(Path(args.junit), junit_text(verdicts))
+        write_whole(Path(args.junit), junit_text({name: verdict.present() for name, verdict in verdicts.items()}))
 
 
 def _refuse_inputs(target: Path, args: argparse.Namespace) -> None:

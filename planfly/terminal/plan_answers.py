@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic.dataclasses import dataclass
 
-from planfly.terminal.verdict_answers import STRICT, ConditionsDocument
+from logs.verdict.conditions import Conditions
+from planfly.terminal.verdict_answers import STRICT
 
 if TYPE_CHECKING:
     from planner.search.plan_front import Front
@@ -32,7 +33,7 @@ class PlanAnswer:
     """completed, budget or interrupted."""
     problems: list[str]
     """What of the plan is not feasible."""
-    conditions: ConditionsDocument
+    conditions: Conditions
     """What it is for."""
 
 
@@ -67,7 +68,7 @@ class FrontAnswer:
     plans: list[FrontEntry]
     problems: list[str]
     """Why there is no plan."""
-    conditions: ConditionsDocument
+    conditions: Conditions
     """What they are for."""
 
 
@@ -78,7 +79,6 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
     """The answer of a front in a folder."""
     from planfly.api.fronts import table_rows
     from planfly.api.planning import conditions_of_plan
-    from planfly.terminal.verdict_answers import conditions_document
 
     default = front.default.plan
     entries = []
@@ -94,7 +94,7 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
         asked=front.asked,
         plans=entries,
         problems=[] if front.plans else list(default.certificate.problems),
-        conditions=conditions_document(conditions_of_plan(default)),
+        conditions=conditions_of_plan(default),
     )
 
 

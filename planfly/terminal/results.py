@@ -8,7 +8,7 @@ from planfly.terminal.command_parser import coloured
 
 if TYPE_CHECKING:
     from logs.recording.reader import FlightLog
-    from logs.verdict.findings import Verdict
+    from logs.verdict.verdict import Verdict
 
 
 def print_verdict(verdict: "Verdict", notes: Iterable[str]) -> None:

@@ -5,12 +5,13 @@ from typing import Literal
 
 from pydantic.dataclasses import dataclass
 
+from logs.verdict.conditions import Conditions
 from logs.verdict.returns.glides_text import glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import MARGIN
 from logs.verdict.returns.judge_returns import ReturnFlown, ReturnRange
 from logs.verdict.returns.returns_text import headline, range_text
 from planfly.api.returning import ReturnsFound, Suggested
-from planfly.terminal.verdict_answers import STRICT, ConditionsDocument
+from planfly.terminal.verdict_answers import STRICT
 from world.frames import to_geo
 
 
@@ -184,7 +185,7 @@ class ReturnsAnswer:
     what: str
     headline: str
     safe: bool
-    conditions: ConditionsDocument
+    conditions: Conditions
     every_s: float
     least_clearance_m: float
     causes: list[CauseEntry]

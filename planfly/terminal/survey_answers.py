@@ -7,9 +7,10 @@ from pydantic.dataclasses import dataclass
 
 from flight.mission.surveys import PhotoLine
 from flight.simulation.setup import FlightSetup
+from logs.verdict.conditions import Conditions
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
 from planfly.survey_remedies import NearMiss, SurveyRemedy
-from planfly.terminal.verdict_answers import STRICT, ConditionsDocument
+from planfly.terminal.verdict_answers import STRICT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -86,7 +87,7 @@ class SurveyAnswer:
     what: str
     headline: str
     usable: bool
-    conditions: ConditionsDocument
+    conditions: Conditions
     surveys: list[list[PhotoLineEntry]]
     overlaps: list[OverlapEntry | None]
     """Of each survey; null where its camera is not known."""

@@ -2,87 +2,69 @@
 
 from collections.abc import Iterable
 
-from logs.verdict.findings import Finding, Verdict, closest_to_limit, left_open
-from logs.verdict.rule import Rule
-from logs.verdict.rules.registry import RULES
-from logs.verdict.summary import failed_by_rule
-from logs.verdict.wording import place_text, quantity_text, suggestions_text
+from logs.verdict.findings import Finding
+from logs.verdict.presentation import RuleFindings
+from logs.verdict.rule_words import RULE_WORDS, rule_word
+from logs.verdict.verdict import Verdict
+from logs.verdict.wording import quantity_text
 from planfly.terminal.command_parser import coloured
 
-# Findings of a rule that are named, beside the worst of those that fail.
+# Number of failed findings of a rule that are named after the worst one.
 _LISTED = 6
-# Sources of a limit that are named beside it; any other limit is a check of planfly's own.
+# Sources of a limit that are named after it; any other limit is a check of planfly's own.
 _LIMIT_SOURCES = ("scenario", "near the field", "aircraft", "autopilot", "mission")
 # Width of the column of rules.
-_TITLES = 2 + max(len(rule.title) for rule in RULES.values())
+_TITLES = 2 + max(len(rule.title) for rule in RULE_WORDS.values())
 
 
 def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
-    """The summary, then what fails, then what is closest to each rule's limit, then notes, in colour where wanted."""
-    first, *rest = verdict.lines or ("",)
-    lines = [coloured(first, "good" if verdict.flyable else "bad"), *rest]
-    for group in failed_by_rule(verdict.findings):
-        judged = sum(finding.rule == group[0].rule and finding.ok is not None for finding in verdict.findings)
-        lines += _failed_lines(group, judged)
-    still_open = left_open(verdict.findings)
-    lines += [f"  open    {_noun(one)} at {place_text(one.place)}: {one.reason}" for one in still_open[: 2 * _LISTED]]
-    # The same flight tells of them all.
-    telling = dict.fromkeys(suggestions_text(one.suggestions) for one in still_open if one.suggestions)
-    lines += [coloured("          would tell: ", "hint") + text for text in telling]
-    for rule in RULES.values():
-        mine = [finding for finding in verdict.findings if finding.rule == rule.name]
-        if mine:
-            zones = 0 if verdict.conditions is None else verdict.conditions.zones
-            count = f"{zones:,} zones; " if rule.name == "fence" and zones > 1 else ""
-            lines.append(f"  {rule.title:<{_TITLES}}{count}{_state(rule, mine)}")
+    """Write the summary, what fails, what is closest to each rule's limit, and notes, in colour where wanted."""
+    shown = verdict.present()
+    lines = [coloured(shown.headline, "good" if shown.state == "ok" else "bad"), *shown.details]
+    for rule in shown.failed_rules:
+        lines += _failed_lines(rule)
+    lines += [f"  open    {rule_word(one.rule)} at {one.where}: {one.reason}" for one in shown.left_open[: 2 * _LISTED]]
+    # One flight decides all findings with the same suggestion.
+    deciding_flights = dict.fromkeys(one.suggestion for one in shown.left_open if one.suggestions)
+    lines += [coloured("          would tell: ", "hint") + text for text in deciding_flights]
+    for rule in shown.rules:
+        count = f"{shown.zones:,} zones; " if rule.words.name == "fence" and shown.zones > 1 else ""
+        lines.append(f"  {rule.words.title:<{_TITLES}}{count}{_state(rule)}")
     return [*lines, *(f"  note    {note}" for note in notes)]
 
 
-def _failed_lines(group: list[Finding], judged: int) -> list[str]:
-    """What fails by one rule: the worst in full with what would pass, and where else.
-
-    group: the worst first.  judged: how many findings of the rule are.
-    """
-    worst, *others = group
-    where = f"{_noun(worst)} at {place_text(worst.place)}"
-    many = f"{_noun(worst)}, {len(group)} of {judged}; the worst at {place_text(worst.place)}"
-    lines = [coloured("  failed  ", "bad") + f"{many if others else where}: {worst.reason}"]
+def _failed_lines(rule: RuleFindings) -> list[str]:
+    """Describe the worst failed finding of a rule in full, with what would pass, and name the other places."""
+    worst, *others = rule.failed
+    noun = rule.words.word
+    where = f"{noun}, {len(rule.failed)} of {rule.judged}; the worst at" if others else f"{noun} at"
+    lines = [coloured("  failed  ", "bad") + f"{where} {worst.where}: {worst.reason}"]
     if worst.suggestions:
-        lines.append(coloured("          would pass: ", "hint") + suggestions_text(worst.suggestions))
+        lines.append(coloured("          would pass: ", "hint") + worst.suggestion)
     if others:
-        named = "; ".join(map(_in_short, others[:_LISTED]))
+        named = "; ".join(map(_place_and_value, others[:_LISTED]))
         more = f"; {len(others) - _LISTED} more" if len(others) > _LISTED else ""
         lines.append(f"          also at {named}{more}")
     return lines
 
 
-def _in_short(finding: Finding) -> str:
-    """Where a finding fails, and by how much."""
+def _place_and_value(finding: Finding) -> str:
     value = finding.planned if finding.flown is None else finding.flown
-    by = "" if value is None else f" ({quantity_text(value, finding.unit)})"
-    return place_text(finding.place) + by
+    return finding.where + ("" if value is None else f" ({quantity_text(value, finding.unit)})")
 
 
-def _noun(finding: Finding) -> str:
-    return RULES[finding.rule].word
-
-
-def _state(rule: Rule, findings: list[Finding]) -> str:
-    """How the findings of a rule stand, and the one closest to its limit."""
-    failed = sum(finding.ok is False for finding in findings)
-    unknown = [finding for finding in findings if finding.ok is None]
-    judged = len(findings) - len(unknown)
-    if not judged:
-        return f"{'warning' if rule.warns else 'not judged'}: {unknown[0].reason}"
-    text = f"{judged - failed} of {judged} ok"
-    closest = closest_to_limit(findings)
-    if closest is None or closest.margin is None or rule.margin is None:
-        return text
+def _state(rule: RuleFindings) -> str:
+    """Count the findings of a rule that pass, and describe the finding closest to its limit."""
+    if not rule.judged:
+        return f"{'warning' if rule.words.warns else 'not judged'}: {rule.findings[0].reason}"
+    closest, margin = rule.closest, rule.words.margin
+    if closest is None or closest.margin is None or margin is None:
+        return rule.count_text
     value = closest.planned if closest.flown is None else closest.flown
     if value is None or closest.limit is None:
-        return text
+        return rule.count_text
     how = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
-    where = "" if closest.place.kind == "flight" else f"{how} at {place_text(closest.place)}: "
+    where = "" if closest.place.kind == "flight" else f"{how} at {closest.where}: "
     limit = quantity_text(closest.limit, closest.unit)
-    whose = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
-    return f"{text}; {where}{rule.margin.of} {quantity_text(value, closest.unit)} (limit {limit}{whose})"
+    source = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
+    return f"{rule.count_text}; {where}{margin.of} {quantity_text(value, closest.unit)} (limit {limit}{source})"

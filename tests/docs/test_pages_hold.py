@@ -10,6 +10,7 @@ import pytest
 
 import planfly
 from logs.verdict import tolerances
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
 from planfly.commands.registry import build_parser
 from planfly.terminal.exit_codes import EXIT_CODES
@@ -72,7 +73,7 @@ def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
 def test_every_scale_that_ranks_flights_stands_on_its_page() -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*?) \| ([\d.]+) (.*?) \|$", text_of("campaigns.md"), re.MULTILINE)
     stated = {rule: (of, float(scale), unit) for rule, of, scale, unit in rows}
-    margins = {rule.name: rule.margin for rule in RULES.values() if rule.scale is not None}
+    margins = {rule.name: rule.margin for rule in RULE_WORDS.values() if rule.scale is not None}
     assert stated == {name: (margin.of, margin.scale, margin.unit) for name, margin in margins.items() if margin}
 
 

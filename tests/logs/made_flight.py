@@ -11,8 +11,9 @@ from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import Track
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
 from planner.plan import Certificate, Plan
 from world.scenario import from_spec
 

@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import judge_geometry
+from logs.verdict.verdict import Verdict
 from planfly.airframe import load_airframe
 from planfly.cli import main
 from planfly.make_plan import make_setup

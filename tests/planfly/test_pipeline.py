@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from logs.recording.reader import read_log
-from logs.verdict.findings import verdict_json
+from logs.verdict.verdict import verdict_json
 from planfly.airframe import load_airframe
 from planfly.make_plan import make_setup
 from planfly.pipeline import fly_and_judge, plan_then_fly

@@ -18,8 +18,9 @@ from flight.autopilots.px4.parameters import default_parameters as px4_parameter
 from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
-from logs.verdict.findings import Fact, Finding, make_finding, verdict_json
+from logs.verdict.findings import Fact, Finding, make_finding
 from logs.verdict.places import Place
+from logs.verdict.verdict import verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.airframe import load_airframe
 from planfly.open_mission import judge_log

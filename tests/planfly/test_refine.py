@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from flight.mission.from_plan import plan_mission
-from logs.verdict.findings import Verdict, make_finding
+from logs.verdict.findings import make_finding
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.places import FLIGHT, Place
+from logs.verdict.verdict import Verdict
 from planfly.airframe import load_airframe
 from planfly.cli import main
 from planfly.make_plan import make_plan, make_setup

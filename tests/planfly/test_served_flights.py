@@ -13,8 +13,9 @@ from flight.live.flight_process import HELD_ON, DivertFlight, EndFlight, JudgeMi
 from flight.live.telemetry import AUTO, CRITICAL, INFO, LOITER, WARNING
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from logs.recording.reader import read_log
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.places import FLIGHT, DecidingParameter, Place
+from logs.verdict.verdict import Verdict
 from planfly import served_flights
 from planfly.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
 from tests.logs.made_flight import make_track

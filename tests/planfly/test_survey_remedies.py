@@ -12,9 +12,10 @@ import pytest
 from flight.mission.items import Command, Mission
 from flight.mission.survey_layout import turn_around_of
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import surveys_of
 from logs.verdict.places import FLIGHT, Place
+from logs.verdict.verdict import Verdict
 from planfly import survey_remedies as remedies
 from planfly.api.flying import opened_mission
 from planfly.api.planning import changed_scenario

@@ -22,13 +22,15 @@ from flight.simulation.setup import (
 )
 from flight.simulation.track import Track
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line, setup_conditions
-from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between, stretch_end_text
 from logs.verdict.judge_geometry import track_findings
 from logs.verdict.places import FLIGHT, LevelAnswer, Place
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules.registry import RULES
 from logs.verdict.summary import headline, undecided_text
 from logs.verdict.tolerances import LONGEST_UNSEEN
+from logs.verdict.verdict import Verdict
 
 # ----------------------------------------------------------------------
 # The lines of a verdict on an imported flight: the answer, what was judged and what not, and what the log is.
@@ -99,7 +101,7 @@ def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs], numbers: Sequ
 def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
     """Which rules were not judged, and why, one line each; on which legs, where others were."""
     lines = []
-    for rule in RULES.values():
+    for rule in RULE_WORDS.values():
         mine = [item for item in findings if item.rule == rule.name]
         silent = [item for item in mine if item.ok is None]
         if not silent:
@@ -306,9 +308,10 @@ def _lacking(setup: FlightSetup, found: set[str]) -> list[Finding]:
     out = []
     for rule in RULES.values():
         lacking = [one for one in rule.log.quantities if setup.source is not None and one not in setup.source.holds]
-        if rule.log.listed and rule.margin is not None and lacking and rule.name not in found:
+        margin = RULE_WORDS[rule.name].margin
+        if rule.log.listed and margin is not None and lacking and rule.name not in found:
             why = f"the log holds no {_CALLED[lacking[0]]}"
-            out.append(make_finding(rule.name, FLIGHT, ok=None, reason=why, source="aircraft", unit=rule.margin.unit))
+            out.append(make_finding(rule.name, FLIGHT, ok=None, reason=why, source="aircraft", unit=margin.unit))
     return out
 
 

@@ -348,7 +348,7 @@ def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
 def with_legs(track: Track, leg_ends: Sequence[float]) -> Track:
     """Return the track with its ``leg`` column made anew of the times at which legs end, s, rising.
 
-    leg_ends: of a `logs.verdict.findings.Verdict` or of `find_leg_ends`.  Without any, all rows are on leg 0.
+    leg_ends: of a `logs.verdict.verdict.Verdict` or of `find_leg_ends`.  Without any, all rows are on leg 0.
     """
     ends = np.array(leg_ends, dtype=np.float64)
     return replace(track, leg=np.searchsorted(ends, track.time, side="right").astype(np.int32))

@@ -9,7 +9,7 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import stay_inside
 from logs.verdict.tolerances import ROUNDING
 from logs.verdict.wording import place_text
@@ -73,14 +73,9 @@ def _inside_box(requirements: RouteRequirements, points: Floats) -> tuple[float,
 
 RULE = Rule(
     name="bounds",
-    title="bounds",
-    asks="Does the flight stay inside the area's box, above its floor and below its ceiling?",
-    margin=Margin("distance inside", "m", 10.0),
     tolerances=("ROUNDING",),
     judge=bounds_findings,
     whole=True,
     suggest=stay_inside,
     log=LogNeeds(("heights",)),
-    phrase=lambda item: short_of_limit("bounds", item),
-    explained=True,
 )

@@ -12,7 +12,7 @@ from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_higher
 from logs.verdict.tolerances import BELOW_HOME_M, CLEARANCE_TOLERANCE, GROUND_LEG_ROOM, HOME_ERROR_M, NEAR_FIELD
 from world.frames import to_map
@@ -248,14 +248,8 @@ def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
 
 RULE = Rule(
     name="clearance",
-    title="clearance",
-    asks="Does each leg stay the required height above the ground?",
-    margin=Margin("height above ground", "m", 10.0),
     tolerances=("BELOW_HOME_M", "CLEARANCE_TOLERANCE", "GROUND_LEG_ROOM", "HOME_ERROR_M", "NEAR_FIELD"),
     judge=clearance_findings,
     suggest=fly_higher,
     log=LogNeeds(("heights",)),
-    phrase=lambda item: short_of_limit("clearance", item),
-    unjudged="terrain",
-    explained=True,
 )

@@ -11,9 +11,9 @@ from logs.verdict.imported.flown_legs import FlownLegs, gaps_between, stretch_en
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.rule import Margin, Rule
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import CONTRADICTION, GAP_STEPS, LONGEST_GAP
-from logs.verdict.wording import place_text_within, shortened
+from logs.verdict.wording import place_text_within
 
 
 def completion_findings(
@@ -211,9 +211,6 @@ def _named(setup: FlightSetup, legs: FlownLegs) -> str:
 
 RULE = Rule(
     name="completion",
-    title="completion",
-    asks="Was the plan feasible, flown to its last waypoint, and recorded in full without contradiction?",
-    margin=Margin("flown", "legs"),
     tolerances=(
         "CONTRADICTION",
         "GAP_STEPS",
@@ -226,6 +223,4 @@ RULE = Rule(
     ),
     judge_end=completion_findings,
     judge_imported_end=imported_completion,
-    urgency=3,
-    phrase=lambda item: f"completion ({shortened(item.brief)})",
 )

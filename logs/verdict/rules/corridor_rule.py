@@ -8,7 +8,7 @@ from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across
-from logs.verdict.rule import Margin, Rule
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import ON_COURSE, ROUNDING
 
 
@@ -86,9 +86,6 @@ def _when_and_where(aligned: AlignedTrack, row: int) -> str:
 
 RULE = Rule(
     name="corridor",
-    title="corridor",
-    asks="How far from the legs did the flight get, its turns included?",
-    margin=Margin("distance from the legs", "m", 10.0),
     tolerances=("ROUNDING", "PASS", "FLY_OVER_SWING_RATIO", "ON_COURSE"),
     judge=corridor_findings,
 )

@@ -10,7 +10,7 @@ from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Message, make_findi
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import use_less_energy
 from logs.verdict.tolerances import RESERVE, UNDECIDED
 
@@ -153,13 +153,9 @@ def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float
 
 RULE = Rule(
     name="energy",
-    title="energy",
-    asks="Does the flight leave the battery's or the tank's reserve?",
-    margin=Margin("energy", "Wh", 50.0),
     tolerances=("RESERVE", "UNDECIDED"),
     judge=energy_findings,
     whole=True,
     suggest=use_less_energy,
     log=LogNeeds(("battery",), aircraft=True),
-    explained=True,
 )

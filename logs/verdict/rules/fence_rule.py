@@ -16,7 +16,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, route_re
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION
-from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import pass_zone
 from logs.verdict.tolerances import ROUNDING
 from logs.verdict.wording import place_text
@@ -179,25 +179,10 @@ def _where(requirements: RouteRequirements, visit: Record, event: str) -> str:
     return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL ({leg})"
 
 
-def _violated(item: Finding) -> str:
-    """A violated zone in a headline."""
-    if not item.place.name:
-        return ""
-    depth = max(item.flown or 0.0, item.planned or 0.0)
-    return f"{place_text(item.place)} violated ({depth:.1f} m beyond it)"
-
-
 RULE = Rule(
     name="fence",
-    title="zones",
-    asks="Do path and flight keep out of exclusions and within inclusions?",
-    margin=Margin("depth", "m", 10.0),
     tolerances=("ROUNDING",),
     judge=fence_findings,
     suggest=pass_zone,
     log=LogNeeds(("heights",)),
-    phrase=_violated,
-    unjudged="airspace",
-    unjudged_of="zones",
-    explained=True,
 )

@@ -30,9 +30,8 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import Way, entered_by_way, first_item, is_laid_out, landing_item
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import ReturnWorld, return_world
-from logs.verdict.rule import Rule, located
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import EARLY_TOUCH, GO_AROUND_ERROR, GO_AROUND_ROOM, NEAR_LINE_UP, ON_THE_SPOT
-from logs.verdict.wording import shortened
 from world.kernels import Record, Records
 from world.terrain import Terrain
 
@@ -380,13 +379,7 @@ def _described(worst: _Aborted) -> str:
 
 RULE = Rule(
     name="go_around",
-    title="go-around",
-    noun="go-around",
-    asks="Would a go-around from anywhere on the glide stay clear of ground, missiles and zones?",
-    margin=None,
     tolerances=("GO_AROUND_ROOM", "NEAR_LINE_UP", "GO_AROUND_ERROR", "EARLY_TOUCH", "ON_THE_SPOT"),
     judge=go_around_findings,
     of_route=True,
-    phrase=lambda item: located("go-around", item, shortened(item.brief)),
-    warns=True,
 )

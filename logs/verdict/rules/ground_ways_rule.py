@@ -35,7 +35,7 @@ from logs.verdict.measures.ways import (
     way_clearance,
 )
 from logs.verdict.places import Place
-from logs.verdict.rule import Margin, Rule, located
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
     ABOVE_FLARE,
     EARLY_TOUCH,
@@ -47,7 +47,7 @@ from logs.verdict.tolerances import (
     PLAN_TOLERANCE,
     POINT_ERROR,
 )
-from logs.verdict.wording import place_text, shortened
+from logs.verdict.wording import place_text
 from world.frames import to_map
 from world.geometry import wrap
 
@@ -371,24 +371,11 @@ def _finding(rule: str, place: Place, met: _Met, ok: bool | None, said: Message,
 
 CLIMBOUT = Rule(
     name="climbout",
-    title="climb-out",
-    noun="climb-out",
-    asks="Is the way up from home to the mission's first place free of ground, missiles and zones?",
-    margin=Margin("height above ground", "m", 10.0),
     tolerances=("LAUNCH_RUN", "FIRST_CLIMB", "MIN_CLIMB", "PLAN_TOLERANCE", "ROUNDING"),
     judge=climbout_findings,
-    phrase=lambda item: located("climb-out", item, shortened(item.brief)),
-    unjudged="climb-out",
-    explained=True,
 )
 APPROACH = Rule(
     name="approach",
-    title="approach",
-    asks="Is the glide to the landing point free of ground, missiles and zones?",
-    margin=Margin("height above ground", "m", 10.0),
     tolerances=("EARLY_TOUCH", "GLIDE_ERROR", "ABOVE_FLARE", "POINT_ERROR", "ROUNDING"),
     judge=approach_findings,
-    phrase=lambda item: located("approach", item, shortened(item.brief)),
-    unjudged="approach",
-    explained=True,
 )

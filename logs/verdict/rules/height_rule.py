@@ -14,7 +14,7 @@ from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_lower
 from logs.verdict.tolerances import HEIGHT_TOLERANCE
 from world.terrain import Terrain
@@ -153,13 +153,8 @@ def _finding(
 
 RULE = Rule(
     name="height",
-    title="heights",
-    asks="Does each leg stay below the largest height above ground and the ceiling?",
-    margin=Margin("height above ground", "m", 10.0),
     tolerances=("HEIGHT_TOLERANCE",),
     judge=height_findings,
     suggest=fly_lower,
     log=LogNeeds(("heights",), planned_heights=True),
-    unjudged="heights above ground",
-    explained=True,
 )

@@ -17,9 +17,9 @@ from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, messa
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import Way, entered_by_way, track_way, way_clearance
-from logs.verdict.rule import Margin, Rule, located
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import CLIMB_ERROR, LAUNCH_ROOM, LAUNCH_RUN, LAUNCH_SINK, RUNWAY_ROOM, TOUCHED
-from logs.verdict.wording import gentle_launch_text, shortened
+from logs.verdict.wording import gentle_launch_text
 
 Floats = NDArray[np.float64]
 
@@ -135,12 +135,6 @@ def _described(take_off: TakeOff, track: Track, run: Floats, room: float) -> lis
 
 RULE = Rule(
     name="launch",
-    title="launch",
-    asks="Does the launch start the motor, leave its runway in time, lose no height, and climb out free of obstacles?",
-    margin=Margin("height above ground", "m", 10.0),
     tolerances=("LAUNCH_RUN", "LAUNCH_ROOM", "CLIMB_ERROR", "LAUNCH_SINK", "RUNWAY_ROOM", "TOUCHED", "ROUNDING"),
     judge=launch_findings,
-    phrase=lambda item: located("launch", item, shortened(item.brief)),
-    unjudged="launch",
-    explained=True,
 )

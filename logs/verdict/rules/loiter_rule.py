@@ -17,7 +17,7 @@ from logs.verdict.measures.circle_reach import beside_end, within_reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
 from logs.verdict.places import Place
-from logs.verdict.rule import LogNeeds, Margin, Rule, located
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.tolerances import BANK_TOLERANCE, PASS, RADIUS_TOLERANCE, SWING, WIDER_SHARE
 from logs.verdict.wording import place_text
 from world.geometry import tangent_length
@@ -268,21 +268,10 @@ def _bare(corner: Place) -> str:
     return place_text(replace(corner, item=None))
 
 
-def _numbers(item: Finding) -> str:
-    """A circle that is too small, in a headline: its radius and the least one."""
-    if item.planned is None or item.limit is None or item.planned >= item.limit:
-        return ""
-    return located("loiter", item, f"radius {item.planned:.0f} m < {item.limit:.0f} m")
-
-
 RULE = Rule(
     name="loiter",
-    title="loiters",
-    asks="Can each circle be held at the bank limit in this wind, and was it flown to its end?",
-    margin=Margin("radius", "m", 10.0),
     tolerances=("RADIUS_TOLERANCE", "PASS", "BANK_TOLERANCE", "SWING", "WIDER_SHARE"),
     judge=end_findings,
     merge=fold_loiters,
     log=LogNeeds(aircraft=True),
-    phrase=_numbers,
 )

@@ -10,9 +10,9 @@ from logs.verdict.findings import Finding, Message, make_finding, message, reaso
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.rule import Margin, Rule
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import MAX_BANK, SLOWEST, SLOWEST_SHARE
-from logs.verdict.wording import place_text, shortened
+from logs.verdict.wording import place_text
 
 Floats = NDArray[np.float64]
 
@@ -102,12 +102,6 @@ def _slowest(requirements: RouteRequirements, up: Floats) -> Floats:
 
 RULE = Rule(
     name="departure",
-    title="loss of control",
-    noun="loss of control",
-    asks="Are all numbers finite, bank and airspeed those of a flight, and the ground never touched?",
-    margin=Margin("largest bank", "deg", 10.0),
     tolerances=("MAX_BANK", "SLOWEST", "SLOWEST_SHARE", "FARTHEST", "FASTEST", "MAX_PLAUSIBLE"),
     judge=departure_findings,
-    urgency=4,
-    phrase=lambda item: f"loss of control ({shortened(item.brief)})",
 )

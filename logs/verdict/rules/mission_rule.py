@@ -32,6 +32,7 @@ from flight.mission.items import (
 )
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message
+from logs.verdict.measures.mission_ends import missing_ends_text
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
@@ -277,34 +278,8 @@ def _approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Ite
             yield REFUSED, item.seq, steep
 
 
-# By MIS_TKO_LAND_REQ: what is asked for, in words.
-_REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "both or neither", 5: "both or neither"}
-
-
-def lacks_landing(mission: Mission, limits: MissionChecks) -> str:
-    """What PX4 says to a mission's lack of a takeoff or a landing, a sentence for people; "" to one that has it all.
-
-    >>> lacks_landing(Mission(None, ()), MissionChecks(requires=2))
-    "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
-    """
-    takeoff = any(item.command in TAKEOFFS for item in mission.items)
-    land = any(item.command in LANDINGS for item in mission.items)
-    enough = {0: True, 1: takeoff, 2: land, 3: takeoff and land}.get(limits.requires, takeoff == land)
-    if enough:
-        return ""
-    if limits.requires == MissionChecks().requires and not limits.stated:
-        return "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
-    wanted = f"MIS_TKO_LAND_REQ {limits.requires} asks for {_REQUIRED[limits.requires]}"
-    return f"{wanted}, and this has {_held(takeoff, land)}"
-
-
-def _held(takeoff: bool, land: bool) -> str:
-    held = [name for name, there in (("a takeoff", takeoff), ("a landing", land)) if there]
-    return " and ".join(held) or "neither a takeoff nor a landing"
-
-
 def _available(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
-    lack = lacks_landing(mission, limits)
+    lack = missing_ends_text(mission, limits)
     if not lack:
         yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ asks for them"
     elif limits.stated:
@@ -386,13 +361,9 @@ def _fence(setup: FlightSetup) -> Iterator[_Remark]:
 
 RULE = Rule(
     name="mission",
-    title="mission",
-    asks="Would an autopilot take the mission's items, and does its route keep to its own fence?",
-    margin=None,
     tolerances=(
         *("PX4_TAKEOFF_BUFFER", "PX4_LANDING_BUFFER"),
         *("PX4_FIRST_WAYPOINT", "PX4_BETWEEN_WAYPOINTS", "PX4_GATE_APART", "PX4_MAX_SERVO", "PX4_MAX_PWM"),
     ),
     judge_items=mission_findings,
-    urgency=2,
 )

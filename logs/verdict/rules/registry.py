@@ -1,9 +1,10 @@
-"""The one list of the rules of the verdict.
+"""The one list of the rules of the verdict, as far as they judge.
 
-To add a rule, write its file and its line in the list: everything that goes rule by rule follows.
+To add a rule, write its words in `logs.verdict.rule_words`, its file, and its line here.
 """
 
 from logs.verdict.rule import Rule
+from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.rules import (
     bounds_rule,
     clearance_rule,
@@ -30,43 +31,33 @@ from logs.verdict.rules import (
     waypoint_rule,
 )
 
-# Every rule by its name, in the order in which a verdict judges and lists them.
-RULES: dict[str, Rule] = {
-    rule.name: rule
-    for rule in (
-        mission_rule.RULE,
-        turn_rule.RULE,
-        loiter_rule.RULE,
-        slope_rule.RULE,
-        clearance_rule.RULE,
-        height_rule.RULE,
-        fence_rule.RULE,
-        threat_rule.RULE,
-        bounds_rule.RULE,
-        waypoint_rule.RULE,
-        corridor_rule.RULE,
-        survey_rule.RULE,
-        speed_rule.RULE,
-        stall_rule.RULE,
-        takeoff_landing_rule.TAKEOFF,
-        ground_ways_rule.CLIMBOUT,
-        launch_rule.RULE,
-        takeoff_landing_rule.LANDING,
-        ground_ways_rule.APPROACH,
-        touchdown_rule.RULE,
-        go_around_rule.RULE,
-        return_rule.RULE,
-        energy_rule.RULE,
-        loss_of_control_rule.RULE,
-        completion_rule.RULE,
-    )
-}
+_RULES = (
+    mission_rule.RULE,
+    turn_rule.RULE,
+    loiter_rule.RULE,
+    slope_rule.RULE,
+    clearance_rule.RULE,
+    height_rule.RULE,
+    fence_rule.RULE,
+    threat_rule.RULE,
+    bounds_rule.RULE,
+    waypoint_rule.RULE,
+    corridor_rule.RULE,
+    survey_rule.RULE,
+    speed_rule.RULE,
+    stall_rule.RULE,
+    takeoff_landing_rule.TAKEOFF,
+    ground_ways_rule.CLIMBOUT,
+    launch_rule.RULE,
+    takeoff_landing_rule.LANDING,
+    ground_ways_rule.APPROACH,
+    touchdown_rule.RULE,
+    go_around_rule.RULE,
+    return_rule.RULE,
+    energy_rule.RULE,
+    loss_of_control_rule.RULE,
+    completion_rule.RULE,
+)
 
-
-def rule_word(name: str) -> str:
-    """What a person calls a rule by its name in data; that name of one that is none of `RULES`.
-
-    >>> rule_word("departure"), rule_word("slope")
-    ('loss of control', 'slope')
-    """
-    return RULES[name].word if name in RULES else name
+# Every rule by its name, in the order of `RULE_WORDS`, in which a verdict judges and lists the rules.
+RULES: dict[str, Rule] = {name: next(rule for rule in _RULES if rule.name == name) for name in RULE_WORDS}

@@ -221,9 +221,6 @@ def without_style(
 
 RULE = Rule(
     name="return",
-    title="return",
-    asks="Where does the return to launch go, how, and did the flight get there?",
-    margin=None,
     judge=return_findings,
     judge_end=flown_return_findings,
     merge=without_style,

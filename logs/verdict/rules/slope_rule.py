@@ -8,7 +8,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, slope_li
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
-from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import ease_slope
 from logs.verdict.tolerances import (
     CALM,
@@ -264,9 +264,6 @@ def _too_weak(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) 
 
 RULE = Rule(
     name="slope",
-    title="slopes",
-    asks="Can each leg be climbed or descended at its airspeed in this wind, and was it?",
-    margin=Margin("slope", "deg", 1.0),
     tolerances=(
         *("PLAN_TOLERANCE", "ON_THE_SPOT", "STEP", "KINK_WAYPOINTS", "OFF_SLOPE", "OFF_HEIGHT", "OFF_HEIGHT_SHORT"),
         *(
@@ -287,5 +284,4 @@ RULE = Rule(
     judge=slope_findings,
     suggest=ease_slope,
     log=LogNeeds(("heights",), planned_heights=True, aircraft=True, full_leg=True),
-    urgency=1,
 )

@@ -11,7 +11,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, slope_li
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.rule import LogNeeds, Margin, Rule, located
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_level_speed
 from logs.verdict.tolerances import (
     ACCELERATION,
@@ -28,7 +28,6 @@ from logs.verdict.tolerances import (
     SLOWEST,
     TAKE_UP,
 )
-from logs.verdict.wording import shortened
 from world.wind import W20
 
 Floats = NDArray[np.float64]
@@ -261,9 +260,6 @@ def _gust_spread(requirements: RouteRequirements, seconds: float) -> float:
 
 RULE = Rule(
     name="speed",
-    title="airspeed",
-    asks="Is each leg's commanded airspeed one of level flight, and does the wind leave a way along the leg?",
-    margin=Margin("airspeed", "m/s", 1.0),
     tolerances=(
         *("ACCELERATION", "GUST_SHARE", "GUST_SIGMAS", "GUST_TIME", "HELD_SPEED_SHARE", "LEAST_GROUND_SPEED", "LEVEL"),
         *("MEASURED_SHARE", "OFF_MEAN", "PLAN_TOLERANCE", "SATURATED", "SLOWEST", "TAKE_UP", "UNDECIDED"),
@@ -271,6 +267,4 @@ RULE = Rule(
     judge=speed_findings,
     suggest=fly_level_speed,
     log=LogNeeds(("airspeed",), aircraft=True, full_leg=True),
-    phrase=lambda item: located("speed", item, shortened(item.brief)),
-    unjudged="airspeed",
 )

@@ -19,7 +19,7 @@ from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import fly_faster
 from logs.verdict.tolerances import GUST_SHARE, STALL_MEAN, STALL_TOLERANCE
 from world.wind import W20
@@ -148,9 +148,6 @@ def _finding(found: _Margin, where: str, tolerance: float, *, geometric: bool) -
 
 RULE = Rule(
     name="stall",
-    title="stall",
-    asks="Is the airspeed above the stall in the bank that is flown?",
-    margin=Margin("airspeed", "m/s", 1.0),
     tolerances=("STALL_MEAN", "STALL_TOLERANCE", "GUST_SHARE"),
     judge=stall_findings,
     whole=True,

@@ -15,16 +15,11 @@ from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measu
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
-from logs.verdict.rule import LogNeeds, Margin, Rule, short_of_limit
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.tolerances import PHOTO_BANK, PHOTO_OVERLAP, PHOTO_SHARE, PLAN_TOLERANCE, TURN_AROUND_RADII
 
 # The checks of photos' overlap.
 FRONT, SIDE = "front overlap", "side overlap"
-
-
-def _lost(item: Finding) -> str:
-    """A photo line in a headline: how much of it can be used; or how much photos overlap."""
-    return short_of_limit(item.check or "photo line", item)
 
 
 def survey_findings(
@@ -250,15 +245,10 @@ def _finding(
 
 RULE = Rule(
     name="survey",
-    title="photo lines",
-    noun="photo line",
-    asks="How much of each photo line of a survey is flown so that its photos can be used?",
-    margin=Margin("share of the photo line", "%", 5.0),
     tolerances=(
         *("PHOTO_SHARE", "PHOTO_ASIDE", "PHOTO_BANK", "PHOTO_HEIGHT", "MIN_PHOTO_HEIGHT", "PHOTO_COURSE"),
         *("PHOTO_STEP", "PHOTO_OVERLAP", "TURN_AROUND_RADII"),
     ),
     judge=survey_findings,
-    phrase=_lost,
     log=LogNeeds(("attitude",), planned_heights=True, full_leg=True),
 )

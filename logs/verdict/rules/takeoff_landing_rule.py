@@ -14,7 +14,7 @@ from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
-from logs.verdict.rule import Margin, Rule
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import PLAN_TOLERANCE
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
@@ -170,22 +170,11 @@ def _limit(requirements: RouteRequirements, leg: int, low: float, high: float, s
 
 TAKEOFF = Rule(
     name="takeoff",
-    title="take-off",
-    noun="take-off",
-    asks="Can the aircraft climb from the ground at home to the take-off item's place?",
-    margin=Margin("slope", "deg"),
     tolerances=("PLAN_TOLERANCE",),
     judge=takeoff_findings,
-    unjudged="take-off",
-    explained=True,
 )
 LANDING = Rule(
     name="landing",
-    title="landing",
-    asks="Can the aircraft descend from the last waypoint to the landing place?",
-    margin=Margin("slope", "deg"),
     tolerances=("PLAN_TOLERANCE",),
     judge=landing_findings,
-    unjudged="landing",
-    explained=True,
 )

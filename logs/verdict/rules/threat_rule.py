@@ -13,9 +13,9 @@ from logs.verdict.measures.path_sweeps import SphereVisits, path_spheres
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
-from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import pass_threat
-from logs.verdict.wording import place_text, place_text_within
+from logs.verdict.wording import place_text_within
 from world.threats import Threats, threat_label
 
 Floats = NDArray[np.float64]
@@ -159,22 +159,10 @@ def _touched(place: Place, plan: _Visit, track: _Visit | None, radius: float, wh
     )
 
 
-def _inside(item: Finding) -> str:
-    """A missile's sphere in a headline; one without a name of its own is called "threat 3 (missile)"."""
-    where = place_text(item.place)
-    named = f"threat {where}" if item.place.name else where
-    return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
-
-
 RULE = Rule(
     name="threat",
-    title="threats",
-    asks="Do path and flight stay outside each missile's sphere?",
-    margin=Margin("time inside", "s"),
     tolerances=("NAVIGATION_SIGMAS", "FAR", "TOUCH"),
     judge=threat_findings,
     suggest=pass_threat,
     log=LogNeeds(("heights",)),
-    phrase=_inside,
-    explained=True,
 )

@@ -21,7 +21,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import entered_by_way, track_way
 from logs.verdict.places import Place
-from logs.verdict.rule import Margin, Rule, located
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
     ABOVE_FLARE,
     EARLY_TOUCH,
@@ -32,7 +32,7 @@ from logs.verdict.tolerances import (
     TOUCH_SINK,
     TOUCHED,
 )
-from logs.verdict.wording import place_text, shortened
+from logs.verdict.wording import place_text
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -271,9 +271,6 @@ def _described(approach: Approach, landing: _Landing) -> list[str]:
 
 RULE = Rule(
     name="touchdown",
-    title="touchdown",
-    asks="Does the aircraft touch down and come to rest on the strip, on a final free of ground, missiles and zones?",
-    margin=Margin("strip", "m", 20.0),
     tolerances=(
         "GUST_TOUCH_ERROR",
         "TOUCH_ERROR",
@@ -286,7 +283,4 @@ RULE = Rule(
         "ROUNDING",
     ),
     judge=touchdown_findings,
-    phrase=lambda item: located("touchdown", item, shortened(item.brief)),
-    unjudged="touchdown",
-    explained=True,
 )

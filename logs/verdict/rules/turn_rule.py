@@ -11,7 +11,7 @@ from logs.verdict.measures.acceptance import negligible_kink, reach
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
-from logs.verdict.rule import LogNeeds, Margin, Rule
+from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import ease_turn
 from logs.verdict.tolerances import (
     BANK_TOLERANCE,
@@ -245,9 +245,6 @@ def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) ->
 
 RULE = Rule(
     name="turn",
-    title="turns",
-    asks="Can each corner be turned, and was it?",
-    margin=Margin("course change", "deg"),
     tolerances=(
         *("PLAN_TOLERANCE", "ON_THE_SPOT", "U_TURN", "LARGEST_OFFSET", "BANK_TOLERANCE", "OVERSHOOT", "SETTLED"),
         *("GUST_OFFSET", "CLOSER_SHARE", "CLOSER", "NAVIGATION_SIGMAS", "WATCHED", "STRAIGHT", "KINK_SHARE"),

@@ -14,7 +14,7 @@ from logs.verdict.findings import Fact, Finding, Message, make_finding, message,
 from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
-from logs.verdict.rule import Margin, Rule
+from logs.verdict.rule import Rule
 from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
 from logs.verdict.wording import place_text, place_text_within
 
@@ -155,19 +155,8 @@ def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, lev
     return float(distance.min()), float(up[np.argmin(np.abs(up))])
 
 
-def _missed(item: Finding) -> str:
-    """A missed waypoint in a headline."""
-    if item.flown is not None and item.brief != item.reason:
-        return f"{place_text(item.place)} {item.brief}"
-    over = item.flown is not None and item.limit is not None and item.flown > item.limit
-    return f"{place_text(item.place)} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if over else "")
-
-
 RULE = Rule(
     name="waypoint",
-    title="waypoints",
-    asks="Was each waypoint reached, by the radius that the mission or the autopilot has for it?",
-    margin=Margin("closest approach", "m", 10.0),
     tolerances=(
         "ROUNDING",
         "EQUALLY_CLOSE",
@@ -179,5 +168,4 @@ RULE = Rule(
         "CHORD_TIME",
     ),
     judge=waypoint_findings,
-    phrase=_missed,
 )

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, control_limits, held_at_limit
 from logs.recording.reader import FlightLog
-from logs.verdict.findings import Verdict, closest_to_limit
+from logs.verdict.findings import closest_to_limit
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.path_sweeps import path_spheres, segment_clearances
 from logs.verdict.measures.route_requirements import with_fence_zones
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.verdict import Verdict
 from logs.views.charts import shorten
 from logs.views.compare import ROLES, NamedFlight, both_along, both_on_map
 from logs.views.failures import Failures
@@ -151,7 +152,7 @@ def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]])
 def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
     """How many findings fail, and each rule's margin closest to its limit; NaN for one that fails without a number."""
     found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
-    for name, rule in RULES.items():
+    for name, rule in RULE_WORDS.items():
         closest = closest_to_limit(one for one in verdict.findings if one.rule == name)
         if closest is not None:
             margin = math.nan if closest.margin is None else closest.margin

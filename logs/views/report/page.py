@@ -22,9 +22,9 @@ from markupsafe import Markup
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs import theme
-from logs.verdict.findings import Verdict
 from logs.verdict.measures.track_alignment import with_legs
 from logs.verdict.returns.drawn_returns import DrawnReturns
+from logs.verdict.verdict import Verdict
 from logs.views import figures
 from logs.views.charts import Chart
 from logs.views.failures import failures

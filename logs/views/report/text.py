@@ -7,12 +7,13 @@ from typing import Literal
 
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import MissionStretch
-from logs.verdict.findings import Finding, Verdict, closest_to_limit, left_open
+from logs.verdict.findings import Finding, left_open
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.places import DecidingParameter, Suggestion
-from logs.verdict.rules.registry import RULES, rule_word
-from logs.verdict.summary import failed_by_rule
-from logs.verdict.wording import place_text, suggestions_text
+from logs.verdict.presentation import RuleFindings, findings_by_rule
+from logs.verdict.rule_words import rule_word
+from logs.verdict.verdict import Verdict
+from logs.verdict.wording import suggestions_text
 
 # ----------------------------------------------------------------------
 # What would have passed where a finding fails: the number, the changes of the plan, the autopilot's parameter.
@@ -250,11 +251,9 @@ class FailedGroup:
 def failed_groups(verdict: Verdict) -> list[FailedGroup]:
     """What fails, by rule, in the order of the verdict's first line."""
     groups = []
-    for group in failed_by_rule(verdict.findings):
-        rule = group[0].rule
-        judged = sum(finding.rule == rule and finding.ok is not None for finding in verdict.findings)
-        worst, *others = (_row(finding, verdict.deciding) for finding in group)
-        groups.append(FailedGroup(rule_word(rule), judged, worst, tuple(map(_in_short, others))))
+    for rule in verdict.present().failed_rules:
+        worst, *others = (_row(finding, verdict.deciding) for finding in rule.failed)
+        groups.append(FailedGroup(rule.words.word, rule.judged, worst, tuple(map(_in_short, others))))
     return groups
 
 
@@ -300,14 +299,14 @@ def _row(finding: Finding, deciding: DecidingParameter | None = None) -> Finding
     planned, flown, limit, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.limit, finding.margin)
     )
-    method, mended = finding.method, suggestions_text(finding.suggestions)
+    method, mended = finding.method, finding.suggestion
     if finding.tolerance:
         method = f"{method} (±\u00a0{quantity(finding.tolerance, finding.unit)})" if method else ""
     return FindingRow(
         state=state,
         sign=f"{_SIGNS[state]} {_WORDS[state]}",
         rule=rule_word(finding.rule),
-        where=place_text(finding.place),
+        where=finding.where,
         planned=number(planned),
         flown=number(flown),
         limit=number(limit),
@@ -336,29 +335,23 @@ def _sentence(finding: Finding) -> str:
     return f"{numbers}; {finding.reason}" if numbers and finding.reason else numbers or finding.reason
 
 
-def rule_rows(findings: Iterable[Finding]) -> list[RuleRow]:
-    """Count the findings by rule, in the order of `RULES`; a rule without findings is left out."""
-    grouped: dict[str, list[Finding]] = {rule: [] for rule in RULES}
-    for finding in findings:
-        grouped.setdefault(finding.rule, []).append(finding)
-    return [_rule_row(rule, group) for rule, group in grouped.items() if group]
+def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
+    """Count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is left out."""
+    return [_rule_row(rule) for rule in findings_by_rule(findings)]
 
 
-def _rule_row(rule: str, group: list[Finding]) -> RuleRow:
-    failed = sum(finding.ok is False for finding in group)
-    judged = sum(finding.ok is not None for finding in group)
-    state = "fail" if failed else "pass" if judged and not left_open(group) else "unjudged"
+def _rule_row(rule: RuleFindings) -> RuleRow:
+    failed, judged = len(rule.failed), rule.judged
+    state = "fail" if failed else "pass" if judged and not left_open(rule.findings) else "unjudged"
     parts: list[str] = [f"{failed} of {judged} fail" if failed else f"{judged} ok"] if judged else []
-    if judged < len(group):
-        parts.append(f"{len(group) - judged} not judged")
-    closest = closest_to_limit(group)
-    sign = f"{_SIGNS[state]} {_WORDS[state]}"
-    if closest is None:
-        why = "" if judged else group[0].reason
-        return RuleRow(state, sign, rule_word(rule), ", ".join(parts), why, NOTHING, NOTHING, NOTHING, NOTHING, "")
-    row = _row(closest)
-    numbers = (row.planned, row.flown, row.limit, row.margin, row.unit)
-    return RuleRow(state, sign, rule_word(rule), ", ".join(parts), row.where, *numbers)
+    if judged < len(rule.findings):
+        parts.append(f"{len(rule.findings) - judged} not judged")
+    sign, word, counts = f"{_SIGNS[state]} {_WORDS[state]}", rule.words.word, ", ".join(parts)
+    if rule.closest is None:
+        why = "" if judged else rule.findings[0].reason
+        return RuleRow(state, sign, word, counts, why, NOTHING, NOTHING, NOTHING, NOTHING, "")
+    row = _row(rule.closest)
+    return RuleRow(state, sign, word, counts, row.where, row.planned, row.flown, row.limit, row.margin, row.unit)
 
 
 # ----------------------------------------------------------------------

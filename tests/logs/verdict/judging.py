@@ -7,9 +7,10 @@ import numpy as np
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, Verdict, verdict_json
+from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.places import Change, Place
+from logs.verdict.verdict import Verdict, verdict_json
 from planner.plan import Certificate, Plan
 
 ROUTE = [[0, 0, 300], [0, 2000, 300], [1500, 3500, 380], [1500, 6000, 300], [3500, 6500, 300]]

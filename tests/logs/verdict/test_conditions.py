@@ -12,8 +12,8 @@ from flight.autopilots.arduplane.parameters import default_parameters, parameter
 from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup, ImportedLog
 from logs.verdict.conditions import condition_lines, corridor_line, least_gap, setup_conditions
-from logs.verdict.findings import verdict_json
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
+from logs.verdict.verdict import verdict_json
 from tests.logs.made_flight import make_setup, make_track
 from tests.logs.verdict.judging import bad_plan
 from world.airspace.zones import Cylinder, Zone

@@ -16,15 +16,8 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import (
-    SCHEMA,
-    UNKNOWN_AIRCRAFT,
-    Finding,
-    Verdict,
-    closest_to_limit,
-    make_finding,
-    verdict_json,
-)
+from logs.verdict.document import SCHEMA
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, closest_to_limit, make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.places import (
     FLIGHT,
@@ -38,6 +31,7 @@ from logs.verdict.places import (
 )
 from logs.verdict.reference_flights import parse_reference_flights, reference_flights_json
 from logs.verdict.rules.registry import RULES
+from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import rule_rows
 from planfly.campaigns.flight_row import least_margins

@@ -4,13 +4,16 @@ from xml.etree import ElementTree
 
 import pytest
 
-from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.findings import Finding, make_finding
 from logs.verdict.junit import junit_text
 from logs.verdict.places import FLIGHT, Place
+from logs.verdict.presentation import Presentation
+from logs.verdict.verdict import Verdict
 
 
-def verdict(*findings: Finding, flyable: bool, line: str) -> Verdict:
-    return Verdict(findings, flyable=flyable, complete=True, lines=(line, "Start: in the air"), level="flown")
+def verdict(*findings: Finding, flyable: bool, line: str) -> Presentation:
+    made = Verdict(findings, flyable=flyable, complete=True, lines=(line, "Start: in the air"), level="flown")
+    return made.present()
 
 
 def cases(text: str) -> dict[tuple[str, str], ElementTree.Element]:

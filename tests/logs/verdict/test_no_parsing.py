@@ -12,9 +12,10 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict import findings, wording
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.rules.registry import RULES
+from logs.verdict.verdict import Verdict, verdict_json
 from logs.views.failures import failures
 from logs.views.report.text import badge_of, rule_rows
 from logs.views.turns import place_values
@@ -30,7 +31,7 @@ MAKERS = (
     *("place_text", "threat_text", "change_text", "suggestion_text", "suggestions_text", "disagreement_text"),
     "tightening_text",
 )
-FIELDS = ("reason", "brief", "headline", "summary", "lines")
+FIELDS = ("reason", "brief", "headline", "summary", "lines", "details", "suggestion")
 TAKE_APART = (
     *("split", "rsplit", "splitlines", "partition", "rpartition", "startswith", "endswith", "removeprefix"),
     *("removesuffix", "find", "rfind", "index", "rindex", "count", "strip", "lstrip", "rstrip"),
@@ -120,7 +121,7 @@ def test_what_a_threat_is_called_changes_its_name_alone(name: str) -> None:
         threat = THREAT | {"kill_scale_m": 200.0, "name": called}
         verdict = judge_geometry(make_setup([[0, 0, 300], [0, 2000, 300]], threats=[threat]))
         assert f"threat {called} (missile)" in verdict.headline
-        return findings.verdict_json(verdict).replace(called, MUTE)
+        return verdict_json(verdict).replace(called, MUTE)
 
     assert written(name) == written("Alfa")
 
@@ -164,7 +165,7 @@ def test_no_module_that_knows_verdicts_takes_their_words_apart() -> None:
             if apart:
                 found.append(f"{file.relative_to(ROOT)}:{node.lineno}")
     # A verdict's first line is its headline.
-    assert [one for one in found if not one.startswith("logs/verdict/findings.py")] == []
+    assert [one for one in found if not one.startswith("logs/verdict/verdict.py")] == []
 
 
 def test_no_module_that_knows_verdicts_has_regular_expressions() -> None:

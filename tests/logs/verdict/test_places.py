@@ -11,7 +11,6 @@ from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.places import (
     FLIGHT,
@@ -23,6 +22,7 @@ from logs.verdict.places import (
     Place,
     ReferenceFlights,
 )
+from logs.verdict.verdict import Verdict, verdict_json
 from logs.verdict.wording import deciding_text
 from logs.views.report.text import level_rows
 from tests.logs.verdict.judging import leg

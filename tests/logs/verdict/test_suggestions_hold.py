@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.places import Suggestion
+from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import bare, of
 from tests.missions import KINDS, MadeMission, infeasible
 from tests.soak import scaled

@@ -10,10 +10,11 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import default_parameters as px4_parameters
 from logs.verdict.conditions import setup_conditions
-from logs.verdict.findings import Finding, Verdict, make_finding, message
+from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
 from logs.verdict.rules.registry import RULES
-from logs.verdict.summary import headline, summary_lines, verdict_html
+from logs.verdict.summary import headline, summary_lines
+from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import leg, missile, waypoint
 from tests.synthetic import make_setup
 from world.airfield import AskedReturns
@@ -149,7 +150,7 @@ def test_what_would_pass_stands_beside_what_fails() -> None:
     change = Change("turn", TURN, 90.0, 60.0, "deg")
     failing = make_finding("turn", TURN, ok=False, reason="too far")
     mended = replace(failing, suggestions=((change,),))
-    text = verdict_html(Verdict((mended,), flyable=False, complete=True, lines=("no",), level="flown"))
+    text = Verdict((mended,), flyable=False, complete=True, lines=("no",), level="flown")._repr_html_()
     assert "turn at most 60.0° there" in text
 
 

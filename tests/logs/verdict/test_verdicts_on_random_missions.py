@@ -6,8 +6,8 @@
 import pytest
 
 from flight.simulation.simulate import simulate
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import bare
 from tests.missions import KINDS, MadeMission, feasible, infeasible
 from tests.soak import SOAK, scaled

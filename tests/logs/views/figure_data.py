@@ -6,8 +6,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flight.simulation.track import COLUMNS, Track
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
 from logs.views.draw_map import draw_map
 from logs.views.drawing import draw_chart
 from logs.views.failures import route_distance

@@ -10,8 +10,8 @@ import matplotlib as mpl
 import pytest
 
 from logs import theme
-from logs.verdict.findings import Verdict
 from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
 from logs.views.drawing import png_bytes, write_png
 from tests.logs.views.figure_data import (
     ALL,

@@ -7,9 +7,9 @@ import pytest
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, Layer
 from logs.views.figures import figure_views, subject_of
 from logs.views.profile import profile_chart

@@ -5,8 +5,9 @@ import math
 import numpy as np
 
 from logs import theme
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.places import FLIGHT, Place
+from logs.verdict.verdict import Verdict
 from logs.views.drawing import draw_chart
 from logs.views.turns import place_values, turn_chart
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import planfly
-from logs.verdict.findings import verdict_json
+from logs.verdict.verdict import verdict_json
 from planfly.cli import main
 from planner.plan import plan_json
 from tests.planfly.conftest import FIELD

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from flight.simulation.track import TRACK_ROW, as_track
-from logs.verdict.findings import GROUND_WAY, UNKNOWN_AIRCRAFT, Finding, Verdict, make_finding
+from logs.verdict.findings import GROUND_WAY, UNKNOWN_AIRCRAFT, Finding, make_finding
 from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import parse_dispersions
 from planfly.campaigns.flight_row import (

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from logs.verdict.rules.registry import RULES
+from logs.verdict.rule_words import RULE_WORDS
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.statistics.decision import Tally
@@ -139,7 +139,7 @@ def test_a_search_s_table_is_no_campaign_s(base: CampaignBase, tmp_path: Path) -
 
 
 def test_every_rule_has_its_columns() -> None:
-    for rule in RULES.values():
+    for rule in RULE_WORDS.values():
         assert {f"margin_{rule.name}", f"place_{rule.name}"} <= set(CAMPAIGN_KIND.columns) & set(WINDS_KIND.columns)
         assert rule.scale is None or rule.scale > 0.0
 

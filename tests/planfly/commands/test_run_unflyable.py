@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from flight.mission.from_plan import plan_mission
-from logs.verdict.findings import Verdict
+from logs.verdict.verdict import Verdict
 from planfly.airframe import Airframe, load_airframe
 from planfly.make_plan import make_plan, make_setup
 from planfly.pipeline import fly_and_judge

@@ -9,7 +9,7 @@ import pytest
 
 import planfly
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Verdict
+from logs.verdict.verdict import Verdict
 from planfly import survey_remedies
 from planfly.airframe import Airframe
 from planfly.api import surveying

@@ -9,7 +9,7 @@ import pytest
 import planfly
 from flight.mission.items import Frame, Mission, MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
-from logs.verdict.findings import verdict_json
+from logs.verdict.verdict import verdict_json
 from planfly.studio import edits, messages
 from planfly.studio.documents import World, open_document, open_dropped, straight_plan
 from planfly.studio.kept import mission_data, mission_from

@@ -1,7 +1,8 @@
 """Several autopilots' verdicts on one mission, as a table."""
 
-from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.findings import Finding, make_finding
 from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
 from planfly.terminal.autopilot_table import autopilot_lines
 
 

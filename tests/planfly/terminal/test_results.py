@@ -7,8 +7,9 @@ import pytest
 
 from logs.recording.reader import read_log
 from logs.verdict.conditions import setup_conditions
-from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.findings import Finding, make_finding
 from logs.verdict.places import FLIGHT, Change, Place
+from logs.verdict.verdict import Verdict
 from planfly.cli import main
 from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import error_text

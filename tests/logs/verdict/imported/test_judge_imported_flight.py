@@ -10,9 +10,9 @@ import pytest
 
 from flight.simulation.setup import Damage, Heights, ImportedLog, RowFaults
 from logs.importers.raw_log import LogSeries, ModeChange, RawLog, example_raw_log
-from logs.verdict.findings import verdict_json
 from logs.verdict.imported.judge_imported_flight import damage_text, heights_text, rows_text
 from logs.verdict.judge_flight import judge_flight
+from logs.verdict.verdict import verdict_json
 from planfly.imported_flights import ImportOptions
 from tests.logs.importers.judged_flights import judged, outcome, reasons
 

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.rules import go_around_rule
+from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import of
 from tests.logs.verdict.rules.test_ground_ways_rule import (
     POINT,

@@ -14,8 +14,9 @@ from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import load_parameters
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import GROUND_WAY, Finding, Verdict
+from logs.verdict.findings import GROUND_WAY, Finding
 from logs.verdict.judge_geometry import judge_geometry
+from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, setup_of, wp
 from tests.soak import scaled

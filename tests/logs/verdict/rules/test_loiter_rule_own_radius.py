@@ -15,8 +15,8 @@ from flight.autopilots.arduplane.parameters import load_parameters
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
-from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.verdict import Verdict
 from planfly.airframe import bank_limit, load_airframe
 from planfly.make_plan import make_setup
 from tests.logs.verdict.judging import of

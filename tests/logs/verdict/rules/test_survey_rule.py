@@ -13,8 +13,9 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import default_parameters
 from flight.mission.items import Camera, SurveyPlan
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import failing, judge, leg
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import bank_radius, fly_path, make_setup

@@ -15,8 +15,9 @@ from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
-from logs.verdict.findings import Finding, Verdict
+from logs.verdict.findings import Finding
 from logs.verdict.places import FLIGHT, Place
+from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text
 from logs.views.report.page import write_report
 from world.scenario import from_spec

@@ -12,8 +12,9 @@ from scipy.spatial import KDTree
 
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
-from logs.verdict.findings import Verdict, make_finding
+from logs.verdict.findings import make_finding
 from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
 from logs.views.compare import NamedFlight
 from logs.views.report.compare import (
     Comparison,

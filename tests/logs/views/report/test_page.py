@@ -16,8 +16,8 @@ import pytest
 from plotly.offline import get_plotlyjs
 
 import logs.views.figures
-from logs.verdict.findings import Verdict
 from logs.verdict.places import Place
+from logs.verdict.verdict import Verdict
 from logs.views.figures import FIGURES, View, figure_views, subject_of
 from logs.views.report.page import (
     CHART_SCRIPTS,

@@ -12,10 +12,11 @@ from flight.autopilots.arduplane.parameters import default_parameters
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import MissionStretch
 from logs.recording.example_log import example_log
-from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import flown_legs
 from logs.verdict.imported.model_comparison import Spread, compare_with_model
 from logs.verdict.places import FLIGHT, Change, DecidingParameter, LevelAnswer, LevelName, Place
+from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text
 from logs.views.report.text import (
     badge_of,

@@ -1,0 +1,151 @@
+"""The data classes of ``verdict.json``: a verdict with the words for people, of which its JSON schema is made.
+
+`logs.verdict.verdict.Verdict.document` fills them.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Final, Literal
+
+from flight.autopilots.autopilot import AutopilotProgram, Parameters
+from logs.verdict.conditions import Conditions
+from logs.verdict.findings import Fact, Finding
+from logs.verdict.places import DecidingParameter, Disagreement, LevelAnswer, Place, Suggestion
+from logs.verdict.wording import deciding_text, disagreement_text
+from world.json_schema import DocumentConfig
+
+SCHEMA: Final = "planfly.verdict/3"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FindingDocument(DocumentConfig):
+    """One rule at one place."""
+
+    rule: str
+    where: str
+    """The place in words."""
+    place: Place
+    planned: float | None
+    flown: float | None
+    limit: float | None
+    limit_source: str
+    """Whose the limit is: scenario, aircraft, mission, autopilot, default, ..."""
+    tolerance: float | None
+    margin: float | None
+    """Distance inside the limit; negative: beyond the limit."""
+    unit: str
+    """Of planned, flown, limit, tolerance and margin."""
+    method: str
+    ok: bool | None
+    """null: not judged, and the reason says why."""
+    reason: str
+    suggestions: tuple[Suggestion, ...]
+    """Alternatives, each of changes to make together; any would pass."""
+    brief: str
+    placed: bool
+    check: str
+    facts: tuple[Fact, ...]
+    suggestion: str
+    """The suggestions in words."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LevelDocument(DocumentConfig):
+    """The answer of one level: geometry, airframe or autopilot."""
+
+    name: str
+    flyable: bool
+    undecided: bool
+    headline: str
+    disagreements: tuple[str, ...]
+    differences: tuple[Disagreement, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecidingDocument(DocumentConfig):
+    """The parameter of the autopilot that decides."""
+
+    name: str
+    current: float
+    passing: float
+    unit: str
+    rule: str
+    place: Place
+    off: float | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterDocument(DocumentConfig):
+    """A parameter in the autopilot's unit, and who states it."""
+
+    name: str
+    value: float
+    origin: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParametersDocument(DocumentConfig):
+    """Parameters of the autopilot that flew."""
+
+    file: str
+    values: tuple[ParameterDocument, ...]
+    unused: tuple[str, ...]
+    not_flown: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VerdictDocument(DocumentConfig):
+    """The verdict on a plan, a mission or a flight; the content of verdict.json."""
+
+    schema: Literal["planfly.verdict/3"]
+    level: str
+    """flown, geometric (without a flight) or plan (no feasible plan, so nothing was flown)."""
+    flyable: bool
+    complete: bool
+    answer: str
+    """flyable, not flyable, incomplete or not judged in full; of an imported flight flown as planned or not."""
+    undecided: bool
+    """True if nothing failed, and something was not judged that had to be."""
+    summary: str
+    """Lines for a person, of which the first answers the question."""
+    conditions: Conditions | None
+    """What the verdict holds for; null if that is not known."""
+    flown_by: AutopilotProgram | None
+    parameters: ParametersDocument | None
+    levels: tuple[LevelDocument, ...]
+    deciding_parameter: DecidingDocument | None
+    findings: tuple[FindingDocument, ...]
+
+
+def finding_document(finding: Finding) -> FindingDocument:
+    """Add the words for the place and the suggestions to a finding."""
+    data = {field.name: getattr(finding, field.name) for field in fields(finding)}
+    return FindingDocument(**data, where=finding.where, suggestion=finding.suggestion)
+
+
+def level_document(level: LevelAnswer) -> LevelDocument:
+    """Add the words for the disagreements to a level's answer."""
+    return LevelDocument(
+        name=level.name,
+        flyable=level.flyable,
+        undecided=level.undecided,
+        headline=level.headline,
+        disagreements=tuple(map(disagreement_text, level.disagreements)),
+        differences=level.disagreements,
+    )
+
+
+def deciding_document(deciding: DecidingParameter) -> DecidingDocument:
+    """Add the words to the parameter that decides."""
+    data = {field.name: getattr(deciding, field.name) for field in fields(deciding)}
+    return DecidingDocument(**data, text=deciding_text(deciding))
+
+
+def parameters_document(parameters: Parameters) -> ParametersDocument:
+    """List each parameter's value and origin, and the names in the file that have no effect."""
+    return ParametersDocument(
+        file=parameters.source,
+        values=tuple(ParameterDocument(**value._asdict()) for value in parameters.values),
+        unused=tuple(parameters.unused),
+        not_flown=tuple(parameters.not_flown),
+    )

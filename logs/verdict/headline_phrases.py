@@ -1,0 +1,80 @@
+"""A failed finding as a headline names it: the rule, the place, and the numbers or the reason in brief."""
+
+from collections.abc import Callable
+
+from logs.verdict.findings import Finding
+from logs.verdict.wording import UNITS, place_text, shortened
+
+# Makes the phrase of a failed finding; its first argument is what a person calls the rule.
+HeadlinePhrase = Callable[[str, Finding], str]
+
+
+def _with_place(noun: str, item: Finding, text: str) -> str:
+    """Join a rule's noun, the place unless it is the whole flight, and a text in brackets."""
+    if item.place.kind == "flight":
+        return f"{noun} ({text})"
+    return f"{noun} {'at' if item.place.kind == 'waypoint' else 'on'} {place_text(item.place)} ({text})"
+
+
+def name_reason(noun: str, item: Finding) -> str:
+    """Name the place and the reason in brief."""
+    return _with_place(noun, item, shortened(item.brief))
+
+
+def name_event(noun: str, item: Finding) -> str:
+    """Name the reason in brief, of an event that ends the flight wherever it is."""
+    return f"{noun} ({shortened(item.brief)})"
+
+
+def name_shortfall(noun: str, item: Finding) -> str:
+    """Compare the flown value, or else the planned value, with a limit that is a least value."""
+    low = item.planned if item.flown is None else item.flown
+    if low is None or item.limit is None:
+        return name_reason(noun, item)
+    unit = UNITS.get(item.unit, "")
+    return _with_place(noun, item, f"{low:.1f}{unit} < {item.limit:.1f}{unit}")
+
+
+def name_excess(noun: str, item: Finding) -> str:
+    """Compare the worse of planned and flown value with the limit, or name the reason if neither is beyond it."""
+    values = [value for value in (item.flown, item.planned) if value is not None]
+    worst = max(values, key=abs, default=None)
+    if item.limit is None or worst is None or abs(worst) <= abs(item.limit):
+        return name_reason(noun, item)
+    unit = UNITS.get(item.unit, "")
+    return _with_place(noun, item, f"{worst:.1f}{unit} {'>' if worst > 0.0 else '<'} {item.limit:.1f}{unit}")
+
+
+def name_circle(noun: str, item: Finding) -> str:
+    """Compare the radius of a circle that is too small with the least radius."""
+    if item.planned is None or item.limit is None or item.planned >= item.limit:
+        return name_excess(noun, item)
+    return _with_place(noun, item, f"radius {item.planned:.0f} m < {item.limit:.0f} m")
+
+
+def name_zone(noun: str, item: Finding) -> str:
+    """Name a violated zone and the depth of the violation."""
+    if not item.place.name:
+        return name_excess(noun, item)
+    depth = max(item.flown or 0.0, item.planned or 0.0)
+    return f"{place_text(item.place)} violated ({depth:.1f} m beyond it)"
+
+
+def name_missile(_noun: str, item: Finding) -> str:
+    """Name the missile and the time inside its sphere; a missile without a name is "threat 3 (missile)"."""
+    where = place_text(item.place)
+    named = f"threat {where}" if item.place.name else where
+    return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
+
+
+def name_photo_line(noun: str, item: Finding) -> str:
+    """Compare the usable share of a photo line, or the overlap of its photos, with the least share."""
+    return name_shortfall(item.check or noun, item)
+
+
+def name_missed_waypoint(_noun: str, item: Finding) -> str:
+    """Name a missed waypoint and the distance at which it was passed."""
+    if item.flown is not None and item.brief != item.reason:
+        return f"{place_text(item.place)} {item.brief}"
+    over = item.flown is not None and item.limit is not None and item.flown > item.limit
+    return f"{place_text(item.place)} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if over else "")

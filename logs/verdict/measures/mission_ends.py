@@ -1,0 +1,29 @@
+"""The takeoff and the landing that PX4 requires of a mission."""
+
+from flight.autopilots.autopilot import MissionChecks
+from flight.mission.items import LANDINGS, TAKEOFFS, Mission
+
+# What each value of MIS_TKO_LAND_REQ requires.
+_REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "both or neither", 5: "both or neither"}
+
+
+def missing_ends_text(mission: Mission, limits: MissionChecks) -> str:
+    """Return what PX4 says about a missing takeoff or landing, as a sentence, or "" if nothing is missing.
+
+    >>> missing_ends_text(Mission(None, ()), MissionChecks(requires=2))
+    "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
+    """
+    takeoff = any(item.command in TAKEOFFS for item in mission.items)
+    land = any(item.command in LANDINGS for item in mission.items)
+    enough = {0: True, 1: takeoff, 2: land, 3: takeoff and land}.get(limits.requires, takeoff == land)
+    if enough:
+        return ""
+    if limits.requires == MissionChecks().requires and not limits.stated:
+        return "PX4's fixed-wing default refuses a mission without a landing: add one, or set MIS_TKO_LAND_REQ 0"
+    wanted = f"MIS_TKO_LAND_REQ {limits.requires} asks for {_REQUIRED[limits.requires]}"
+    return f"{wanted}, and this has {_present_ends(takeoff, land)}"
+
+
+def _present_ends(takeoff: bool, land: bool) -> str:
+    present = [name for name, there in (("a takeoff", takeoff), ("a landing", land)) if there]
+    return " and ".join(present) or "neither a takeoff nor a landing"

@@ -1,0 +1,13 @@
+"""A verdict as a small table for a notebook."""
+
+from logs.verdict.presentation import Presentation
+from world.html_table import html_table
+
+
+def verdict_html(verdict: Presentation) -> str:
+    """Write the headline, a row for each rule, and a row for each finding that fails, with what would pass."""
+    rows: list[tuple[str, ...]] = []
+    for rule in verdict.rules:
+        rows.append((rule.words.title, rule.count_text, "", ""))
+        rows += [("", one.where, one.reason, one.suggestion) for one in rule.findings if one.ok is False]
+    return html_table(verdict.headline, rows, ("rule", "result", "reason", "would pass"))

@@ -1,0 +1,96 @@
+"""A verdict in the order in which it is shown: by rule, the failed findings first, and the findings that are left open.
+
+Terminal, report page, notebook, studio and JUnit read a `Presentation`, which `logs.verdict.verdict.Verdict.present`
+makes.  It holds data; `logs.verdict.wording` makes words of places and suggestions.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from logs.verdict.findings import Finding, closest_to_limit, left_open
+from logs.verdict.rule_words import RULE_WORDS, RuleWords
+
+
+@dataclass(frozen=True, slots=True)
+class RuleFindings:
+    """The findings of one rule, in the verdict's order."""
+
+    words: RuleWords
+    findings: tuple[Finding, ...]
+
+    @property
+    def failed(self) -> tuple[Finding, ...]:
+        """The failed findings, the worst first."""
+        return tuple(sorted((item for item in self.findings if item.ok is False), key=lambda item: item.margin or 0.0))
+
+    @property
+    def judged(self) -> int:
+        """Number of findings that were judged."""
+        return sum(item.ok is not None for item in self.findings)
+
+    @property
+    def closest(self) -> Finding | None:
+        """The failed finding that is furthest beyond its limit, else the finding closest to its limit."""
+        return closest_to_limit(self.findings)
+
+    @property
+    def count_text(self) -> str:
+        """The number of findings that pass, of those that were judged."""
+        return f"{self.judged - len(self.failed)} of {self.judged} ok" if self.judged else "not judged"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Presentation:
+    """A verdict as readers meet it.
+
+    headline: the answer in a line.  details: the other lines of the summary.
+    state: "ok", "open" (nothing failed, and a part was not judged) or "fail".
+    findings: in the verdict's order.  rules: the findings by rule, in the order of `RULE_WORDS`.
+    zones: number of zones of airspace that the verdict judges by.
+    """
+
+    headline: str
+    details: tuple[str, ...]
+    state: str
+    findings: tuple[Finding, ...]
+    rules: tuple[RuleFindings, ...]
+    zones: int
+
+    @property
+    def failed_rules(self) -> tuple[RuleFindings, ...]:
+        """The rules with failed findings, in the order of the headline."""
+        failed = [rule for rule in self.rules if rule.failed]
+        return tuple(sorted(failed, key=lambda rule: -rule.words.urgency))
+
+    @property
+    def left_open(self) -> tuple[Finding, ...]:
+        """The findings that are not judged, so that the verdict is left open."""
+        return left_open(self.findings)
+
+    def worth_listing(self, most: int) -> list[tuple[int, Finding]]:
+        """List findings with their numbers: those that failed or are left open, then the closest to its limit by rule.
+
+        most: number of failed and open findings at most.
+        """
+        is_open = {id(item) for item in self.left_open}
+        closest = {id(rule.closest) for rule in self.rules}
+        numbered = list(enumerate(self.findings))
+        first = [(k, item) for k, item in numbered if item.ok is False or id(item) in is_open]
+        rest = [(k, item) for k, item in numbered if item.ok is True and id(item) in closest]
+        return [*first[:most], *rest]
+
+
+def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:
+    """Group findings by rule in the order of `RULE_WORDS`; a rule without findings is left out.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> beyond = {0: 2.0, 1: 5.0}
+    >>> slopes = [make_finding("slope", Place("leg", k), ok=False, reason="", margin=-m) for k, m in beyond.items()]
+    >>> [[finding.place.index for finding in rule.failed] for rule in findings_by_rule(slopes)]
+    [[1, 0]]
+    """
+    grouped: dict[str, list[Finding]] = {name: [] for name in RULE_WORDS}
+    for item in findings:
+        grouped[item.rule].append(item)
+    return tuple(RuleFindings(RULE_WORDS[name], tuple(group)) for name, group in grouped.items() if group)

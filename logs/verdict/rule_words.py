@@ -1,0 +1,300 @@
+"""The words of each rule of the verdict, and nothing that judges: name, title, question, unit, scale and urgency.
+
+`logs.verdict.rules.registry.RULES` holds how each rule judges.  Everything that shows a verdict reads this table.
+"""
+
+from dataclasses import dataclass
+
+from logs.verdict.headline_phrases import (
+    HeadlinePhrase,
+    name_circle,
+    name_event,
+    name_excess,
+    name_missed_waypoint,
+    name_missile,
+    name_photo_line,
+    name_reason,
+    name_shortfall,
+    name_zone,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """The quantity whose distance to the limit is a rule's margin, and the scale that ranks flights by it.
+
+    of: the quantity that is compared with the limit, in words.
+    unit: of quantity, limit and margin.
+    scale: a difference that a person would call noticeable, in that unit.  It ranks flights and marks a narrow pass,
+    and decides no verdict.  None for a count, a time or a limit of geometry, which do not say how close a flight was.
+    """
+
+    of: str
+    unit: str
+    scale: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RuleWords:
+    """The words of a rule.
+
+    name: in findings, in file formats, and in the columns of a campaign's table.
+    title: heads the rule's findings in tables.  noun: names the rule within a sentence; "" for its name.
+    asks: the question that the rule answers, one sentence.
+    margin: None for a rule without a number of its own.
+    urgency: a headline names failures of a greater urgency first.
+    phrase: makes the phrase of a failed finding in a headline.
+    unjudged: names what was not judged in the headline of a flyable verdict; "" to omit it.
+    unjudged_of: the unit in which the headline numbers findings that were not judged.
+    explained: True if the summary states why the rule was not judged.
+    warns: True if the rule's findings are warnings, which decide no verdict.
+    """
+
+    name: str
+    title: str
+    noun: str = ""
+    asks: str
+    margin: Margin | None
+    urgency: int = 0
+    phrase: HeadlinePhrase = name_excess
+    unjudged: str = ""
+    unjudged_of: str = "legs"
+    explained: bool = False
+    warns: bool = False
+
+    @property
+    def word(self) -> str:
+        """The rule's name for people, within a sentence or in a table; `name` is its name in data."""
+        return self.noun or self.name
+
+    @property
+    def scale(self) -> float | None:
+        """The margin's scale in the margin's unit, or None if the margin ranks no flights."""
+        return None if self.margin is None else self.margin.scale
+
+    @property
+    def margin_column(self) -> str:
+        """Column of a campaign's table with the least margin of each flight."""
+        return f"margin_{self.name}"
+
+    @property
+    def place_column(self) -> str:
+        """Column of a campaign's table with the place of the least margin."""
+        return f"place_{self.name}"
+
+
+# The words of every rule by its name, in the order in which a verdict judges and lists the rules.
+RULE_WORDS: dict[str, RuleWords] = {
+    words.name: words
+    for words in (
+        RuleWords(
+            name="mission",
+            title="mission",
+            asks="Would an autopilot take the mission's items, and does its route keep to its own fence?",
+            margin=None,
+            urgency=2,
+        ),
+        RuleWords(
+            name="turn",
+            title="turns",
+            asks="Can each corner be turned, and was it?",
+            margin=Margin("course change", "deg"),
+        ),
+        RuleWords(
+            name="loiter",
+            title="loiters",
+            asks="Can each circle be held at the bank limit in this wind, and was it flown to its end?",
+            margin=Margin("radius", "m", 10.0),
+            phrase=name_circle,
+        ),
+        RuleWords(
+            name="slope",
+            title="slopes",
+            asks="Can each leg be climbed or descended at its airspeed in this wind, and was it?",
+            margin=Margin("slope", "deg", 1.0),
+            urgency=1,
+        ),
+        RuleWords(
+            name="clearance",
+            title="clearance",
+            asks="Does each leg stay the required height above the ground?",
+            margin=Margin("height above ground", "m", 10.0),
+            phrase=name_shortfall,
+            unjudged="terrain",
+            explained=True,
+        ),
+        RuleWords(
+            name="height",
+            title="heights",
+            asks="Does each leg stay below the largest height above ground and the ceiling?",
+            margin=Margin("height above ground", "m", 10.0),
+            unjudged="heights above ground",
+            explained=True,
+        ),
+        RuleWords(
+            name="fence",
+            title="zones",
+            asks="Do path and flight keep out of exclusions and within inclusions?",
+            margin=Margin("depth", "m", 10.0),
+            phrase=name_zone,
+            unjudged="airspace",
+            unjudged_of="zones",
+            explained=True,
+        ),
+        RuleWords(
+            name="threat",
+            title="threats",
+            asks="Do path and flight stay outside each missile's sphere?",
+            margin=Margin("time inside", "s"),
+            phrase=name_missile,
+            explained=True,
+        ),
+        RuleWords(
+            name="bounds",
+            title="bounds",
+            asks="Does the flight stay inside the area's box, above its floor and below its ceiling?",
+            margin=Margin("distance inside", "m", 10.0),
+            phrase=name_shortfall,
+            explained=True,
+        ),
+        RuleWords(
+            name="waypoint",
+            title="waypoints",
+            asks="Was each waypoint reached, by the radius that the mission or the autopilot has for it?",
+            margin=Margin("closest approach", "m", 10.0),
+            phrase=name_missed_waypoint,
+        ),
+        RuleWords(
+            name="corridor",
+            title="corridor",
+            asks="How far from the legs did the flight get, its turns included?",
+            margin=Margin("distance from the legs", "m", 10.0),
+        ),
+        RuleWords(
+            name="survey",
+            title="photo lines",
+            noun="photo line",
+            asks="How much of each photo line of a survey is flown so that its photos can be used?",
+            margin=Margin("share of the photo line", "%", 5.0),
+            phrase=name_photo_line,
+        ),
+        RuleWords(
+            name="speed",
+            title="airspeed",
+            asks="Is each leg's commanded airspeed one of level flight, and does the wind leave a way along the leg?",
+            margin=Margin("airspeed", "m/s", 1.0),
+            phrase=name_reason,
+            unjudged="airspeed",
+        ),
+        RuleWords(
+            name="stall",
+            title="stall",
+            asks="Is the airspeed above the stall in the bank that is flown?",
+            margin=Margin("airspeed", "m/s", 1.0),
+        ),
+        RuleWords(
+            name="takeoff",
+            title="take-off",
+            noun="take-off",
+            asks="Can the aircraft climb from the ground at home to the take-off item's place?",
+            margin=Margin("slope", "deg"),
+            unjudged="take-off",
+            explained=True,
+        ),
+        RuleWords(
+            name="climbout",
+            title="climb-out",
+            noun="climb-out",
+            asks="Is the way up from home to the mission's first place free of ground, missiles and zones?",
+            margin=Margin("height above ground", "m", 10.0),
+            phrase=name_reason,
+            unjudged="climb-out",
+            explained=True,
+        ),
+        RuleWords(
+            name="launch",
+            title="launch",
+            asks="Does the launch start the motor, leave its runway in time, lose no height, and climb out free of"
+            " obstacles?",
+            margin=Margin("height above ground", "m", 10.0),
+            phrase=name_reason,
+            unjudged="launch",
+            explained=True,
+        ),
+        RuleWords(
+            name="landing",
+            title="landing",
+            asks="Can the aircraft descend from the last waypoint to the landing place?",
+            margin=Margin("slope", "deg"),
+            unjudged="landing",
+            explained=True,
+        ),
+        RuleWords(
+            name="approach",
+            title="approach",
+            asks="Is the glide to the landing point free of ground, missiles and zones?",
+            margin=Margin("height above ground", "m", 10.0),
+            phrase=name_reason,
+            unjudged="approach",
+            explained=True,
+        ),
+        RuleWords(
+            name="touchdown",
+            title="touchdown",
+            asks="Does the aircraft touch down and come to rest on the strip, on a final free of ground, missiles and"
+            " zones?",
+            margin=Margin("strip", "m", 20.0),
+            phrase=name_reason,
+            unjudged="touchdown",
+            explained=True,
+        ),
+        RuleWords(
+            name="go_around",
+            title="go-around",
+            noun="go-around",
+            asks="Would a go-around from anywhere on the glide stay clear of ground, missiles and zones?",
+            margin=None,
+            phrase=name_reason,
+            warns=True,
+        ),
+        RuleWords(
+            name="return",
+            title="return",
+            asks="Where does the return to launch go, how, and did the flight get there?",
+            margin=None,
+        ),
+        RuleWords(
+            name="energy",
+            title="energy",
+            asks="Does the flight leave the battery's or the tank's reserve?",
+            margin=Margin("energy", "Wh", 50.0),
+            explained=True,
+        ),
+        RuleWords(
+            name="departure",
+            title="loss of control",
+            noun="loss of control",
+            asks="Are all numbers finite, bank and airspeed those of a flight, and the ground never touched?",
+            margin=Margin("largest bank", "deg", 10.0),
+            urgency=4,
+            phrase=name_event,
+        ),
+        RuleWords(
+            name="completion",
+            title="completion",
+            asks="Was the plan feasible, flown to its last waypoint, and recorded in full without contradiction?",
+            margin=Margin("flown", "legs"),
+            urgency=3,
+            phrase=name_event,
+        ),
+    )
+}
+
+
+def rule_word(name: str) -> str:
+    """Return the rule's name for people; a name that is not in `RULE_WORDS` is returned as it is.
+
+    >>> rule_word("departure"), rule_word("slope")
+    ('loss of control', 'slope')
+    """
+    return RULE_WORDS[name].word if name in RULE_WORDS else name

@@ -1,0 +1,205 @@
+"""The verdict: findings, and the two questions that they answer, is the plan flyable and was it flown to its end."""
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from flight.autopilots.autopilot import AutopilotProgram, Parameters
+from logs.verdict.conditions import Conditions
+from logs.verdict.document import (
+    SCHEMA,
+    VerdictDocument,
+    deciding_document,
+    finding_document,
+    level_document,
+    parameters_document,
+)
+from logs.verdict.findings import BESIDE_FLIGHT, Finding, left_open
+from logs.verdict.junit import junit_text
+from logs.verdict.notebook import verdict_html
+from logs.verdict.places import DecidingParameter, LevelAnswer
+from logs.verdict.presentation import Presentation, findings_by_rule
+from world.extras import need_extra
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Verdict:
+    """Whether a plan really flies.
+
+    flyable: complete, and no finding failed.
+    complete: the plan was feasible, flown to its end, and recorded whole (at the geometric level: feasible, or a
+    mission that a person brought).
+    lines: the summary for a person, of which the first, the headline, answers the question.
+    level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
+    flown).
+    levels: what each level says that was asked, geometry first, the verdict's own last; none of a plan that was not
+    flown.
+    deciding: the autopilot's parameter that decides, where the flight fails by one and the aircraft passes.
+    notes: what is not flown as the mission has it; the lines say it too.
+    leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
+    it did not get to; empty where too little was recorded to tell.
+    program: of a flown verdict, the real autopilot that flew, None where none did.
+    parameters: of a flown verdict, those of the ArduPlane that flew, by its law or itself; None where none did.
+    unjudged: what was not judged, so that the flight is not flyable although nothing failed; "" for nothing: items that
+    the log of an imported flight lacks, its end, or slopes that the aircraft is not known well enough for.
+    imported: of a flight that another program logged, which was flown as planned or was not.
+    conditions: what it is for: aircraft, speed, weather, navigation, autopilot, ground; the lines say it too.
+
+    >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
+    >>> verdict.headline, verdict.summary.count("Start")
+    ('flyable', 1)
+    >>> verdict
+    <Verdict flown: flyable; 0 findings, 0 failed>
+    """
+
+    findings: tuple[Finding, ...]
+    flyable: bool
+    complete: bool
+    lines: tuple[str, ...]
+    level: str
+    levels: tuple[LevelAnswer, ...] = ()
+    deciding: DecidingParameter | None = None
+    notes: tuple[str, ...] = ()
+    leg_ends: tuple[float, ...] = ()
+    program: AutopilotProgram | None = None
+    parameters: Parameters | None = None
+    unjudged: str = ""
+    imported: bool = False
+    conditions: Conditions | None = None
+
+    @property
+    def answer(self) -> str:
+        """The verdict in a few words.
+
+        >>> Verdict((), flyable=False, complete=True, lines=(), level="flown", imported=True).answer
+        'not flown as planned'
+        """
+        if self.undecided:
+            return "not judged in full"
+        yes = "flown as planned" if self.imported else "flyable"
+        return yes if self.flyable else f"not {yes}" if self.complete else "incomplete"
+
+    @property
+    def undecided(self) -> bool:
+        """Whether nothing failed, and a part of the mission was not judged."""
+        return bool(self.unjudged) and not self.failed
+
+    @property
+    def flies(self) -> bool:
+        """Whether it is flyable, but for ways from and to the ground and returns that are left open beside the flight.
+
+        >>> from dataclasses import replace
+        >>> from logs.verdict.findings import GROUND_WAY, make_finding
+        >>> from logs.verdict.places import Place
+        >>> open_way = make_finding("climbout", Place("waypoint", 0), ok=None, reason="", check=GROUND_WAY)
+        >>> verdict = Verdict((open_way,), flyable=False, complete=True, lines=(), level="flown", unjudged="a way")
+        >>> verdict.flies, replace(verdict, complete=False).flies
+        (True, False)
+        """
+        beside = all(item.check in BESIDE_FLIGHT for item in left_open(self.findings))
+        return self.flyable or (self.complete and self.undecided and beside)
+
+    @property
+    def headline(self) -> str:
+        """The answer in a line."""
+        return self.lines[0] if self.lines else ""
+
+    @property
+    def summary(self) -> str:
+        """All lines as one text."""
+        return "\n".join(self.lines)
+
+    @property
+    def failed(self) -> tuple[Finding, ...]:
+        """The findings that fail."""
+        return tuple(finding for finding in self.findings if finding.ok is False)
+
+    @property
+    def closest(self) -> dict[str, Finding]:
+        """By rule the failed finding that is furthest beyond its limit, else the one closest to it.
+
+        Rules without a finding that failed or was judged by a number are left out.
+
+        >>> from logs.verdict.findings import make_finding
+        >>> from logs.verdict.places import Place
+        >>> near, far = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (4.0, 9.0))
+        >>> verdict = Verdict((far, near), flyable=True, complete=True, lines=(), level="flown")
+        >>> verdict.closest["slope"].margin
+        4.0
+        """
+        closest = {rule.words.name: rule.closest for rule in findings_by_rule(self.findings)}
+        return {name: finding for name, finding in closest.items() if finding is not None}
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame`: a row a finding, in the verdict's order, NaN for numbers that it has none of.
+
+        Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
+        tolerance, margin, unit, limit_source, method, ok (None where it was not judged) and reason.
+        Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
+        """
+        need_extra("tables", "to_pandas() needs")
+        # An extra: nobody else needs it.
+        import pandas as pd
+
+        numbers = ("planned", "flown", "limit", "tolerance", "margin")
+        names = (*numbers, "unit", "limit_source", "method", "ok", "reason")
+        rows = [
+            [one.rule, one.place.kind, one.place.index, *(getattr(one, name) for name in names)]
+            for one in self.findings
+        ]
+        frame = pd.DataFrame(rows, columns=["rule", "place", "index", *names])
+        return frame.astype(dict.fromkeys(numbers, float))
+
+    def __repr__(self) -> str:
+        return f"<Verdict {self.level}: {self.answer}; {len(self.findings)} findings, {len(self.failed)} failed>"
+
+    def document(self) -> VerdictDocument:
+        """Return the content of ``verdict.json``: the verdict with its places and suggestions in words."""
+        return VerdictDocument(
+            schema=SCHEMA,
+            level=self.level,
+            flyable=self.flyable,
+            complete=self.complete,
+            answer=self.answer,
+            undecided=self.undecided,
+            summary=self.summary,
+            conditions=self.conditions,
+            flown_by=self.program,
+            parameters=None if self.parameters is None else parameters_document(self.parameters),
+            levels=tuple(map(level_document, self.levels)),
+            deciding_parameter=None if self.deciding is None else deciding_document(self.deciding),
+            findings=tuple(map(finding_document, self.findings)),
+        )
+
+    def present(self) -> Presentation:
+        """Return the verdict in the order in which it is shown."""
+        headline, *details = self.lines or ("",)
+        return Presentation(
+            headline=headline,
+            details=tuple(details),
+            state="ok" if self.flyable else "open" if self.undecided else "fail",
+            findings=self.findings,
+            rules=findings_by_rule(self.findings),
+            zones=0 if self.conditions is None else self.conditions.zones,
+        )
+
+    def to_junit(self, name: str) -> str:
+        """Write the verdict as JUnit XML, which continuous integration shows.  name: of what was judged."""
+        return junit_text({name: self.present()})
+
+    def _repr_html_(self) -> str:
+        """The verdict as a table for a notebook."""
+        return verdict_html(self.present())
+
+
+def verdict_json(verdict: Verdict) -> str:
+    """Write the verdict as the text of a ``verdict.json``.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> finding = make_finding("turn", Place("waypoint", 1, item=2), ok=True, reason="turns 30.0°", planned=30.0)
+    >>> written = json.loads(verdict_json(Verdict((finding,), True, True, ("flyable",), "flown")))
+    >>> written["schema"], written["summary"], written["findings"][0]["where"], written["findings"][0]["place"]["index"]
+    ('planfly.verdict/3', 'flyable', 'waypoint 1 (item 2)', 1)
+    """
+    return json.dumps(asdict(verdict.document()), indent=1, allow_nan=False) + "\n"
