@@ -14,7 +14,7 @@ from typing import Any
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight
-from flight.autopilots.px4.parameters import load_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.px4_sitl.autopilot import Px4Sitl
 from flight.autopilots.px4_sitl.flight import Px4Flight
 from flight.autopilots.sitl.flight import SitlFlight
@@ -68,7 +68,7 @@ def run() -> dict[str, Any]:
         return AutopilotFlight(mission(seed), aerosonde, arduplane_program(program), {})
 
     def px4(program: Path, seed: int) -> SitlFlight:
-        autopilot = Px4Sitl(load_parameters(aerosonde), binary=program)
+        autopilot = Px4Sitl(Px4Parameters.load(aerosonde), binary=program)
         return Px4Flight(replace(mission(seed), autopilot=autopilot), aerosonde, autopilot)
 
     found: dict[str, Any] = {}

@@ -21,7 +21,7 @@ from aircraft.data_sheet import FUEL_HEAT, TAIL, WING, AircraftClass, DataSheet,
 from aircraft.uncertainty import read_draws
 from benchmarks.flight import errors_of
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest, full_throttle, idle, straight
 from flight.simulation.simulate import simulate
@@ -99,7 +99,7 @@ def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float
     )  # fmt: skip
     setup = replace(setup, battery=aircraft.battery_energy / 3600.0)
     found = {}
-    for name, flown_by in (("planfly", setup.autopilot), ("arduplane", ArduPlane(load_parameters(aircraft)))):
+    for name, flown_by in (("planfly", setup.autopilot), ("arduplane", ArduPlane(ArduPilotParameters.load(aircraft)))):
         flown = simulate(replace(setup, autopilot=flown_by), aircraft)
         errors = errors_of(flown)
         found[name] = (flown.ended, errors.cross_max, errors.height_max)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft, load_aircraft
 from benchmarks.angles import angles
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.fdm import Fdm, Variation
 from flight.guidance.gains import Gains, load_gains
@@ -209,7 +209,7 @@ def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240, *, ardupilo
     ardupilot: whether ArduPlane's law flies, in place of planfly's guidance.
     """
     ratios, closed, bares = [], [], []
-    autopilot = ArduPlane(load_parameters(aerosonde())) if ardupilot else PlanflyGuidance()
+    autopilot = ArduPlane(ArduPilotParameters.load(aerosonde())) if ardupilot else PlanflyGuidance()
     for _ in range(rounds):
         setup = replace(windy(1), guidance_hz=cast("Any", guidance_hz), autopilot=autopilot)
         flight = Flight(setup, aerosonde())

@@ -40,12 +40,12 @@ def deciding_parameter(autopilot: Autopilot, findings: tuple[Finding, ...], pass
     passes the values between, by halves: the value that is named was flown and passed.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> from logs.verdict.findings import make_finding
     >>> from logs.verdict.places import Place
     >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
     >>> quick = lambda law: law.parameters.tecs_height_demand_time < 1.3
-    >>> found = deciding_parameter(ArduPlane(default_parameters()), (low,), quick)
+    >>> found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (low,), quick)
     >>> found.name, found.current, found.passing
     ('TECS_HDEM_TCONST', 3.0, 1.2)
     """

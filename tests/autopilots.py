@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from aircraft.catalog import load_aircraft
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.sitl import flight as sitl_flight
 
@@ -38,7 +38,7 @@ def _write_program(program: Path, fake: Path, fault: str) -> Path:
 
 def arduplane_program(program: Path) -> ArduPlaneSitl:
     """Return the autopilot of an ArduPlane program, with the aerosonde's parameters."""
-    return ArduPlaneSitl(load_parameters(load_aircraft("aerosonde")), binary=program)
+    return ArduPlaneSitl(ArduPilotParameters.load(load_aircraft("aerosonde")), binary=program)
 
 
 def shorten_run_in(patch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
 from aircraft.identification.performance import Performance, fastest_level, performance
 from aircraft.uncertainty import Draws, draws_text
-from flight.autopilots.arduplane.parameters import DEFINITIONS, logged_parameters
+from flight.autopilots.arduplane.parameters import DEFINITIONS, ArduPilotParameters
 from flight.dynamics.envelope_tables import load_envelope
 from flight.guidance.model_gains import gains_of_model, gains_text
 from flight.mission_files.wpl import waypoints_text
@@ -160,7 +160,7 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
     """
     old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     present = {definition.name for definition in DEFINITIONS.values()}
-    law, _ = logged_parameters(log.parameters, log.source)
+    law, _ = ArduPilotParameters.of_log(log.parameters, log.source)
     others = {
         name: value
         for name, value in log.parameters.items()

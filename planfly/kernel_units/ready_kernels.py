@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from aircraft.catalog import load_aircraft
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission_files.formats import parse_mission
@@ -89,7 +89,7 @@ def _make_problem() -> None:
 
 
 def _track() -> None:
-    tracking_error(default_parameters(), load_aircraft("aerosonde").airspeed, "gnss")
+    tracking_error(ArduPilotParameters.defaults(), load_aircraft("aerosonde").airspeed, "gnss")
 
 
 def _rank() -> None:

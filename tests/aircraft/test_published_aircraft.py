@@ -10,7 +10,7 @@ from aircraft.catalog import load_aircraft
 from aircraft.model_writer import model_xml
 from benchmarks.tuning.published_aircraft import PUBLISHED
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.characteristics import modes_at
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import fastest, linearise, slowest, straight
@@ -112,7 +112,7 @@ def test_it_flies(name: str, law: str) -> None:
     way = np.array([[0.0, 0.0, 500.0], [0.0, 400.0, 510.0], [300.0, 650.0, 520.0]])
     setup = setup_maker(aircraft)(way, speeds=aircraft.airspeed, wind=(3.0, 60.0), turbulence="light", bank_deg=35.0)
     if law == "arduplane":
-        setup = replace(setup, autopilot=ArduPlane(load_parameters(aircraft)))
+        setup = replace(setup, autopilot=ArduPlane(ArduPilotParameters.load(aircraft)))
     flown = simulate(setup, aircraft)
     assert flown.ended == "completed"
     if law == "planfly":

@@ -11,7 +11,7 @@ from aircraft.catalog import Aircraft
 from aircraft.data_sheet import DataSheet
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.characteristics import modes_at
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm, Variation
@@ -59,7 +59,7 @@ def test_it_flies(foam: Aircraft, law: str) -> None:
     way = np.array([[0.0, 0.0, 500.0], [0.0, 500.0, 520.0], [400.0, 800.0, 540.0], [900.0, 700.0, 520.0]])
     setup = setup_maker(foam)(way, speeds=15.0, wind=(3.0, 200.0), turbulence="light", bank_deg=35.0)
     if law == "arduplane":
-        setup = replace(setup, autopilot=ArduPlane(load_parameters(foam)))
+        setup = replace(setup, autopilot=ArduPlane(ArduPilotParameters.load(foam)))
     flown = simulate(setup, foam)
     assert flown.ended == "completed"
     if law == "planfly":

@@ -10,11 +10,11 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_parameters, load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import default_parameters as px4_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.live.telemetry import AUTO
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
@@ -80,7 +80,7 @@ class Flights:
 )
 def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> None:
     flights = Flights(lambda new: new.tecs_height_demand_time <= most)
-    found = deciding_parameter(ArduPlane(default_parameters()), (LOW, HEIGHTS), flights)
+    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (LOW, HEIGHTS), flights)
     assert found is not None
     assert (found.name, found.current, found.passing, found.unit) == ("TECS_HDEM_TCONST", 3.0, passing, "s")
     assert (found.rule, found.place, found.off) == ("clearance", LEG, -8.4)
@@ -94,7 +94,7 @@ def test_no_value_below_the_documented_range_is_named(present: float, passing: f
         assert isinstance(law, Px4)
         return law.parameters["FW_R_LIM"] > math.radians(present + 0.5)
 
-    law = Px4(px4_parameters("1.17")).with_parameters(FW_R_LIM=present)
+    law = Px4(Px4Parameters.defaults("1.17")).with_parameters(FW_R_LIM=present)
     found = deciding_parameter(law, (WIDE,), banks_further)
     assert found is not None
     assert (found.name, found.current, found.passing) == ("FW_R_LIM", present, passing)
@@ -103,16 +103,16 @@ def test_no_value_below_the_documented_range_is_named(present: float, passing: f
 def test_nothing_decides_how_a_mission_is_flown_that_is_not_taken() -> None:
     refused = make_finding("mission", Place("mission", item=1), ok=False, reason="")
     flights = Flights(lambda _: True)
-    assert deciding_parameter(ArduPlane(default_parameters()), (refused,), flights) is None
+    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (refused,), flights) is None
     assert flights.count == 0
 
 
 def test_what_failed_says_where_to_look_first() -> None:
     passes = Flights(lambda new: new.tecs_height_demand_time < 2.0 or new.navl1_period < 15.0)
-    found = deciding_parameter(ArduPlane(default_parameters()), (LOW,), passes)
+    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (LOW,), passes)
     assert found is not None
     assert found.name == "TECS_HDEM_TCONST"
-    found = deciding_parameter(ArduPlane(default_parameters()), (WIDE,), passes)
+    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), passes)
     assert found is not None
     assert (found.name, found.passing, found.off) == ("NAVL1_PERIOD", 14.0, 210.0)
 
@@ -126,20 +126,20 @@ def test_what_failed_says_where_to_look_first() -> None:
     ],
 )
 def test_both_ways(name: str, passes: Callable[[ArduPilotParameters], bool], passing: float) -> None:
-    found = deciding_parameter(ArduPlane(default_parameters()), (WIDE,), Flights(passes))
+    found = deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), Flights(passes))
     assert found is not None
     assert (found.name, found.passing) == (name, passing)
 
 
 def test_none_where_none_decides() -> None:
     flights = Flights(lambda new: False)
-    assert deciding_parameter(ArduPlane(default_parameters()), (WIDE,), flights) is None
+    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (WIDE,), flights) is None
     assert flights.count == 8
-    assert deciding_parameter(ArduPlane(default_parameters()), (HEIGHTS,), flights) is None
+    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (HEIGHTS,), flights) is None
 
 
 def test_a_value_beyond_the_farthest_is_not_tried() -> None:
-    quick = default_parameters().changed(TECS_HDEM_TCONST=1.0)
+    quick = ArduPilotParameters.defaults().changed(TECS_HDEM_TCONST=1.0)
     seen: list[float] = []
 
     def passes(new: ArduPilotParameters) -> bool:
@@ -152,7 +152,7 @@ def test_a_value_beyond_the_farthest_is_not_tried() -> None:
 
 def test_findings_that_pass_are_not_blamed() -> None:
     fine: Finding = make_finding("corridor", LEG, ok=True, reason="")
-    assert deciding_parameter(ArduPlane(default_parameters()), (fine,), lambda new: True) is None
+    assert deciding_parameter(ArduPlane(ArduPilotParameters.defaults()), (fine,), lambda new: True) is None
 
 
 # ----------------------------------------------------------------------
@@ -176,7 +176,7 @@ def over_a_hill(spare: float) -> FlightSetup:
     made = setup_maker(AIRCRAFT)(
         points, terrain={"kind": "peaks", "peak": [peak]}, limits={"min_clearance_m": REQUIRED}
     )
-    return replace(made, autopilot=ArduPlane(load_parameters(AIRCRAFT)))
+    return replace(made, autopilot=ArduPlane(ArduPilotParameters.load(AIRCRAFT)))
 
 
 @pytest.fixture(scope="module")
@@ -281,5 +281,5 @@ def test_planflys_guidance_has_no_flight_beside_it() -> None:
 
 
 def test_the_airframe_knows_where_it_is_whatever_the_autopilot_does() -> None:
-    lost = replace(over_a_hill(30.0), nav="gnss", autopilot=ArduPlane(default_parameters()))
+    lost = replace(over_a_hill(30.0), nav="gnss", autopilot=ArduPlane(ArduPilotParameters.defaults()))
     assert airframe_answer(lost, AIRCRAFT) == airframe_answer(replace(lost, nav="perfect"), AIRCRAFT)

@@ -20,11 +20,7 @@ from flight.autopilots.arduplane.parameters import (
     RELEASE,
     SIDE_CANDIDATES,
     ArduPilotParameters,
-    default_parameters,
-    load_parameters,
-    logged_parameters,
     speeds_flown,
-    stored_parameters,
 )
 from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.autopilots.autopilot import (
@@ -58,7 +54,7 @@ _OF_THE_WAY = (
 class ArduPlane(Autopilot):
     """ArduPlane's law: L1 along the legs, TECS for height and airspeed.
 
-    >>> made = ArduPlane(default_parameters())
+    >>> made = ArduPlane(ArduPilotParameters.defaults())
     >>> made.acceptance_radius, made.turn_distance(math.radians(45.0), 0.0), made.speed_limits[:2]
     (90.0, 45.0, (9.0, 22.0))
     """
@@ -78,12 +74,16 @@ class ArduPlane(Autopilot):
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
         """With the parameters of the person's file, of the aircraft, and ArduPlane's defaults."""
-        return cls(load_parameters(aircraft, table.params))
+        return cls(ArduPilotParameters.load(aircraft, table.params))
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
         """With the parameters that a log stores."""
-        return cls(default_parameters() if stored.parameters is None else stored_parameters(stored.parameters))
+        return cls(
+            ArduPilotParameters.defaults()
+            if stored.parameters is None
+            else ArduPilotParameters.restore(stored.parameters)
+        )
 
     def store(self) -> StoredAutopilot:
         """Its parameters."""
@@ -98,13 +98,13 @@ class ArduPlane(Autopilot):
         """ArduPlane with the log's parameters, for a log that any release of it wrote."""
         if not program.startswith("ArduP"):
             return None
-        made, notes = logged_parameters(parameters, source)
+        made, notes = ArduPilotParameters.of_log(parameters, source)
         return cls(made), notes
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
         """None: what the aircraft does not state has ArduPlane's defaults."""
-        load_parameters(aircraft)
+        ArduPilotParameters.load(aircraft)
         return []
 
     @property
@@ -180,7 +180,7 @@ class ArduPlane(Autopilot):
         On a field that is lower than home the flare would rise (`flight.autopilots.arduplane.ground_law`): there
         TECS_LAND_PMAX holds the nose down where nobody states it.
 
-        >>> made = ArduPlane(default_parameters()).as_asked(180.0, None, lands=True, lower=50.0)
+        >>> made = ArduPlane(ArduPilotParameters.defaults()).as_asked(180.0, None, lands=True, lower=50.0)
         >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland, round(made.parameters.landing_pitch_max, 4)
         (180.0, 1.0, -0.0175)
         """
@@ -213,7 +213,7 @@ class ArduPlane(Autopilot):
     def return_rules(self) -> ReturnRules:
         """By RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_*, TECS_SINK_MAX and GLIDE_SLOPE_MIN.
 
-        >>> made = ArduPlane(default_parameters().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
+        >>> made = ArduPlane(ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
         >>> made.return_rules.height, made.return_rules.climb_first, made.return_rules.rally_limit
         (nan, inf, 5000.0)
         >>> made.return_rules.lands
@@ -238,7 +238,7 @@ class ArduPlane(Autopilot):
     def loiter_rules(self) -> LoiterRules:
         """By WP_LOITER_RAD and the air's density, until it is within `REACHED_HEIGHT` of a height.
 
-        >>> rules = ArduPlane(default_parameters().changed(WP_LOITER_RAD=-80.0)).loiter_rules
+        >>> rules = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=-80.0)).loiter_rules
         >>> rules.radius, round(rules.growth(1300.0), 3)
         (-80.0, 1.135)
         """

@@ -71,8 +71,8 @@ def failsafe_causes(
     has_landing: whether it has a landing sequence; without one a landing is a return.
     ends_landed: whether it ends on the ground.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> made = default_parameters().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> made = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
     >>> for cause in failsafe_causes(made, has_fence=False):
     ...     print(cause.name, cause.parameter, cause.value, cause.does)
     the pilot's RTL  0 return

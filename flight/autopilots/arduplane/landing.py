@@ -23,10 +23,11 @@ def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float
 
     No landing is faster than the cruise, whatever TECS_LAND_ARSPD says.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> [landing_airspeed(default_parameters(), wind) for wind in (3.0, 0.0, -2.0, -8.0)]  # minimum 9, cruise 12
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> default = ArduPilotParameters.defaults()  # minimum 9, cruise 12
+    >>> [landing_airspeed(default, wind) for wind in (3.0, 0.0, -2.0, -8.0)]
     [10.5, 10.5, 11.5, 12.0]
-    >>> landing_airspeed(default_parameters().changed(TECS_LAND_ARSPD=14.0), 0.0)
+    >>> landing_airspeed(ArduPilotParameters.defaults().changed(TECS_LAND_ARSPD=14.0), 0.0)
     12.0
     """
     cruise, stated = parameters.airspeed_cruise, parameters.landing_airspeed
@@ -42,14 +43,14 @@ def landing_glide(height: float, run: float, ground_speed: float, parameters: Ar
     At 20 m/s over 600 m the sink from 54 m is 1.8 m/s, and the flare's two seconds 3.6 m; the flare lasts
     3.6 / (0.125 + 0.9) s, which is 70 m of way.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> glide = landing_glide(54.0, 600.0, 20.0, default_parameters())
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> glide = landing_glide(54.0, 600.0, 20.0, ArduPilotParameters.defaults())
     >>> [round(number, 3) for number in glide]
     [0.095, 3.6, 70.244]
 
     A flare at TECS_LAND_SINK alone, 0.05 m/s, counts as one at 0.1: 1 m, twice LAND_FLARE_ALT, takes 10 s.
 
-    >>> gentle = default_parameters().changed(TECS_LAND_SINK=0.05, LAND_FLARE_AIM=100.0, LAND_FLARE_ALT=0.5)
+    >>> gentle = ArduPilotParameters.defaults().changed(TECS_LAND_SINK=0.05, LAND_FLARE_AIM=100.0, LAND_FLARE_ALT=0.5)
     >>> [round(landing_glide(54.0, 600.0, 20.0, gentle)[k], 3) for k in (1, 2)]
     [1.0, 200.0]
     """

@@ -26,11 +26,11 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
 
     A rail of 6 m takes 0.6 s to 20 m/s, at 33 m/s^2; 10 m/s are 8.3 m/s^2.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> made = default_parameters().changed(TKOFF_THR_MINACC=15.0)
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> made = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)
     >>> [round(motor_start(v * v / 12.0, v, 0.2, made), 2) for v in (20.0, 10.0)]
     [-0.4, inf]
-    >>> motor_start(0.0, 0.0, 0.0, default_parameters()), motor_start(0.0, 0.0, 0.0, made)
+    >>> motor_start(0.0, 0.0, 0.0, ArduPilotParameters.defaults()), motor_start(0.0, 0.0, 0.0, made)
     (-inf, inf)
     """
     least, delay = parameters.takeoff_acceleration, parameters.takeoff_delay
@@ -60,8 +60,8 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
 def takeoff_slew(parameters: ArduPilotParameters) -> float:
     """How fast the throttle opens in a take-off, of its range a second; inf for at once.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> [takeoff_slew(default_parameters().changed(TKOFF_THR_SLEW=slew)) for slew in (0.0, -1.0, 50.0)]
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> [takeoff_slew(ArduPilotParameters.defaults().changed(TKOFF_THR_SLEW=slew)) for slew in (0.0, -1.0, 50.0)]
     [1.0, inf, 0.5]
     """
     if parameters.takeoff_slew < 0.0:
@@ -74,8 +74,8 @@ def run_up(starts: float, parameters: ArduPilotParameters) -> float:
 
     starts: what `motor_start` says.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> round(run_up(-math.inf, default_parameters()), 2), run_up(-0.4, default_parameters())
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> round(run_up(-math.inf, ArduPilotParameters.defaults()), 2), run_up(-0.4, ArduPilotParameters.defaults())
     (1.2, 0.0)
     """
     return parameters.takeoff_delay + 1.0 / takeoff_slew(parameters) if math.isinf(starts) and starts < 0.0 else 0.0

@@ -6,20 +6,15 @@ that states a parameter counts: the file that a person gives, the file `ardupilo
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters, find_misfits
-from flight.autopilots.parameter_files import Entry, parse_parameters, read_parameter_file
-from flight.autopilots.parameter_origin import ARDUPILOT, read_parameters_for, refuse_unknown
-from world.errors import ParameterError
-from world.files import TextLine
+from flight.autopilots.autopilot import Candidate
+from flight.autopilots.parameter_origin import ARDUPILOT
+from flight.autopilots.parameter_set import Definition, ParameterSet, ParameterTable
 from world.kernels import Record, record_dtype
 
 Floats = NDArray[np.float64]
@@ -27,31 +22,10 @@ Floats = NDArray[np.float64]
 
 # Whose law, parameters and defaults these are.
 RELEASE = "4.6"
-# Of an aircraft, beside its model: what ArduPlane has to be told of it.
-AIRCRAFT_FILE = "ardupilot.parm"
-
 _DEGREE = math.pi / 180.0
 _PERCENT = 0.01
 _CENTI = 0.01
 _KILOMETRE = 1000.0
-
-
-class Definition(NamedTuple):
-    """One parameter.
-
-    name: ArduPlane's.
-    default: ArduPlane's, in its unit.
-    low, high: what is taken, in that unit.
-    to_si: factor to SI and radians.
-    old: an older name, and the factor from its unit to that of the present name.
-    """
-
-    name: str
-    default: float
-    low: float
-    high: float
-    to_si: float = 1.0
-    old: tuple[str, float] | None = None
 
 
 # By the field of `ArduPilotParameters`.
@@ -158,15 +132,35 @@ _USUAL_LOITER_RADIUS = 60.0
 # Read, and no flight of ours shows it: a return is on a slope where this would have it follow the terrain.
 NOT_FLOWN = ("TERRAIN_FOLLOW",)
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
+# Parameters that should not fall from one to the next; ArduPlane does not compare them.
+_ORDERS = (
+    ("THR_MIN", "TRIM_THROTTLE", "THR_MAX"),
+    ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX"),
+    ("PTCH_LIM_MIN_DEG", "PTCH_TRIM_DEG", "PTCH_LIM_MAX_DEG"),
+    ("TECS_SINK_MIN", "TECS_SINK_MAX"),
+)
+# Minimum and maximum; the minimum must be lower.
+_PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
+TABLE = ParameterTable(ARDUPILOT, "ArduPlane", DEFINITIONS, pairs=_PAIRS, orders=_ORDERS)
 
 
 @dataclass(frozen=True, slots=True)
-class ArduPilotParameters:
-    """What ArduPlane flies with; all but the first three are those of `DEFINITIONS`, made of ``values``.
+class ArduPilotParameters(ParameterSet):
+    r"""The parameters that ArduPlane flies with; the fields are those of `DEFINITIONS`, made of ``values``.
 
-    values: every parameter that the law knows, in the order of `DEFINITIONS`.
-    unused: names that the file states and the law has no use for.
-    source: the file that a person gave, "" for none.
+    >>> default = ArduPilotParameters.defaults()
+    >>> default.wp_radius, default.tecs_height_demand_time
+    (90.0, 3.0)
+    >>> default.changed(ROLL_LIMIT_DEG=30.0).roll_limit == math.radians(30.0)
+    True
+    >>> ArduPilotParameters.of_text("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
+    ('FOO',)
+    >>> ArduPilotParameters.of_text("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").misfits
+    ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
+    >>> made, notes = ArduPilotParameters.of_log({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
+    >>> made.by_origin("file"), notes
+    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is taken',))
+
     navl1_period: s.  navl1_xtrack_i: 1/s.
     wp_radius: m, turns begin this far before a right angle.  wp_max_radius: m, 0 for none.
     wp_loiter_rad: m, of a loiter that states none, negative to the left.
@@ -214,10 +208,8 @@ class ArduPilotParameters:
         `flight.autopilots.arduplane.failsafes`.
     """
 
+    table: ClassVar[ParameterTable] = TABLE
     not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN
-    values: tuple[ParameterValue, ...]
-    unused: tuple[str, ...] = ()
-    source: str = ""
     navl1_period: float = field(init=False)
     navl1_damping: float = field(init=False)
     navl1_lim_bank: float = field(init=False)
@@ -310,38 +302,9 @@ class ArduPilotParameters:
     rudder_only: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Take the values to SI."""
+        """Convert the values to SI."""
         for (name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=True):
             object.__setattr__(self, name, parameter.value * definition.to_si)
-
-    @property
-    def beyond(self) -> tuple[str, ...]:
-        """Nothing: a value beyond its range is refused."""
-        return ()
-
-    @property
-    def misfits(self) -> tuple[str, ...]:
-        r"""Values of the file that contradict another parameter, in words; ArduPlane flies with them all the same.
-
-        >>> parameters_of("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").misfits
-        ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
-        """
-        return find_misfits(self.values, _ORDERS)
-
-    def changed(self, **values: float) -> "ArduPilotParameters":
-        """The same parameters but for these, by ArduPlane's names and in its units.
-
-        >>> default_parameters().changed(ROLL_LIMIT_DEG=30.0).roll_limit == math.radians(30.0)
-        True
-        """
-        kept = {parameter.name for parameter in self.values}
-        if unknown := sorted(set(values) - kept):
-            raise ValueError(f"{unknown[0]}: not a parameter of the law")
-        made = tuple(
-            parameter._replace(value=values[parameter.name], origin="file") if parameter.name in values else parameter
-            for parameter in self.values
-        )
-        return ArduPilotParameters(made, self.unused, self.source)
 
     @property
     def climbs_before_turn(self) -> bool:
@@ -352,7 +315,7 @@ class ArduPilotParameters:
     def follows_terrain_home(self) -> bool:
         """Whether a return follows the terrain: bit 0 or 4 of TERRAIN_FOLLOW.
 
-        >>> [default_parameters().changed(TERRAIN_FOLLOW=bits).follows_terrain_home for bits in (0, 1, 8, 16)]
+        >>> [ArduPilotParameters.defaults().changed(TERRAIN_FOLLOW=bits).follows_terrain_home for bits in (0, 1, 8, 16)]
         [False, True, False, True]
         """
         return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS | _FOLLOW_HOME))
@@ -361,7 +324,8 @@ class ArduPilotParameters:
     def has_fence_of_its_own(self) -> bool:
         """True if its fence is on, acts, and has a circle about home or altitudes.
 
-        >>> [default_parameters().changed(FENCE_ENABLE=1, FENCE_TYPE=kind).has_fence_of_its_own for kind in (4, 6)]
+        >>> default = ArduPilotParameters.defaults()
+        >>> [default.changed(FENCE_ENABLE=1, FENCE_TYPE=kind).has_fence_of_its_own for kind in (4, 6)]
         [False, True]
         """
         enabled = self.fence_enable > 0.0 or self.fence_auto_enable > 0.0
@@ -374,7 +338,7 @@ class ArduPilotParameters:
         RTL_RADIUS, or WP_LOITER_RAD where that is 1 m or less, or 60 m where both are; to the side of RTL_RADIUS if
         that is not 0 (`ModeRTL::navigate` in ArduPlane/mode_rtl.cpp, `Plane::update_loiter` in navigation.cpp).
 
-        >>> made = default_parameters()
+        >>> made = ArduPilotParameters.defaults()
         >>> [made.changed(RTL_RADIUS=m, WP_LOITER_RAD=-80.0).return_radius for m in (0.0, -150.0, 1.0)]
         [-80.0, -150.0, 80.0]
         >>> made.return_radius, made.changed(WP_LOITER_RAD=-1.0).return_radius
@@ -389,180 +353,12 @@ class ArduPilotParameters:
         size = abs(self.wp_loiter_rad)
         return math.copysign(size if size > 1.0 else _USUAL_LOITER_RADIUS, self.wp_loiter_rad)
 
-    def by_origin(self, origin: Origin) -> dict[str, float]:
-        """The values (in ArduPlane's units) that one source states, by name."""
-        return {name: value for name, value, stated in self.values if stated == origin}
-
     def record(self) -> Record:
         """The parameters for compiled code, as a record of `ARDUPILOT_PARAMETERS`."""
         record: Record = np.zeros(1, ARDUPILOT_PARAMETERS)[0]
         for name in DEFINITIONS:
             setattr(record, name, getattr(self, name))
         return record
-
-
-def default_parameters() -> ArduPilotParameters:
-    """ArduPlane's own values, whatever it flies.
-
-    >>> default_parameters().wp_radius, default_parameters().tecs_height_demand_time
-    (90.0, 3.0)
-    """
-    return _parameters([], "", ())
-
-
-def load_parameters(aircraft: Aircraft, path: Path | str | None = None) -> ArduPilotParameters:
-    """The parameters that an aircraft is flown with: of a file, of the aircraft, and ArduPlane's defaults.
-
-    Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
-
-    >>> from aircraft.catalog import load_aircraft
-    >>> load_parameters(load_aircraft("aerosonde")).wp_radius
-    90.0
-    """
-    stated: list[tuple[Origin, dict[str, float]]] = []
-    unused: tuple[str, ...] = ()
-    if path is not None:
-        entries = read_parameters_for(Path(path), ARDUPILOT)
-        values, unused = _known(entries)
-        refuse_unknown(Path(path), ARDUPILOT, entries, values)
-        stated.append(("file", values))
-    own = aircraft.folder / AIRCRAFT_FILE
-    if own.exists():
-        stated.append(("aircraft", _known(read_parameter_file(own))[0]))
-    return _parameters(stated, "" if path is None else str(path), unused)
-
-
-def parameters_of(text: str, source: str) -> ArduPilotParameters:
-    r"""The parameters of a file's text alone, with ArduPlane's defaults.  Raises ParameterError.
-
-    >>> parameters_of("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
-    ('FOO',)
-    """
-    values, unused = _known(parse_parameters(text, source))
-    return _parameters([("file", values)], source, unused)
-
-
-def stored_parameters(stored: StoredParameters) -> ArduPilotParameters:
-    """Parameters that were recorded, by their present names; those that were not yet known have their defaults.
-
-    Raises ParameterError for a value that is not allowed.
-
-    >>> stored_parameters(StoredParameters((ParameterValue("WP_RADIUS", 50.0, "file"),), (), "a.parm")).wp_radius
-    50.0
-    """
-    origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
-    for name, value, origin in stored.values:
-        if name in _BY_NAME:
-            definition, _ = _BY_NAME[name]
-            if not definition.low <= value <= definition.high:
-                raise _refused(stored.source, name, value, f"allowed {definition.low:g}..{definition.high:g}")
-            origins[origin][name] = value
-    return _parameters(list(origins.items()), stored.source, stored.unused)
-
-
-# What has to be in order, but that ArduPlane does not compare.
-_ORDERS = (
-    ("THR_MIN", "TRIM_THROTTLE", "THR_MAX"),
-    ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX"),
-    ("PTCH_LIM_MIN_DEG", "PTCH_TRIM_DEG", "PTCH_LIM_MAX_DEG"),
-    ("TECS_SINK_MIN", "TECS_SINK_MAX"),
-)
-# What has to be in order.
-_PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
-
-
-def logged_parameters(logged: Mapping[str, float], source: str) -> tuple[ArduPilotParameters, tuple[str, ...]]:
-    """The parameters of a flight log, by their names of any release, and what could not be used of them, in sentences.
-
-    A log without parameters has ArduPlane's defaults, and says so.  source: the log's file.
-
-    >>> made, notes = logged_parameters({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
-    >>> made.by_origin("file"), notes
-    ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is taken',))
-    """
-    values: dict[str, float] = {}
-    notes = []
-    for definition in DEFINITIONS.values():
-        old = definition.old
-        if definition.name in logged:
-            value = logged[definition.name]
-        elif old is not None and old[0] in logged:
-            value = logged[old[0]] * old[1]
-        else:
-            continue
-        if definition.low <= value <= definition.high:
-            values[definition.name] = value
-        else:
-            notes.append(f"{definition.name} {value:g} of the log is not allowed: the default is taken")
-    for low, high in _PAIRS:
-        if low in values and high in values and values[low] >= values[high]:
-            notes.append(f"{low} {values[low]:g} and {high} {values[high]:g} of the log: the defaults are taken")
-            del values[low], values[high]
-    if not values:
-        notes.append("the log holds no parameters: ArduPlane's defaults are taken")
-    stated = tuple(ParameterValue(name, value, "file") for name, value in values.items())
-    try:
-        return stored_parameters(StoredParameters(stated, (), source)), tuple(notes)
-    except ParameterError as error:
-        return default_parameters(), (*notes, f"{error}: ArduPlane's defaults are taken")
-
-
-def _parameters(
-    stated: list[tuple[Origin, dict[str, float]]], source: str, unused: tuple[str, ...]
-) -> ArduPilotParameters:
-    """Parameters of the first source that states each, and ArduPlane's default where none does."""
-
-    def found(definition: Definition) -> ParameterValue:
-        for origin, values in stated:
-            if definition.name in values:
-                return ParameterValue(definition.name, values[definition.name], origin)
-        return ParameterValue(definition.name, definition.default, "default")
-
-    made = ArduPilotParameters(tuple(map(found, DEFINITIONS.values())), unused, source)
-    if stated:
-        _check_order(made, source or AIRCRAFT_FILE)
-    return made
-
-
-def _check_order(made: ArduPilotParameters, source: str) -> None:
-    """Refuse a minimum that is not below its maximum."""
-    values = {name: value for name, value, _ in made.values}
-    for low, high in _PAIRS:
-        if values[low] >= values[high]:
-            value, allowed = values[low], f"must be below {high} {values[high]:g}"
-            message = f"{source}: {low} {value:g}: {allowed}"
-            raise ParameterError(message, file=source, field=low, value=value, allowed=allowed)
-
-
-# Definition and factor to its unit, by each name that a file may have.
-_BY_NAME = {definition.name: (definition, 1.0) for definition in DEFINITIONS.values()} | {
-    definition.old[0]: (definition, definition.old[1]) for definition in DEFINITIONS.values() if definition.old
-}
-
-
-def _known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Values by their present names and in their present units, and the names that the law has no use for."""
-    values: dict[str, float] = {}
-    unused = []
-    for name, entry in entries.items():
-        if name not in _BY_NAME:
-            unused.append(name)
-            continue
-        definition, factor = _BY_NAME[name]
-        value = entry.value * factor
-        if not definition.low <= value <= definition.high:
-            raise _refused(
-                entry.where, name, entry.value, f"allowed {definition.low / factor:g}..{definition.high / factor:g}"
-            )
-        if values.setdefault(definition.name, value) != value:
-            raise _refused(entry.where, name, entry.value, "the same parameter has another value under its other name")
-    return values, tuple(unused)
-
-
-def _refused(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
-    """The error of a value.  where: its line; of one that was recorded, the source, which the message does not name."""
-    at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
-    return ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)
 
 
 # ----------------------------------------------------------------------
@@ -592,8 +388,8 @@ def takes_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
     A command of another speed changes nothing: told to fly at 17 m/s with AIRSPEED_MIN at 18, ArduPlane 4.6 flew on at
     its 25.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> takes_speed(22.0, default_parameters()), takes_speed(22.1, default_parameters())
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> takes_speed(22.0, ArduPilotParameters.defaults()), takes_speed(22.1, ArduPilotParameters.defaults())
     (True, False)
     """
     return parameters.airspeed_min <= airspeed <= parameters.airspeed_max
@@ -604,8 +400,8 @@ def speeds_flown(commanded: Floats, cruise: float, parameters: ArduPilotParamete
 
     cruise: its airspeed until it takes up the first.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> speeds_flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0, default_parameters()).tolist()
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> speeds_flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0, ArduPilotParameters.defaults()).tolist()
     [12.0, 15.0, 15.0, 10.0]
     """
     flown = []

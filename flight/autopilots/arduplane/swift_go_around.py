@@ -97,7 +97,7 @@ def fly_go_arounds(
         that is a circle is its last: the go-around is over once around it.
 
     >>> from aircraft.catalog import load_aircraft
-    >>> from flight.autopilots.arduplane.parameters import load_parameters
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> from flight.autopilots.arduplane.point_mass import point_mass
     >>> from flight.autopilots.arduplane.swift_return import surroundings
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -107,7 +107,7 @@ def fly_go_arounds(
     >>> made = point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind())
     >>> start = aborted_at((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, made)
     >>> behind = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
-    >>> world, law = surroundings(load_scenario("jacksboro")), load_parameters(aerosonde)
+    >>> world, law = surroundings(load_scenario("jacksboro")), ArduPilotParameters.load(aerosonde)
     >>> (way,) = fly_go_arounds(start, 840.0, 0.17, behind, law, made, world).ways
     >>> k = climb_rows(way, 840.0)
     >>> bool(abs(way[k, 0]) < 1.0), bool(abs(way[-1, 0] - 800.0) < 100.0), bool(way[:, 2].min() > 797.0)

@@ -171,7 +171,7 @@ def fly_returns(
     engine_out: whether the engine has stopped: it flies on for `REACTION` s, and its circle ends it.
 
     >>> from aircraft.catalog import load_aircraft
-    >>> from flight.autopilots.arduplane.parameters import load_parameters
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> from flight.autopilots.arduplane.point_mass import point_mass
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from world.scenario import load_scenario
@@ -182,7 +182,7 @@ def fly_returns(
     >>> flown = fly_returns(
     ...     start,
     ...     [ReturnCircle(0.0, 4000.0, 900.0, 120.0)],
-    ...     load_parameters(aerosonde),
+    ...     ArduPilotParameters.load(aerosonde),
     ...     point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind()),
     ...     surroundings(scenario),
     ... ).flown[0]

@@ -67,8 +67,9 @@ def tracking_error(
     nav: how well it knows where it is.  fly_over: whether it flies on to each waypoint before it turns.
     turbulence: of the wind; gusts leave less of the throttle for a climb.
 
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> error = tracking_error(default_parameters().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0), 25.0, "gnss")
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> parameters = ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0)
+    >>> error = tracking_error(parameters, 25.0, "gnss")
     >>> error.lag, error.step, 40.0 < error.corner_acceptance(math.radians(30.0), 25.0) < 60.0
     (3.0, 15.0, True)
     """

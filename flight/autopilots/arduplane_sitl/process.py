@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.parameters import AIRCRAFT_FILE, DEFINITIONS
+from flight.autopilots.arduplane.parameters import DEFINITIONS
 from flight.autopilots.parameter_files import LONGEST_NAME, read_parameter_file
+from flight.autopilots.parameter_set import AIRCRAFT_FILE
 from flight.autopilots.sitl.exchange import LOOPBACK
 from flight.autopilots.sitl.link import free_ports
 from flight.autopilots.sitl.process import Launch

@@ -20,14 +20,7 @@ from flight.autopilots.autopilot import (
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_tick
-from flight.autopilots.px4.parameters import (
-    HEIGHT_CANDIDATES,
-    SIDE_CANDIDATES,
-    Px4Parameters,
-    default_parameters,
-    load_parameters,
-    stored_parameters,
-)
+from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
 from flight.autopilots.px4.tracking_error import off_height_chance, tracking_error
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.loiter_circles import LoiterRules
@@ -51,8 +44,8 @@ _OF_THE_WAY = ("leg", "reached_for", "at_rim", "circling", "returning", "climbed
 class Px4(Autopilot):
     """PX4's law for fixed wing: NPFG along the legs, TECS for height and airspeed.
 
-    >>> made = Px4(default_parameters("1.16"))
-    >>> made.acceptance_radius, Px4(default_parameters("1.17")).acceptance_radius
+    >>> made = Px4(Px4Parameters.defaults("1.16"))
+    >>> made.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).acceptance_radius
     (33.6, 10.0)
     """
 
@@ -71,15 +64,15 @@ class Px4(Autopilot):
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
         """With the parameters of the person's file, of the aircraft, and PX4's defaults."""
-        return cls(load_parameters(aircraft, table.params, table.px4_version or NEWEST_PX4))
+        return cls(Px4Parameters.load(aircraft, table.params, table.px4_version or NEWEST_PX4))
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
         """With the parameters and the version that a log stores."""
         version = stored.version or NEWEST_PX4
         if stored.parameters is None:
-            return cls(default_parameters())
-        return cls(stored_parameters(stored.parameters, version))
+            return cls(Px4Parameters.defaults())
+        return cls(Px4Parameters.restore(stored.parameters, version))
 
     def store(self) -> StoredAutopilot:
         """Its parameters and its version."""
@@ -94,7 +87,7 @@ class Px4(Autopilot):
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
         """None: what the aircraft does not state has PX4's defaults."""
-        load_parameters(aircraft)
+        Px4Parameters.load(aircraft)
         return []
 
     @property
@@ -170,7 +163,7 @@ class Px4(Autopilot):
         default of fixed wings) and 5 are the nearest rally point, and home where there is none.  The others, and 1,
         know a mission's landing too, which is not flown to.
 
-        >>> rules = Px4(default_parameters()).return_rules
+        >>> rules = Px4(Px4Parameters.defaults()).return_rules
         >>> rules.includes_home, rules.rally_height, rules.instead
         (False, 100.0, '')
         """
@@ -192,7 +185,7 @@ class Px4(Autopilot):
     def loiter_rules(self) -> LoiterRules:
         """By NAV_LOITER_RAD, and the rates of its reference height, until it is within NAV_FW_ALT_RAD.
 
-        >>> Px4(default_parameters()).loiter_rules.radius
+        >>> Px4(Px4Parameters.defaults()).loiter_rules.radius
         80.0
         """
         made = self.parameters
@@ -211,7 +204,7 @@ class Px4(Autopilot):
     def mission_checks(self) -> MissionChecks:
         """By NAV_ACC_RAD, FW_LND_ANG and MIS_TKO_LAND_REQ, which a file of all parameters need not state.
 
-        >>> Px4(default_parameters()).mission_checks.requires
+        >>> Px4(Px4Parameters.defaults()).mission_checks.requires
         2
         """
         made = self.parameters

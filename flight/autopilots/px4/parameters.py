@@ -10,41 +10,21 @@ its folder says once, in `ardupilot.parm`: `FROM_ARDUPILOT` lists which of those
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
-from typing import ClassVar, NamedTuple, get_args
+from typing import ClassVar, get_args
 
 import numpy as np
 
-from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Candidate, Origin, ParameterValue, StoredParameters, find_misfits
-from flight.autopilots.parameter_files import Entry, parse_parameters, read_parameter_file
-from flight.autopilots.parameter_origin import PX4, read_parameters_for, refuse_unknown
+from flight.autopilots.autopilot import Candidate
+from flight.autopilots.parameter_files import Entry
+from flight.autopilots.parameter_origin import PX4
+from flight.autopilots.parameter_set import Definition, ParameterSet, ParameterTable
 from world.errors import ParameterError
-from world.files import TextLine
 from world.kernels import Record, record_dtype
 from world.scenario_tables import NEWEST_PX4, Px4Version
 
 _VERSIONS: tuple[Px4Version, ...] = get_args(Px4Version)
 
 _DEGREE = math.pi / 180.0
-
-
-class Definition(NamedTuple):
-    """One parameter.
-
-    name: PX4's.
-    default: PX4's, in its unit.
-    low, high: what is taken, in that unit: what can be flown.
-    to_si: factor to SI and radians.
-    documented: the range of PX4's reference, where that is narrower.
-    """
-
-    name: str
-    default: float
-    low: float
-    high: float
-    to_si: float = 1.0
-    documented: tuple[float, float] | None = None
 
 
 # By the field of `PX4_PARAMETERS`; those that are not flown at the end.
@@ -58,10 +38,10 @@ DEFINITIONS = {
     "npfg_switch_share": Definition("NPFG_SW_DST_MLT", 0.32, 0.0, 10.0, documented=(0.1, 1.0)),
     "npfg_period_safety": Definition("NPFG_PERIOD_SF", 1.5, 1.0, 10.0),
     "ground_speed_min": Definition("FW_GND_SPD_MIN", 5.0, 0.0, 40.0),
-    "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 85.0, _DEGREE, (35.0, 75.0)),
+    "roll_limit": Definition("FW_R_LIM", 50.0, 5.0, 85.0, _DEGREE, documented=(35.0, 75.0)),
     "roll_slew": Definition("FW_PN_R_SLEW_MAX", 90.0, 0.0, 1000.0, _DEGREE),
     "roll_time": Definition("FW_R_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
-    "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _DEGREE, (0.0, 180.0)),
+    "roll_rate_max": Definition("FW_R_RMAX", 70.0, 0.0, 720.0, _DEGREE, documented=(0.0, 180.0)),
     # When it turns to the next waypoint.
     "acceptance": Definition("NAV_ACC_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
     "height_acceptance": Definition("NAV_FW_ALT_RAD", 10.0, 0.05, 10_000.0, documented=(0.05, 200.0)),
@@ -90,8 +70,8 @@ DEFINITIONS = {
     "airspeed_min": Definition("FW_AIRSPD_MIN", 10.0, 0.5, 500.0),
     "airspeed_trim": Definition("FW_AIRSPD_TRIM", 15.0, 0.5, 500.0),
     "airspeed_max": Definition("FW_AIRSPD_MAX", 20.0, 0.5, 500.0),
-    "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -80.0, 0.0, _DEGREE, (-60.0, 0.0)),
-    "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 80.0, _DEGREE, (0.0, 60.0)),
+    "pitch_limit_min": Definition("FW_P_LIM_MIN", -30.0, -80.0, 0.0, _DEGREE, documented=(-60.0, 0.0)),
+    "pitch_limit_max": Definition("FW_P_LIM_MAX", 30.0, 0.0, 80.0, _DEGREE, documented=(0.0, 60.0)),
     "pitch_trim": Definition("FW_PSP_OFF", 0.0, -90.0, 90.0, _DEGREE),
     "pitch_time": Definition("FW_P_TC", 0.4, 0.02, 10.0, documented=(0.2, 1.0)),
     "throttle_trim": Definition("FW_THR_TRIM", 0.6, 0.0, 1.0),
@@ -128,10 +108,9 @@ DEFINITIONS = {
 }
 # Read, and no flight of ours shows what another value than PX4's own would do.
 NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
-_BY_NAME = {definition.name: definition for definition in DEFINITIONS.values()}
 # A station saves every parameter of the vehicle, a thousand and more; a person writes down what is of interest.
 _WHOLE_SET = 300
-# What has to be in order, but that PX4 does not refuse.
+# Parameters that should not fall from one to the next; PX4 warns of some and flies with them.
 _ORDERS = (
     ("FW_THR_MIN", "FW_THR_TRIM", "FW_THR_MAX"),
     ("FW_AIRSPD_MIN", "FW_AIRSPD_TRIM", "FW_AIRSPD_MAX"),
@@ -140,7 +119,7 @@ _ORDERS = (
     ("FW_T_SINK_R_SP", "FW_T_SINK_MAX"),
     ("FW_T_CLMB_R_SP", "FW_T_CLMB_MAX"),
 )
-# What has to be in order.
+# Minimum and maximum; the minimum must be lower.
 _PAIRS = (("FW_THR_MIN", "FW_THR_MAX"), ("FW_AIRSPD_MIN", "FW_AIRSPD_MAX"))
 
 PX4_PARAMETERS = record_dtype(
@@ -168,74 +147,57 @@ FROM_ARDUPILOT = {
     "TECS_SINK_MIN": ("FW_T_SINK_MIN", 1.0),
     "TECS_SINK_MAX": ("FW_T_SINK_MAX", 1.0),
 }
-# Of an aircraft, beside its model.
-AIRCRAFT_FILE = "ardupilot.parm"
+TABLE = ParameterTable(PX4, "PX4", DEFINITIONS, pairs=_PAIRS, orders=_ORDERS, log_digits=6)
 
 
 @dataclass(frozen=True, slots=True)
-class Px4Parameters:
-    """What PX4 flies with.
+class Px4Parameters(ParameterSet):
+    r"""The parameters that PX4 flies with.
 
-    values: every parameter that the law knows, in the order of `DEFINITIONS`.
-    unused: names that the file states and the law has no use for.
-    source: the file that a person gave, "" for none.
     version: of PX4.
+
+    >>> default = Px4Parameters.defaults()
+    >>> round(default["FW_R_LIM"], 3), default["NAV_ACC_RAD"], Px4Parameters.defaults("1.16").anticipates
+    (0.873, 10.0, True)
+    >>> default.changed(NAV_ACC_RAD=56.0)["NAV_ACC_RAD"]
+    56.0
+    >>> Px4Parameters.of_text("1\t1\tNAV_ACC_RAD\t30.0\t9\n1\t1\tBAT1_N_CELLS\t3\t6\n", "mine.params").unused
+    ('BAT1_N_CELLS',)
+    >>> Px4Parameters.of_text("FW_R_LIM 30", "mine.params").beyond
+    ('FW_R_LIM 30 (35..75)',)
+    >>> Px4Parameters.of_text("FW_AIRSPD_TRIM 25", "mine.params").misfits
+    ('FW_AIRSPD_TRIM 25 of the file is above FW_AIRSPD_MAX 20 of the defaults',)
+    >>> made, notes = Px4Parameters.of_log({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
+    >>> made.by_origin("file"), notes
+    ({'FW_R_LIM': 45.0}, ('NAV_ACC_RAD -5 of the log is not allowed: the default is taken',))
     """
 
+    table: ClassVar[ParameterTable] = TABLE
     not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN
-    values: tuple[ParameterValue, ...]
-    unused: tuple[str, ...] = ()
-    source: str = ""
     version: Px4Version = NEWEST_PX4
 
-    def __getitem__(self, name: str) -> float:
-        """A parameter's value by PX4's name, in SI and radians.
+    def __post_init__(self) -> None:
+        """Refuse a version of PX4 that is not known."""
+        if self.version not in _VERSIONS:
+            allowed = f"{' or '.join(_VERSIONS)} is expected"
+            message = f"px4_version: {self.version!r}: {allowed}"
+            raise ParameterError(message, file=self.source, field="px4_version", value=self.version, allowed=allowed)
 
-        >>> round(default_parameters()["FW_R_LIM"], 3), default_parameters()["NAV_ACC_RAD"]
-        (0.873, 10.0)
-        """
-        return next(value * _BY_NAME[name].to_si for known, value, _ in self.values if known == name)
+    @classmethod
+    def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
+        """Return the values of the aircraft's file that are PX4's too, within PX4's ranges."""
+        values = {}
+        for name, entry in entries.items():
+            if name in FROM_ARDUPILOT:
+                own, factor = FROM_ARDUPILOT[name]
+                definition = TABLE.by_name[own]
+                values[own] = min(definition.high, max(definition.low, entry.value * factor))
+        return values
 
-    def changed(self, **values: float) -> "Px4Parameters":
-        """The same parameters but for these, by PX4's names and in its units.
-
-        >>> default_parameters().changed(NAV_ACC_RAD=56.0)["NAV_ACC_RAD"]
-        56.0
-        """
-        if unknown := sorted(set(values) - set(_BY_NAME)):
-            raise ValueError(f"{unknown[0]}: not a parameter of the law")
-        made = tuple(
-            parameter._replace(value=values[parameter.name], origin="file") if parameter.name in values else parameter
-            for parameter in self.values
-        )
-        return Px4Parameters(made, self.unused, self.source, self.version)
-
-    def by_origin(self, origin: Origin) -> dict[str, float]:
-        """The values (in PX4's units) that one source states, by name."""
-        return {name: value for name, value, stated in self.values if stated == origin}
-
-    @property
-    def beyond(self) -> tuple[str, ...]:
-        """What the file states beyond PX4's documented ranges, which is flown all the same, with the range.
-
-        >>> parameters_of("FW_R_LIM 30", "mine.params").beyond
-        ('FW_R_LIM 30 (35..75)',)
-        """
-        found = []
-        for name, value in self.by_origin("file").items():
-            low, high = _BY_NAME[name].documented or (-math.inf, math.inf)
-            if not low <= value <= high:
-                found.append(f"{name} {value:g} ({low:g}..{high:g})")
-        return tuple(found)
-
-    @property
-    def misfits(self) -> tuple[str, ...]:
-        """Values of the file that contradict another parameter, in words; PX4 warns of some, and flies with them.
-
-        >>> parameters_of("FW_AIRSPD_TRIM 25", "mine.params").misfits
-        ('FW_AIRSPD_TRIM 25 of the file is above FW_AIRSPD_MAX 20 of the defaults',)
-        """
-        return find_misfits(self.values, _ORDERS)
+    @classmethod
+    def _is_stated(cls, definition: Definition, value: float) -> bool:
+        """Return False for a parameter that is not flown and has PX4's own value: a station saves every parameter."""
+        return definition.name not in NOT_FLOWN or value != definition.default
 
     @property
     def is_whole_set(self) -> bool:
@@ -278,168 +240,6 @@ def speed_filter_gains(speed: float, rate: float, process: float) -> tuple[float
     stable = vectors[:, roots.real < 0.0]
     gains = np.real(stable[2:] @ np.linalg.inv(stable[:2])) @ precision
     return float(gains[0, 0]), float(gains[0, 1]), float(gains[1, 0]), float(gains[1, 1])
-
-
-def default_parameters(version: Px4Version = NEWEST_PX4) -> Px4Parameters:
-    """PX4's own values, whatever it flies.
-
-    >>> default_parameters()["FW_T_CLMB_R_SP"], default_parameters("1.16").anticipates
-    (3.0, True)
-    """
-    return _parameters([], "", (), version)
-
-
-def load_parameters(
-    aircraft: Aircraft, path: Path | str | None = None, version: Px4Version = NEWEST_PX4
-) -> Px4Parameters:
-    """The parameters that an aircraft is flown with: of a file, of the aircraft, and PX4's defaults.
-
-    Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
-
-    >>> from aircraft.catalog import load_aircraft
-    >>> made = load_parameters(load_aircraft("aerosonde"))
-    >>> made["FW_AIRSPD_TRIM"], made["FW_THR_TRIM"], made["NPFG_PERIOD"]
-    (25.0, 0.77, 10.0)
-    """
-    stated: list[tuple[Origin, dict[str, float]]] = []
-    unused: tuple[str, ...] = ()
-    if path is not None:
-        entries = read_parameters_for(Path(path), PX4)
-        values, unused = _known(entries)
-        refuse_unknown(Path(path), PX4, entries, values)
-        stated.append(("file", values))
-    stated.append(("aircraft", _of_aircraft(aircraft)))
-    return _parameters(stated, "" if path is None else str(path), unused, version)
-
-
-def parameters_of(text: str, source: str, version: Px4Version = NEWEST_PX4) -> Px4Parameters:
-    r"""The parameters of a file's text alone, with PX4's defaults.  Raises ParameterError.
-
-    >>> parameters_of("1\t1\tNAV_ACC_RAD\t30.0\t9\n1\t1\tBAT1_N_CELLS\t3\t6\n", "mine.params").unused
-    ('BAT1_N_CELLS',)
-    """
-    values, unused = _known(parse_parameters(text, source))
-    return _parameters([("file", values)], source, unused, version)
-
-
-def stored_parameters(stored: StoredParameters, version: str) -> Px4Parameters:
-    """Parameters that were recorded; those that were not yet known have their defaults.
-
-    Raises ParameterError for a value or a version that is not allowed.
-
-    >>> stored = StoredParameters((ParameterValue("NAV_ACC_RAD", 50.0, "file"),), (), "a.params")
-    >>> stored_parameters(stored, "1.16")["NAV_ACC_RAD"]
-    50.0
-    """
-    known = next((one for one in _VERSIONS if one == version), None)
-    if known is None:
-        allowed = f"{' or '.join(_VERSIONS)} is expected"
-        message = f"px4_version: {version!r}: {allowed}"
-        raise ParameterError(message, file=stored.source, field="px4_version", value=version, allowed=allowed)
-    origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
-    for name, value, origin in stored.values:
-        if name in _BY_NAME:
-            _check(name, value, stored.source)
-            origins[origin][name] = value
-    return _parameters(list(origins.items()), stored.source, stored.unused, known)
-
-
-def logged_parameters(
-    logged: Mapping[str, float], source: str, version: Px4Version
-) -> tuple[Px4Parameters, tuple[str, ...]]:
-    """The parameters of a flight log, and what could not be used of them, in sentences.
-
-    A log without parameters has PX4's defaults, and says so.  source: the log's file.
-
-    >>> made, notes = logged_parameters({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
-    >>> made.by_origin("file"), notes
-    ({'FW_R_LIM': 45.0}, ('NAV_ACC_RAD -5 of the log is not allowed: the default is taken',))
-    """
-    values: dict[str, float] = {}
-    notes = []
-    for name, definition in _BY_NAME.items():
-        if name not in logged:
-            continue
-        # Logs hold single precision.
-        value = float(f"{logged[name]:.6g}")
-        if definition.low <= value <= definition.high:
-            values[name] = value
-        else:
-            notes.append(f"{name} {value:g} of the log is not allowed: the default is taken")
-    for low, high in _PAIRS:
-        if low in values and high in values and values[low] >= values[high]:
-            notes.append(f"{low} {values[low]:g} and {high} {values[high]:g} of the log: the defaults are taken")
-            del values[low], values[high]
-    if not values:
-        notes.append("the log holds no parameters: PX4's defaults are taken")
-    try:
-        return _parameters([("file", values)], source, (), version), tuple(notes)
-    except ParameterError as error:
-        return default_parameters(version), (*notes, f"{error}: PX4's defaults are taken")
-
-
-def _parameters(
-    stated: list[tuple[Origin, dict[str, float]]], source: str, unused: tuple[str, ...], version: Px4Version
-) -> Px4Parameters:
-    """Parameters of the first source that states each, and PX4's default where none does."""
-
-    def found(definition: Definition) -> ParameterValue:
-        for origin, values in stated:
-            value = values.get(definition.name)
-            # A station saves every parameter: one that is not flown counts where it is not PX4's own value.
-            usual = definition.name in NOT_FLOWN and value == definition.default
-            if value is not None and not usual:
-                return ParameterValue(definition.name, value, origin)
-        return ParameterValue(definition.name, definition.default, "default")
-
-    made = Px4Parameters(tuple(map(found, DEFINITIONS.values())), unused, source, version)
-    values = {name: value for name, value, _ in made.values}
-    for low, high in _PAIRS:
-        if values[low] >= values[high]:
-            value, allowed = values[low], f"must be below {high} {values[high]:g}"
-            where = source or AIRCRAFT_FILE
-            message = f"{where}: {low} {value:g}: {allowed}"
-            raise ParameterError(message, file=where, field=low, value=value, allowed=allowed)
-    return made
-
-
-def _of_aircraft(aircraft: Aircraft) -> dict[str, float]:
-    """What the aircraft's folder states for ArduPlane that is PX4's too, within PX4's ranges."""
-    file = aircraft.folder / AIRCRAFT_FILE
-    if not file.exists():
-        return {}
-    values = {}
-    for name, entry in read_parameter_file(file).items():
-        if name in FROM_ARDUPILOT:
-            own, factor = FROM_ARDUPILOT[name]
-            values[own] = min(_BY_NAME[own].high, max(_BY_NAME[own].low, entry.value * factor))
-    return values
-
-
-def _known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Values by their names, and the names that the law has no use for."""
-    values: dict[str, float] = {}
-    unused = []
-    for name, entry in entries.items():
-        if name not in _BY_NAME:
-            unused.append(name)
-            continue
-        _check(name, entry.value, entry.where)
-        values[name] = entry.value
-    return values, tuple(unused)
-
-
-def _check(name: str, value: float, where: TextLine | str) -> None:
-    """Refuse a value out of its range.
-
-    where: its line; of one that was recorded, the source, which the message does not name.
-    """
-    definition = _BY_NAME[name]
-    if definition.low <= value <= definition.high:
-        return
-    allowed = f"allowed {definition.low:g}..{definition.high:g}"
-    at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
-    raise ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)
 
 
 # ----------------------------------------------------------------------

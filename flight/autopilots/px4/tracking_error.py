@@ -65,8 +65,8 @@ def tracking_error(
 
     nav: how well it knows where it is.  turbulence: of the wind.
 
-    >>> from flight.autopilots.px4.parameters import default_parameters
-    >>> error = tracking_error(default_parameters("1.16"), 25.0, "gnss")
+    >>> from flight.autopilots.px4.parameters import Px4Parameters
+    >>> error = tracking_error(Px4Parameters.defaults("1.16"), 25.0, "gnss")
     >>> round(error.lag, 3), error.corner_acceptance(math.radians(30.0), 25.0)
     (3.5, 56.0)
     """

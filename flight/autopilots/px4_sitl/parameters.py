@@ -7,7 +7,8 @@ from pathlib import Path
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.parameter_files import LONGEST_NAME, read_parameter_file
-from flight.autopilots.px4.parameters import AIRCRAFT_FILE, Px4Parameters
+from flight.autopilots.parameter_set import AIRCRAFT_FILE
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.px4_sitl.physics import AILERON, ELEVATOR, RUDDER, THROTTLE
 from flight.simulation.setup import FlightSetup
 

@@ -463,12 +463,12 @@ def true_route(setup: FlightSetup) -> Route:
     """A setup's route with true airspeeds.  ArduPlane flies equivalent ones: each leg's counts at its middle height.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
     >>> true_route(setup) is setup.route
     True
-    >>> faster = true_route(replace(setup, autopilot=ArduPlane(default_parameters())))
+    >>> faster = true_route(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults())))
     >>> bool((faster.airspeed > setup.route.airspeed).all())
     True
     """

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft, find_again
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, point_mass
 from flight.autopilots.arduplane.swift_return import (
     CIRCLED,
@@ -380,7 +380,7 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         raise MissionError(message, file=source, field="home")
     aircraft: Aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
     own = setup.autopilot.law.parameters
-    parameters = own if isinstance(own, ArduPilotParameters) else load_parameters(aircraft)
+    parameters = own if isinstance(own, ArduPilotParameters) else ArduPilotParameters.load(aircraft)
     return ReturnWorld(
         setup,
         parameters,

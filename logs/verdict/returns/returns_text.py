@@ -166,8 +166,8 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
     """What makes the aircraft return, and what does not, two lines.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
-    >>> from flight.autopilots.arduplane.parameters import default_parameters
-    >>> made = default_parameters().changed(FS_GCS_ENABL=1, FS_LONG_ACTN=1)
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> made = ArduPilotParameters.defaults().changed(FS_GCS_ENABL=1, FS_LONG_ACTN=1)
     >>> for line in causes_text(failsafe_causes(made, has_fence=False)):
     ...     print(line)
     it returns: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)

@@ -11,7 +11,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.autopilots import catalog
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import Autopilot, AutopilotProgram, StoredAutopilot
 from flight.autopilots.catalog import (
@@ -33,7 +33,7 @@ from world.scenario import Scenario, load_scenario, with_flight
 AEROSONDE = load_aircraft("aerosonde")
 GIVEN = {f"P{k}": float(k) for k in range(40)}
 PROGRAM = AutopilotProgram("ArduPlane V4.6.0 (7fbc1660)", "0826d539" + "e" * 56, GIVEN, {"P1": 1.0, "P2": 2.5})
-MINE = parameters_of("WP_RADIUS 50\nFOO 1\n", "mine.parm")
+MINE = ArduPilotParameters.of_text("WP_RADIUS 50\nFOO 1\n", "mine.parm")
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def test_what_a_scenario_asks_of_its_returns_and_a_file_denies_is_refused(tmp_pa
 
 @pytest.mark.parametrize(("lower", "file", "most"), [(3.5, "", -1.0), (2.5, "", 10.0), (3.5, "TECS_LAND_PMAX 7", 7.0)])
 def test_on_a_lower_field_the_nose_is_held_down_in_the_flare(lower: float, file: str, most: float) -> None:
-    made = ArduPlane(parameters_of(f"RTL_AUTOLAND 2\n{file}\n", "mine.parm"))
+    made = ArduPlane(ArduPilotParameters.of_text(f"RTL_AUTOLAND 2\n{file}\n", "mine.parm"))
     asked = made.as_asked(None, None, lands=True, lower=lower)
     assert isinstance(asked, ArduPlane)
     assert asked.parameters.landing_pitch_max == pytest.approx(math.radians(most))
@@ -125,8 +125,8 @@ def test_one_without_parameters_takes_no_file_of_them() -> None:
         (ArduPlane(MINE), None),
         (ArduPlaneSitl(MINE, PROGRAM), None),
         (Other("l1"), "other"),
-        (Px4(px4_parameters.parameters_of("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")), "px4"),
-        (Px4(px4_parameters.default_parameters()), "px4"),
+        (Px4(px4_parameters.Px4Parameters.of_text("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")), "px4"),
+        (Px4(px4_parameters.Px4Parameters.defaults()), "px4"),
     ],
 )
 @pytest.mark.usefixtures("listed")
@@ -156,7 +156,7 @@ def test_a_log_says_who_wrote_it() -> None:
 
 
 def test_a_program_is_named_by_its_version_its_digest_and_what_was_changed() -> None:
-    flown = ArduPlaneSitl(default_parameters(), PROGRAM)
+    flown = ArduPlaneSitl(ArduPilotParameters.defaults(), PROGRAM)
     assert flown.described("aerosonde") == (
         "ArduPlane V4.6.0 (7fbc1660) (sha256 0826d539...), 40 parameters set for aerosonde, changed: P1 1, P2 2.5"
     )

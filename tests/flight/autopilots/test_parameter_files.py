@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from flight.autopilots.arduplane.parameters import parameters_of
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.parameter_files import MAX_BYTES, parse_parameters, read_parameter_file
 from world.errors import ParameterError
 
@@ -91,6 +91,6 @@ def test_of_several_components_the_autopilots_counts(order: tuple[int, int]) -> 
 
 def test_a_name_that_is_too_long_is_read_and_known_to_no_law() -> None:
     """PITCH_LIM_MAX_DEG has 17 characters; MAVLink carries 16."""
-    made = parameters_of("PITCH_LIM_MAX_DEG,15.00\nROLL_LIMIT_DEG,35\n", "x8rev.param")
+    made = ArduPilotParameters.of_text("PITCH_LIM_MAX_DEG,15.00\nROLL_LIMIT_DEG,35\n", "x8rev.param")
     assert made.unused == ("PITCH_LIM_MAX_DEG",)
     assert made.by_origin("file") == {"ROLL_LIMIT_DEG": 35.0}

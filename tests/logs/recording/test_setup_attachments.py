@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.mission.items import Mission, MissionItem
@@ -118,7 +118,7 @@ def test_what_is_not_known_of_an_aircraft_comes_back(tmp_path: Path, track: Trac
 def test_the_real_autopilot_that_flew_comes_back(tmp_path: Path, track: Track) -> None:
     given, changed = {"NAVL1_PERIOD": 15.0, "WP_RADIUS": 90.5}, {"NAVL1_PERIOD": 15.0}
     program = AutopilotProgram("ArduPlane V4.6.0 (0badc0de)", "ab" * 32, given, changed, ("FOO",))
-    setup = dataclasses.replace(make_setup(), autopilot=ArduPlaneSitl(default_parameters(), program))
+    setup = dataclasses.replace(make_setup(), autopilot=ArduPlaneSitl(ArduPilotParameters.defaults(), program))
     log = read_log(record(tmp_path / "a.mcap", setup, track))
     assert log.setup.autopilot.program == program
     assert read_log(record(tmp_path / "b.mcap", make_setup(), track)).setup.autopilot.program is None
@@ -138,7 +138,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
 
 
 def test_arduplanes_parameters_come_back_with_who_states_them(tmp_path: Path, track: Track) -> None:
-    parameters = parameters_of("NAVL1_PERIOD 16.3\nLIM_ROLL_CD 3210\nFS_LONG_ACTN 0\n", "mine.parm")
+    parameters = ArduPilotParameters.of_text("NAVL1_PERIOD 16.3\nLIM_ROLL_CD 3210\nFS_LONG_ACTN 0\n", "mine.parm")
     setup = dataclasses.replace(make_setup(with_plan=False), autopilot=ArduPlane(parameters), nav="gnss")
     log = read_log(record(tmp_path / "a.mcap", setup, track))
     assert log.setup.autopilot.parameters == parameters
@@ -154,7 +154,7 @@ def test_a_parameter_that_is_not_allowed_is_refused() -> None:
     def change(data: dict[str, Any]) -> None:
         data["parameters"]["values"]["WP_RADIUS"] = -5.0
 
-    setup = dataclasses.replace(make_setup(with_plan=False), autopilot=ArduPlane(default_parameters()))
+    setup = dataclasses.replace(make_setup(with_plan=False), autopilot=ArduPlane(ArduPilotParameters.defaults()))
     with pytest.raises(LogError, match=r"setup.json: parameters.values: WP_RADIUS: -5: allowed"):
         unpack_setup(altered(setup, change), "a.mcap")
 

@@ -8,7 +8,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup, ImportedLog
 from logs.verdict.conditions import condition_lines, corridor_line, least_gap, setup_conditions
@@ -83,11 +83,11 @@ def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyP
 def test_the_kind_of_an_airspeed_and_who_states_it() -> None:
     """ArduPlane and PX4 fly equivalent airspeeds, planfly's guidance true ones."""
     setup = make_setup()
-    mine = parameters_of("AIRSPEED_CRUISE 21\n", "mine.parm")
+    mine = ArduPilotParameters.of_text("AIRSPEED_CRUISE 21\n", "mine.parm")
     unstated = setup.in_scenario(replace(setup.scenario, flight=FlightTable()))
     said = [
         lines_of(replace(unstated, autopilot=autopilot))[0].partition(" kg, ")[2]
-        for autopilot in (setup.autopilot, ArduPlane(default_parameters()), ArduPlane(mine))
+        for autopilot in (setup.autopilot, ArduPlane(ArduPilotParameters.defaults()), ArduPlane(mine))
     ]
     assert said == [
         "25.2 m/s true airspeed (its cruise speed)",
@@ -165,7 +165,7 @@ def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wi
     )
     assert corridor_line(replace(setup, route=replace(setup.route, waypoints=lines(31.0)))) == default
     assert corridor_line(setup) == default
-    assert corridor_line(replace(setup, autopilot=ArduPlane(default_parameters()))) == (
+    assert corridor_line(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults()))) == (
         "Corridor: 180 m to either side of the legs, 2 times ArduPlane's acceptance radius of 90 m"
         " ([limits] corridor_m states one)"
     )

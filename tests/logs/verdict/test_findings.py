@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.simulation.setup import FlightSetup
@@ -55,7 +55,7 @@ THREAT = {
 
 def test_a_real_autopilot_that_flew_is_data_too(setup: FlightSetup, track: Track) -> None:
     program = AutopilotProgram("ArduPlane V4.6.0", "ab" * 32, {"WP_RADIUS": 60.0}, {"WP_RADIUS": 60.0}, ("FOO",))
-    verdict = judge(replace(setup, autopilot=ArduPlaneSitl(default_parameters(), program)), track)
+    verdict = judge(replace(setup, autopilot=ArduPlaneSitl(ArduPilotParameters.defaults(), program)), track)
     assert "\nFlown by: ArduPlane V4.6.0 (sha256 abababab...), 1 parameters set for" in verdict.summary
     assert json.loads(verdict_json(verdict))["flown_by"] == {
         "version": "ArduPlane V4.6.0", "sha256": "ab" * 32, "parameters": {"WP_RADIUS": 60.0},
@@ -66,7 +66,7 @@ def test_a_real_autopilot_that_flew_is_data_too(setup: FlightSetup, track: Track
 
 def test_parameters_are_data_with_who_states_them(setup: FlightSetup, track: Track) -> None:
     assert json.loads(verdict_json(judge(setup, track)))["parameters"] is None
-    mine = parameters_of("LIM_ROLL_CD 3000\nFOO 1\n", "mine.parm")
+    mine = ArduPilotParameters.of_text("LIM_ROLL_CD 3000\nFOO 1\n", "mine.parm")
     data = json.loads(verdict_json(judge(replace(setup, autopilot=ArduPlane(mine)), track)))["parameters"]
     assert (data["file"], data["unused"]) == ("mine.parm", ["FOO"])
     assert data["not_flown"] == ["TERRAIN_FOLLOW"]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
@@ -52,7 +52,9 @@ DECIDING = DecidingParameter("NAVL1_PERIOD", 17.0, 14.0, "s", "corridor", leg(1)
 
 @pytest.fixture(scope="module")
 def autopilot() -> FlightSetup:
-    return replace(make_setup(STRAIGHT, limits={"corridor_m": 60.0}), autopilot=ArduPlane(default_parameters()))
+    return replace(
+        make_setup(STRAIGHT, limits={"corridor_m": 60.0}), autopilot=ArduPlane(ArduPilotParameters.defaults())
+    )
 
 
 def aside(setup: FlightSetup, metres: float, reference: ReferenceFlights | None) -> Verdict:
@@ -104,7 +106,7 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
 
 def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:
     program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0" * 64, {}, {})
-    real = replace(autopilot, autopilot=ArduPlaneSitl(default_parameters(), program))
+    real = replace(autopilot, autopilot=ArduPlaneSitl(ArduPilotParameters.defaults(), program))
     said = aside(real, 70.0, ReferenceFlights(PASSED, DECIDING)).lines[1]
     assert said.endswith(f"cannot: {deciding_text(DECIDING)}, by the flight of its law")
     assert aside(real, 70.0, ReferenceFlights(PASSED)).lines[1].endswith("with these parameters cannot")

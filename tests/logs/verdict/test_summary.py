@@ -6,9 +6,9 @@ from xml.etree import ElementTree
 import numpy as np
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_parameters, parameters_of
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import default_parameters as px4_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict.conditions import setup_conditions
 from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
@@ -86,13 +86,13 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         by = replace(setup, autopilot=ArduPlane(parameters))
         return summary_lines([], by, "flown", levels, setup_conditions(by))
 
-    lines = lines_by(default_parameters())
+    lines = lines_by(ArduPilotParameters.defaults())
     assert (
         "Flown by: ArduPlane 4.6's law with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
         " TECS_HDEM_TCONST 3 s)"
     ) in lines
     assert not [line for line in lines if line.startswith("Parameters")]
-    mine = parameters_of("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
+    mine = ArduPilotParameters.of_text("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
     lines = lines_by(mine)
     assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
     known = len(mine.values) - 1
@@ -100,7 +100,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         f"Parameters: 1 of the file, 0 of the aircraft, {known} ArduPlane's defaults;"
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
-    returns = parameters_of("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
+    returns = ArduPilotParameters.of_text("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
     lines = lines_by(returns)
     assert any(line.endswith("defaults; read, not flown: TERRAIN_FOLLOW") for line in lines)
 
@@ -110,7 +110,7 @@ def test_what_px4_has_no_parameter_for_is_not_used() -> None:
     asked = replace(setup.scenario, returns=AskedReturns(("rtl",), None, np.zeros((0, 3)), 2))
     levels = (LevelAnswer("autopilot", True, "flyable"),)
     not_used = []
-    for autopilot in (ArduPlane(default_parameters()), Px4(px4_parameters())):
+    for autopilot in (ArduPlane(ArduPilotParameters.defaults()), Px4(Px4Parameters.defaults())):
         by = replace(setup, scenario=asked, autopilot=autopilot)
         lines = summary_lines([], by, "flown", levels, setup_conditions(by))
         not_used += [line for line in lines if line.startswith("Not used")]

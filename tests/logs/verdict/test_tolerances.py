@@ -8,7 +8,7 @@ import pytest
 
 from flight.autopilots.autopilot import MissionChecks
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import default_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict import tolerances
 
 NAMES = [name for name in vars(tolerances) if name.isupper()]
@@ -47,4 +47,4 @@ def test_px4s_defaults_are_those_of_its_parameters() -> None:
     usual = MissionChecks()
     assert (usual.acceptance, tolerances.PX4_FIRST_WAYPOINT, usual.requires) == (10.0, 10_000.0, 2)
     assert math.degrees(usual.landing_angle + tolerances.PX4_LANDING_BUFFER) == pytest.approx(5.1)
-    assert Px4(default_parameters()).mission_checks == usual
+    assert Px4(Px4Parameters.defaults()).mission_checks == usual

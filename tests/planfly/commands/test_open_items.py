@@ -13,10 +13,10 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import default_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.items import Mission
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import load_airframe
@@ -52,8 +52,8 @@ def written(path: Path, *lines: str) -> str:
 # flyable: the autopilot refuses it at the upload.
 FLYABLE, OPEN, REFUSED = "flyable", "not judged in full", "not flyable"
 LAWS = {
-    "ArduPlane": lambda: ArduPlane(load_parameters(load_aircraft("aerosonde"))),
-    "PX4": lambda: Px4(default_parameters("1.17")),
+    "ArduPlane": lambda: ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))),
+    "PX4": lambda: Px4(Px4Parameters.defaults("1.17")),
     "planfly": PlanflyGuidance,
 }
 CASES = {

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
@@ -116,7 +116,7 @@ def return_setup(flight: str, **parameters: float) -> FlightSetup:
         "RTL_CLIMB_MIN": float(row["rtl_climb_min_m"]),
         "FLIGHT_OPTIONS": float(row["flight_options"]),
     }
-    law = ArduPlane(load_parameters(airframe.aircraft)).with_parameters(**stated | parameters)
+    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft)).with_parameters(**stated | parameters)
     setup = make_setup(jacksboro(), replace(airframe, autopilot=law), return_mission(flight), 1)
     return replace(setup, nav="perfect")
 

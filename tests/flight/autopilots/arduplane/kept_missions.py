@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.items import Mission
 from flight.mission.itinerary import loiter_of
 from flight.mission_files.formats import parse_mission
@@ -132,7 +132,7 @@ def setup_by_law(mission: Mission, flight: str = "") -> FlightSetup:
     }
     scenario = from_spec(spec, flight or "circles")
     airframe = load_airframe(scenario)
-    law = ArduPlane(load_parameters(airframe.aircraft))
+    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft))
     if flight in _ROLL_LIMITS:
         law = law.with_parameters(ROLL_LIMIT_DEG=_ROLL_LIMITS[flight])
     return replace(make_setup(scenario, replace(airframe, autopilot=law), mission, 1), nav="perfect")

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from flight.autopilots.arduplane.law import ARDUPILOT_MEMORY
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.state import STATE
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import MOTION
@@ -41,7 +41,7 @@ def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
 
 def parameters(**values: float) -> Record:
     """Of ArduPlane, but for these, by its names and in its units."""
-    return default_parameters().changed(**values).record()
+    return ArduPilotParameters.defaults().changed(**values).record()
 
 
 def memory(**values: Any) -> Record:

@@ -3,7 +3,7 @@
 import pytest
 
 from flight.autopilots.arduplane.failsafes import failsafe_causes
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 
 # A battery that is watched, with both thresholds.
 WATCHED = {"BATT_MONITOR": 4.0, "BATT_LOW_VOLT": 14.0, "BATT_CRT_MAH": 500.0}
@@ -13,7 +13,7 @@ def does(
     name: str, *, has_fence: bool = False, has_landing: bool = False, ends_landed: bool = False, **values: float
 ) -> str:
     """What it does on this cause; "" where the cause is none."""
-    made = default_parameters().changed(**values)
+    made = ArduPilotParameters.defaults().changed(**values)
     causes = failsafe_causes(made, has_fence=has_fence, has_landing=has_landing, ends_landed=ends_landed)
     return next((cause.does for cause in causes if cause.name == name), "")
 

@@ -5,13 +5,13 @@ import math
 import pytest
 
 from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 
 RAIL = 6.0
 
 
 def made(**values: float) -> ArduPilotParameters:
-    return default_parameters().changed(**values)
+    return ArduPilotParameters.defaults().changed(**values)
 
 
 @pytest.mark.parametrize(("speed", "starts"), [(13.5, True), (13.4, False), (20.0, True), (10.0, False)])

@@ -22,7 +22,7 @@ from flight.autopilots.arduplane.law import (
     roll_demand,
     update_tecs,
 )
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.state import COMMANDS
 from flight.guidance.gains import GAINS
 from flight.guidance.inner_loops import GUIDANCE_MEMORY, steer_elevator
@@ -350,7 +350,7 @@ KEPT: list[dict[str, Any]] = json.loads(
 
 @pytest.fixture(scope="module")
 def usual(aerosonde: Aircraft) -> ArduPilotParameters:
-    return load_parameters(aerosonde)
+    return ArduPilotParameters.load(aerosonde)
 
 
 def test_it_holds_an_equivalent_airspeed(

@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.simulate import simulate
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly.airframe import load_airframe
@@ -126,7 +126,7 @@ def test_without_end_the_items_radius_is_flown_and_for_a_time_never(command: int
     onward = () if command == 17 else (wp(-3000, 1000),)
     read = mission(wp(0, 0, 0.0), wp(0, 1500, 0.0, command=command, p=params), *onward)
     setup = setup_by_law(read)
-    law = ArduPlane(load_parameters(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
+    law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
     airframe = replace(load_airframe(setup.scenario), autopilot=law)
     setup = replace(make_setup(setup.scenario, airframe, read, 1), nav="perfect")
     assert setup.route.arcs.max() == pytest.approx(radius, abs=0.5)
@@ -149,7 +149,7 @@ def test_loiters_that_a_jump_leads_back_to_are_flown_each_time(
     lines: tuple[str, ...], around: float, visits: int
 ) -> None:
     setup = setup_by_law(mission(wp(0, -2000, 500), *lines, home="36.5 -84.2 0"))
-    law = ArduPlane(load_parameters(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
+    law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)
     airframe = replace(load_airframe(setup.scenario), autopilot=law)
     setup = replace(make_setup(setup.scenario, airframe, setup.mission, 1), nav="perfect")
     done = simulate(setup, airframe.aircraft)
@@ -181,7 +181,9 @@ def test_a_bank_limit_of_circles_is_said_not_to_be_flown() -> None:
     for name, bank, said in (("circle", 30, True), ("return", 30, True), ("neither", 30, False), ("circle", 0, False)):
         read = mission(wp(0, -2000, 500), *lines[name])
         setup = setup_by_law(read)
-        law = ArduPlane(load_parameters(load_aircraft("aerosonde"))).with_parameters(NAVL1_LIM_BANK=float(bank))
+        law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(
+            NAVL1_LIM_BANK=float(bank)
+        )
         airframe = replace(load_airframe(setup.scenario), autopilot=law)
         notes = make_setup(setup.scenario, airframe, read, 1).route.notes
         assert any(note.startswith("NAVL1_LIM_BANK 30 is not flown") for note in notes) == said
@@ -191,7 +193,7 @@ def test_a_bank_limit_of_circles_is_said_not_to_be_flown() -> None:
 def test_a_last_loiter_whose_height_was_given_up_has_not_been_flown(climb: float, ended: str) -> None:
     """Three circles of 60 m at 25 m/s take 45 s, which are 4.5 m at 0.1 m/s: less than 5 m, so it gives up."""
     setup = setup_by_law(mission(wp(0, -2000, 500), wp(0, 0, 700, 31, p="0 55 0 0"), home="36.5 -84.2 0"))
-    made = ArduPlane(load_parameters(load_aircraft("aerosonde")))
+    made = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde")))
     law = made.with_parameters(TECS_CLMB_MAX=climb, ROLL_LIMIT_DEG=55.0)
     airframe = replace(load_airframe(setup.scenario), autopilot=law)
     setup = replace(make_setup(setup.scenario, airframe, setup.mission, 1), nav="perfect")

@@ -12,12 +12,7 @@ from flight.autopilots.arduplane.parameters import (
     ARDUPILOT_PARAMETERS,
     DEFINITIONS,
     ArduPilotParameters,
-    default_parameters,
-    load_parameters,
-    logged_parameters,
-    parameters_of,
     speeds_flown,
-    stored_parameters,
     takes_speed,
 )
 from flight.autopilots.autopilot import ParameterValue, StoredParameters
@@ -46,7 +41,7 @@ ALT_HOLD_RTL 12000
 
 
 def test_the_defaults_are_arduplanes() -> None:
-    plain = default_parameters()
+    plain = ArduPilotParameters.defaults()
     # ardupilot.org, Plane, complete parameter list of 4.6.
     assert (plain.wp_radius, plain.wp_max_radius, plain.wp_loiter_rad) == (90.0, 0.0, 60.0)
     assert (plain.navl1_period, plain.navl1_damping, plain.navl1_xtrack_i) == (17.0, 0.75, 0.02)
@@ -61,7 +56,7 @@ def test_the_defaults_are_arduplanes() -> None:
 
 @pytest.mark.parametrize("text", [NEW, OLD])
 def test_old_and_new_names_mean_the_same(text: str) -> None:
-    found = parameters_of(text, "mine.parm")
+    found = ArduPilotParameters.of_text(text, "mine.parm")
     assert (found.airspeed_cruise, found.airspeed_min, found.airspeed_max) == (25.0, 18.0, 31.0)
     degrees = [found.roll_limit, found.pitch_limit_max, found.pitch_limit_min, found.pitch_trim]
     assert [math.degrees(angle) for angle in degrees] == pytest.approx([35.0, 22.0, -18.0, 3.5])
@@ -71,9 +66,11 @@ def test_old_and_new_names_mean_the_same(text: str) -> None:
 
 
 def test_one_parameter_under_both_names_must_agree() -> None:
-    assert parameters_of("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 35\n", "a").roll_limit == pytest.approx(math.radians(35.0))
+    assert ArduPilotParameters.of_text("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 35\n", "a").roll_limit == pytest.approx(
+        math.radians(35.0)
+    )
     with pytest.raises(ParameterError, match=r"a:2: ROLL_LIMIT_DEG: 36: the same parameter has another value"):
-        parameters_of("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 36\n", "a")
+        ArduPilotParameters.of_text("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 36\n", "a")
 
 
 @pytest.mark.parametrize(
@@ -89,7 +86,7 @@ def test_one_parameter_under_both_names_must_agree() -> None:
 )
 def test_values_out_of_range_are_refused(text: str, said: str) -> None:
     with pytest.raises(ParameterError) as refused:
-        parameters_of(text, "a")
+        ArduPilotParameters.of_text(text, "a")
     assert str(refused.value) == said
 
 
@@ -98,17 +95,17 @@ def test_the_edges_of_a_range_are_taken() -> None:
         for value in (definition.low, definition.high):
             if definition.name.startswith(("THR_M", "AIRSPEED_M")):
                 continue
-            found = parameters_of(f"{definition.name} {value}", "a")
+            found = ArduPilotParameters.of_text(f"{definition.name} {value}", "a")
             assert found.by_origin("file") == {definition.name: value}
 
 
 def test_a_file_comes_before_the_aircraft_and_that_before_the_defaults(tmp_path: Path) -> None:
     aircraft: Aircraft = replace(load_aircraft("aerosonde"), folder=tmp_path)
-    assert load_parameters(aircraft) == default_parameters()
+    assert ArduPilotParameters.load(aircraft) == ArduPilotParameters.defaults()
     (tmp_path / "ardupilot.parm").write_text("WP_RADIUS 70\nROLL_LIMIT_DEG 30\nSERVO1_FUNCTION 4\n", encoding="utf-8")
     mine = tmp_path / "mine.param"
     mine.write_text("WP_RADIUS 50\nSERIAL1_BAUD 57\n", encoding="utf-8")
-    found = load_parameters(aircraft, mine)
+    found = ArduPilotParameters.load(aircraft, mine)
     assert found.by_origin("file") == {"WP_RADIUS": 50.0}
     assert found.by_origin("aircraft") == {"ROLL_LIMIT_DEG": 30.0}
     assert found.by_origin("default")["NAVL1_PERIOD"] == 17.0
@@ -117,7 +114,7 @@ def test_a_file_comes_before_the_aircraft_and_that_before_the_defaults(tmp_path:
 
 
 def test_the_record_holds_every_field() -> None:
-    found = parameters_of(NEW, "a")
+    found = ArduPilotParameters.of_text(NEW, "a")
     record = found.record()
     assert field_names(ARDUPILOT_PARAMETERS) == tuple(DEFINITIONS)
     assert all(record[name] == getattr(found, name) for name in DEFINITIONS)
@@ -126,25 +123,25 @@ def test_the_record_holds_every_field() -> None:
 
 
 def test_what_was_stored_comes_back_bit_for_bit() -> None:
-    found = parameters_of(OLD + "NAVL1_PERIOD 16.3\nFOO 1\n", "mine.parm")
-    again = stored_parameters(StoredParameters(found.values, found.unused, found.source))
+    found = ArduPilotParameters.of_text(OLD + "NAVL1_PERIOD 16.3\nFOO 1\n", "mine.parm")
+    again = ArduPilotParameters.restore(StoredParameters(found.values, found.unused, found.source))
     assert again == found
     assert again.record().tolist() == found.record().tolist()
     with pytest.raises(ParameterError, match=r"WP_RADIUS: -5: allowed"):
-        stored_parameters(StoredParameters((ParameterValue("WP_RADIUS", -5.0, "file"),), (), ""))
+        ArduPilotParameters.restore(StoredParameters((ParameterValue("WP_RADIUS", -5.0, "file"),), (), ""))
 
 
 def test_one_value_can_be_changed() -> None:
-    slow = default_parameters().changed(TECS_HDEM_TCONST=1.0)
+    slow = ArduPilotParameters.defaults().changed(TECS_HDEM_TCONST=1.0)
     assert (slow.tecs_height_demand_time, slow.wp_radius) == (1.0, 90.0)
     with pytest.raises(ValueError, match="TECS_FOO: not a parameter"):
-        default_parameters().changed(TECS_FOO=1.0)
+        ArduPilotParameters.defaults().changed(TECS_FOO=1.0)
 
 
 # ----------------------------------------------------------------------
 # Which airspeeds ArduPlane takes up, and what it flies instead.
 
-PARAMETERS = default_parameters().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0)
+PARAMETERS = ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0)
 
 
 @pytest.mark.parametrize(("airspeed", "taken"), [(17.99, False), (18.0, True), (31.0, True), (31.01, False)])
@@ -158,7 +155,7 @@ def test_a_speed_that_is_not_taken_leaves_the_one_before() -> None:
 
 
 def parameters(**values: float) -> tuple[ArduPilotParameters, tuple[str, ...]]:
-    return logged_parameters(values, "a.BIN")
+    return ArduPilotParameters.of_log(values, "a.BIN")
 
 
 def test_older_names_and_units_are_taken() -> None:

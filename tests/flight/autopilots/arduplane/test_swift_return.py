@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, point_mass
 from flight.autopilots.arduplane.swift_return import (
     CIRCLED,
@@ -52,7 +52,7 @@ def around() -> Surroundings:
 
 
 def parameters(**values: float) -> ArduPilotParameters:
-    return load_parameters(airframe().aircraft).changed(**values)
+    return ArduPilotParameters.load(airframe().aircraft).changed(**values)
 
 
 def start(**values: float) -> Records:

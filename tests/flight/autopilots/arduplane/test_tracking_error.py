@@ -6,7 +6,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.tracking_error import MIN_ACCEPTANCE, WIND_SPREAD, tracking_error
 from tests.soak import some
 from world.wind import Turbulence
@@ -19,7 +19,7 @@ LAG, LATER = 0.38, 0.15
 @pytest.fixture(scope="module")
 def parameters() -> ArduPilotParameters:
     """Of the Aerosonde: 30 degrees of bank at most, L1 with a period of 17 s and a damping of 0.75."""
-    return load_parameters(load_aircraft("aerosonde"))
+    return ArduPilotParameters.load(load_aircraft("aerosonde"))
 
 
 @pytest.fixture(scope="module")

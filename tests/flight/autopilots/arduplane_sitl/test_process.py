@@ -8,7 +8,7 @@ import pytest
 
 from aircraft.catalog import aircraft_names, load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.process import (
     SIMULATION,
     autopilot_parameters,
@@ -30,7 +30,7 @@ def setup_at(speed: float = 25.0, params: Path | None = None) -> FlightSetup:
     if params is None:
         return setup
     scenario = with_flight(setup.scenario, params=str(params))
-    return replace(setup, scenario=scenario, autopilot=ArduPlane(load_parameters(AEROSONDE, params)))
+    return replace(setup, scenario=scenario, autopilot=ArduPlane(ArduPilotParameters.load(AEROSONDE, params)))
 
 
 def test_the_simulations_the_servos_and_the_aircrafts_are_all_given() -> None:
@@ -85,7 +85,7 @@ def test_each_aircrafts_speeds_are_its_own(name: str) -> None:
     speeds = [found[f"AIRSPEED_{kind}"] for kind in ("MIN", "CRUISE", "MAX")]
     assert speeds == [aircraft.airspeed_min, aircraft.airspeed, aircraft.airspeed_max]
     # Each is one that both the law and a real ArduPlane fly with.
-    assert load_parameters(aircraft).by_origin("aircraft").items() <= found.items()
+    assert ArduPilotParameters.load(aircraft).by_origin("aircraft").items() <= found.items()
 
 
 def test_an_aircraft_without_parameters_is_one_line(tmp_path: Path) -> None:

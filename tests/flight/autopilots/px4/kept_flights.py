@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import load_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.simulate import Flight
 from flight.simulation.track import as_track, join_rows
 from tests.setups import setup_maker
@@ -104,7 +104,7 @@ def by_law(flight: str) -> Flown:
     """The same mission by planfly's law, with the same parameters."""
     _, version, changed = FLIGHTS[flight]
     aerosonde, waypoints = load_aircraft("aerosonde"), kept(flight).waypoints
-    law = Px4(load_parameters(aerosonde, None, version).changed(**changed))
+    law = Px4(Px4Parameters.load(aerosonde, None, version).changed(**changed))
     setup = setup_maker(aerosonde)(waypoints, bank_deg=30.0)
     flying = Flight(replace(setup, autopilot=law), aerosonde)
     memory = flying._workspace.own["memory"]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from flight.autopilots.px4.law import PX4_MEMORY
-from flight.autopilots.px4.parameters import default_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.dynamics.state import STATE
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import MOTION
@@ -46,7 +46,7 @@ def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
 
 def parameters(version: Px4Version = "1.16", /, **values: float) -> Record:
     """Of PX4, but for these, by its names and in its units."""
-    return default_parameters(version).changed(**values).record()
+    return Px4Parameters.defaults(version).changed(**values).record()
 
 
 def memory(**values: Any) -> Record:

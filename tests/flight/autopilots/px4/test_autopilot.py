@@ -9,7 +9,7 @@ import pytest
 from aircraft.catalog import Aircraft
 from flight.autopilots.catalog import load_autopilot
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import load_parameters, parameters_of
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.return_path import ReturnPlace, choose_target
 from flight.simulation.simulate import simulate
 from tests.setups import MakeSetup
@@ -45,14 +45,16 @@ def test_parameters_alone_are_of_the_autopilot_that_the_scenario_names(aerosonde
 
 
 def test_it_turns_earlier_in_thin_air_up_to_1_16(aerosonde: Aircraft) -> None:
-    older, newer = (Px4(load_parameters(aerosonde, None, version)) for version in ("1.16", "1.17"))
+    older, newer = (Px4(Px4Parameters.load(aerosonde, None, version)) for version in ("1.16", "1.17"))
     # 2.24 s of the true airspeed, which at 2,000 m is 1.1029 of the equivalent one (ISO 2533: 1.0066 kg/m^3).
     assert older.turn_distance(1.0, 2000.0) == pytest.approx(56.0 * (1.2250 / 1.0066) ** 0.5, rel=1e-3)
     assert newer.turn_distance(1.0, 2000.0) == 10.0
 
 
 def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
-    made = Px4(parameters_of("FW_AIRSPD_MIN 18\nFW_AIRSPD_MAX 31\nFW_AIRSPD_TRIM 25\nFW_R_LIM 40\n", "a.params"))
+    made = Px4(
+        Px4Parameters.of_text("FW_AIRSPD_MIN 18\nFW_AIRSPD_MAX 31\nFW_AIRSPD_TRIM 25\nFW_R_LIM 40\n", "a.params")
+    )
     assert made.speeds_flown(np.array([10.0, 20.0, 40.0]), 25.0).tolist() == [18.0, 20.0, 31.0]
     assert made.speed_limits is not None
     assert made.speed_limits.nearest
@@ -74,7 +76,7 @@ def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     ],
 )
 def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> None:
-    rules = Px4(parameters_of(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).return_rules
+    rules = Px4(Px4Parameters.of_text(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).return_rules
     home, rally = ReturnPlace(0.0, 0.0, 300.0), ReturnPlace(0.0, 4000.0, 450.0)
     target = choose_target(rules, (0.0, 1000.0, 800.0), home, [rally])
     assert (target.name, target.position[2]) == (name, up)
@@ -85,7 +87,7 @@ def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> 
 def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # 100 m down in 1,000 m: 40 s at 25 m/s, in which 2 m/s take it 80 m; within 10 m it has arrived.
     setup = make_setup([[0, 0, 600.0], [0, 1000, 500.0]])
-    law = Px4(load_parameters(aerosonde, None, "1.16"))
+    law = Px4(Px4Parameters.load(aerosonde, None, "1.16"))
     flown = simulate(replace(setup, autopilot=law), aerosonde)
     track = flown.track
     assert flown.ended == "completed"
@@ -93,7 +95,7 @@ def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSet
     # 90 m at 2 m/s, and some seconds behind the reference.
     assert 45.0 < track.time[-1] < 60.0
     assert np.degrees(np.abs(track.attitude[:, 0])).max() > 25.0
-    quick = Px4(load_parameters(aerosonde, None, "1.16").changed(FW_T_SINK_R_SP=4.0, FW_T_HRATE_FF=1.0))
+    quick = Px4(Px4Parameters.load(aerosonde, None, "1.16").changed(FW_T_SINK_R_SP=4.0, FW_T_HRATE_FF=1.0))
     down = simulate(replace(setup, autopilot=quick), aerosonde).track
     assert np.degrees(np.abs(down.attitude[:, 0])).max() < 5.0
 
@@ -101,7 +103,7 @@ def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSet
 def test_it_does_not_circle_at_the_end_for_ever(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # 800 m down at 2 m/s take 400 s; it is over 300 s after it came there.
     setup = make_setup([[0, -11000, 1200.0], [0, 0, 1200.0], [0, 1000, 400.0]])
-    flown = simulate(replace(setup, autopilot=Px4(load_parameters(aerosonde, None, "1.16"))), aerosonde)
+    flown = simulate(replace(setup, autopilot=Px4(Px4Parameters.load(aerosonde, None, "1.16"))), aerosonde)
     assert flown.ended == "completed"
     assert flown.track.time[-1] == pytest.approx((12_000.0 - 60.0) / 26.4 + 300.0, abs=6.0)
     assert flown.track.position[-1, 2] > 500.0
@@ -109,7 +111,7 @@ def test_it_does_not_circle_at_the_end_for_ever(make_setup: MakeSetup, aerosonde
 
 def test_it_holds_a_leg_in_wind(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     setup = make_setup([[0, 0, 500.0], [0, 3000, 500.0]], wind=(8.0, 270.0))
-    track = simulate(replace(setup, autopilot=Px4(load_parameters(aerosonde))), aerosonde).track
+    track = simulate(replace(setup, autopilot=Px4(Px4Parameters.load(aerosonde))), aerosonde).track
     late = track.time > 40.0
     assert np.abs(track.position[late, 0]).max() < 5.0
 
@@ -121,6 +123,6 @@ def test_the_wind_is_held_by_the_true_airspeed_and_from_1_17_on_by_the_equivalen
     # At 3,000 m 25 m/s are 29.0 true.  Of a wind of 12 m/s across asin(12 / 25) = 28.7 degrees are held, not 24.4: the
     # track is off by what brings 4.2 degrees back, some 5 m.
     setup = make_setup([[0, 0, 3000.0], [0, 4000, 3000.0]], wind=(12.0, 270.0))
-    track = simulate(replace(setup, autopilot=Px4(load_parameters(aerosonde, None, version))), aerosonde).track
+    track = simulate(replace(setup, autopilot=Px4(Px4Parameters.load(aerosonde, None, version))), aerosonde).track
     off = abs(float(np.median(track.position[track.time > 60.0, 0])))
     assert least <= off < most

@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import load_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import SimulatedFlight, simulate
@@ -19,7 +19,7 @@ from tests.setups import MakeSetup
 
 def flown(aerosonde: Aircraft, *lines: str, **values: float) -> tuple[FlightSetup, SimulatedFlight]:
     """A mission by the law of 1.17, its route drawn for it."""
-    law = Px4(load_parameters(aerosonde, None, "1.17").changed(**values))
+    law = Px4(Px4Parameters.load(aerosonde, None, "1.17").changed(**values))
     made = setup_of(*lines)
     route = make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, law.route_rules)
     setup = replace(made, route=route, autopilot=law)
@@ -34,7 +34,7 @@ def until(track: Track, east: float, north: float) -> slice:
 def test_the_circle_at_the_gate_has_the_radius_of_loiters(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # 250 m down in 1 km takes 125 s at 2 m/s, of which 85 s are circled.
     setup = make_setup([[0, 0, 650.0], [0, 1000, 400.0], [0, 3000, 400.0]])
-    law = Px4(load_parameters(aerosonde).changed(NAV_LOITER_RAD=150.0))
+    law = Px4(Px4Parameters.load(aerosonde).changed(NAV_LOITER_RAD=150.0))
     track = simulate(replace(setup, autopilot=law), aerosonde).track
     circles = (track.time > 65.0) & (track.position[:, 2] > 415.0)
     assert np.ptp(track.time[circles]) > 50.0
@@ -49,7 +49,7 @@ def test_a_circle_begun_before_the_last_waypoint_does_not_end_the_flight(
     # 56 m before the end it is some 12 m too low, for it climbs at its 3 m/s all the way, 3.5 s late, and circles; a
     # second later it is within 10 m, and flies on.
     setup = make_setup([[0, 0, 500.0], [0, 1500, 673.0]])
-    law = Px4(load_parameters(aerosonde))
+    law = Px4(Px4Parameters.load(aerosonde))
     result = simulate(replace(setup, autopilot=law), aerosonde)
     track = result.track
     assert result.ended == "completed"
@@ -119,7 +119,7 @@ def test_a_circle_left_on_its_far_side_is_left_within_its_corridor(aerosonde: Ai
 
 @pytest.mark.parametrize(("version", "before"), [("1.16", 56.0), ("1.17", 10.0)])
 def test_after_the_last_waypoint_it_goes_once_around(aerosonde: Aircraft, version: str, before: float) -> None:
-    law = Px4(load_parameters(aerosonde, None, version))
+    law = Px4(Px4Parameters.load(aerosonde, None, version))
     made = setup_of(wp(0, -1500, 300), wp(0, 0, 300))
     setup = replace(made, autopilot=law)
     result = simulate(setup, aerosonde)
@@ -144,7 +144,7 @@ def test_what_stands_beside_the_last_waypoint_is_met_in_its_circle(aerosonde: Ai
     # Its middle is 200 m beside the leg, and the first circle leads 233 m to that side.
     missile = {"name": "m", "east_m": 200.0, "north_m": 60.0, "amsl_m": 600.0, "kill_radius_m": 60.0}
     missile |= {"kill_scale_m": 60.0, "detection_radius_m": 61.0, "detection_scale_m": 60.0}
-    law, way = Px4(load_parameters(aerosonde)), (wp(0, -1500, 300), wp(0, 0, 300), wp(0, 1500, 300))
+    law, way = Px4(Px4Parameters.load(aerosonde)), (wp(0, -1500, 300), wp(0, 0, 300), wp(0, 1500, 300))
     for count, flies in ((2, False), (3, True)):
         made = setup_of(*way[:count], threats=[missile])
         setup = replace(made, scenario=replace(made.scenario, external=False), autopilot=law)
@@ -157,7 +157,7 @@ def test_a_speed_after_a_gate_counts_from_where_it_is_crossed(aerosonde: Aircraf
     # The gate is 300 m beside the leg; its plane, at right angles to the way from there to item 4, cuts the leg 75 m
     # sooner.
     gate, slow = wp(300, 600, command=4501), "2 178 0 20 -1 0 0 0 0"
-    law = Px4(load_parameters(aerosonde, None, "1.17"))
+    law = Px4(Px4Parameters.load(aerosonde, None, "1.17"))
     made = setup_of(wp(0, 0, 300), gate, slow, wp(0, 1800, 300))
     route = make_route(made.mission, ORIGIN, made.scenario.terrain, 25.0, False, made.limits, law.route_rules)
     result = simulate(replace(made, route=route, autopilot=law), aerosonde)

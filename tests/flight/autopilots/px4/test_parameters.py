@@ -9,18 +9,7 @@ import pytest
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import StoredParameters
-from flight.autopilots.px4.parameters import (
-    DEFINITIONS,
-    NOT_FLOWN,
-    PX4_PARAMETERS,
-    Px4Parameters,
-    default_parameters,
-    load_parameters,
-    logged_parameters,
-    parameters_of,
-    speed_filter_gains,
-    stored_parameters,
-)
+from flight.autopilots.px4.parameters import DEFINITIONS, NOT_FLOWN, PX4_PARAMETERS, Px4Parameters, speed_filter_gains
 from world.errors import ParameterError
 from world.kernels import field_names
 
@@ -41,11 +30,11 @@ QGC = """# Onboard parameters for Vehicle 1
 def test_every_field_is_in_the_record_in_si() -> None:
     fields = set(field_names(PX4_PARAMETERS))
     assert set(DEFINITIONS) <= fields
-    record = parameters_of("FW_R_LIM 45\nFW_THR_TRIM 0.5\nFW_PSP_OFF -3\n", "a.params", "1.16").record()
+    record = Px4Parameters.of_text("FW_R_LIM 45\nFW_THR_TRIM 0.5\nFW_PSP_OFF -3\n", "a.params", "1.16").record()
     assert (record.roll_limit, record.throttle_trim) == pytest.approx((math.radians(45.0), 0.5))
     assert record.pitch_trim == pytest.approx(-math.radians(3.0))
     assert record.anticipates
-    assert not default_parameters("1.17").record().anticipates
+    assert not Px4Parameters.defaults("1.17").record().anticipates
 
 
 def test_every_default_is_allowed() -> None:
@@ -55,7 +44,7 @@ def test_every_default_is_allowed() -> None:
 def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde: Aircraft, tmp_path: Path) -> None:
     file = tmp_path / "mine.params"
     file.write_text(QGC, encoding="utf-8")
-    made = load_parameters(aerosonde, file, "1.16")
+    made = Px4Parameters.load(aerosonde, file, "1.16")
     assert made.by_origin("file") == {"FW_R_LIM": 30.0, "NAV_ACC_RAD": 25.0}
     assert (made.unused, made.source, made.version) == (("BAT1_N_CELLS",), str(file), "1.16")
     assert made.by_origin("default")["NPFG_PERIOD"] == 10.0
@@ -68,14 +57,14 @@ def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde:
 
 
 def test_one_that_is_not_flown_counts_where_it_is_not_px4s_own() -> None:
-    made = parameters_of("FW_T_F_ALT_ERR -1\nRTL_LAND_DELAY 5\n", "a.params")
+    made = Px4Parameters.of_text("FW_T_F_ALT_ERR -1\nRTL_LAND_DELAY 5\n", "a.params")
     assert set(made.by_origin("file")) == {"RTL_LAND_DELAY"}
     assert {"FW_T_F_ALT_ERR", "RTL_LAND_DELAY"} <= set(NOT_FLOWN)
     assert NOT_FLOWN[0] == "FW_USE_AIRSPD"
 
 
 def test_what_a_person_states_otherwise_and_is_not_flown_is_named() -> None:
-    made = parameters_of("FW_USE_AIRSPD 0\nNPFG_EN_MIN_GSP 0\nNAV_FW_ALTL_RAD 8\nFW_LND_ANG 7\n", "a.params")
+    made = Px4Parameters.of_text("FW_USE_AIRSPD 0\nNPFG_EN_MIN_GSP 0\nNAV_FW_ALTL_RAD 8\nFW_LND_ANG 7\n", "a.params")
     assert {"FW_USE_AIRSPD", "NPFG_EN_MIN_GSP", "NAV_FW_ALTL_RAD"} <= set(made.by_origin("file")) & set(NOT_FLOWN)
     assert made.by_origin("file")["FW_LND_ANG"] == 7.0
     assert made.unused == ()
@@ -93,36 +82,36 @@ def test_what_a_person_states_otherwise_and_is_not_flown_is_named() -> None:
 )
 def test_faults_are_one_line(text: str, said: str) -> None:
     with pytest.raises(ParameterError) as refused:
-        parameters_of(text, "a.params")
+        Px4Parameters.of_text(text, "a.params")
     assert str(refused.value) == said
 
 
 def test_what_is_stored_is_restored_and_another_version_is_not() -> None:
-    made = parameters_of("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")
+    made = Px4Parameters.of_text("NAV_ACC_RAD 50\nFOO 1\n", "mine.params", "1.16")
     stored = StoredParameters(made.values, made.unused, made.source)
-    assert stored_parameters(stored, "1.16") == made
-    assert stored_parameters(stored, "1.17") == replace(made, version="1.17")
+    assert Px4Parameters.restore(stored, "1.16") == made
+    assert Px4Parameters.restore(stored, "1.17") == replace(made, version="1.17")
     with pytest.raises(ParameterError, match=r"^px4_version: '1.9': 1.16 or 1.17 is expected$"):
-        stored_parameters(stored, "1.9")
+        Px4Parameters.restore(stored, "1.9")
     bad = StoredParameters(tuple(one._replace(value=1e9) for one in made.values), (), "mine.params")
     with pytest.raises(ParameterError, match="allowed"):
-        stored_parameters(bad, "1.16")
+        Px4Parameters.restore(bad, "1.16")
 
 
 def test_only_parameters_of_the_law_are_changed() -> None:
-    assert default_parameters().changed(FW_R_LIM=40.0).by_origin("file") == {"FW_R_LIM": 40.0}
+    assert Px4Parameters.defaults().changed(FW_R_LIM=40.0).by_origin("file") == {"FW_R_LIM": 40.0}
     with pytest.raises(ValueError, match=r"^WP_RADIUS: not a parameter of the law$"):
-        default_parameters().changed(WP_RADIUS=40.0)
+        Px4Parameters.defaults().changed(WP_RADIUS=40.0)
 
 
 def test_a_logs_parameters_are_read_to_single_precision() -> None:
-    made, notes = logged_parameters({"NPFG_SW_DST_MLT": float(np.float32(0.32)), "X": 1.0}, "a.ulg", "1.16")
+    made, notes = Px4Parameters.of_log({"NPFG_SW_DST_MLT": float(np.float32(0.32)), "X": 1.0}, "a.ulg", "1.16")
     assert (made["NPFG_SW_DST_MLT"], notes) == (0.32, ())
     for logged in ({}, {"FW_AIRSPD_MIN": 9.0, "FW_AIRSPD_MAX": 8.0}):
-        _, notes = logged_parameters(logged, "a.ulg", "1.16")
+        _, notes = Px4Parameters.of_log(logged, "a.ulg", "1.16")
         assert notes[-1] == "the log holds no parameters: PX4's defaults are taken"
-    made, notes = logged_parameters({"FW_AIRSPD_MIN": 25.0}, "a.ulg", "1.16")
-    assert made == default_parameters("1.16")
+    made, notes = Px4Parameters.of_log({"FW_AIRSPD_MIN": 25.0}, "a.ulg", "1.16")
+    assert made == Px4Parameters.defaults("1.16")
     assert "must be below FW_AIRSPD_MAX 20: PX4's defaults are taken" in notes[0]
 
 
@@ -140,18 +129,18 @@ def test_the_airspeed_filter_is_the_steady_kalman_filter(deviations: tuple[float
 
 
 def test_parameters_are_equal_by_value() -> None:
-    assert default_parameters() == Px4Parameters(default_parameters().values)
+    assert Px4Parameters.defaults() == Px4Parameters(Px4Parameters.defaults().values)
 
 
 def test_what_lies_beyond_the_documented_range_is_flown_and_said() -> None:
     text = "FW_R_LIM 30\nFW_P_LIM_MAX 70\nNPFG_PERIOD_SF 10\nFW_T_CLMB_R_SP 0.1\nFW_T_SINK_R_SP 40\nFW_T_SEB_R_FF 3\n"
-    made = parameters_of(text, "a.params")
+    made = Px4Parameters.of_text(text, "a.params")
     assert made.by_origin("file")["FW_T_SINK_R_SP"] == 40.0
     assert [said.split(" (")[0] for said in made.beyond] == [
         "FW_R_LIM 30", "FW_T_CLMB_R_SP 0.1", "FW_T_SINK_R_SP 40", "FW_T_SEB_R_FF 3", "FW_P_LIM_MAX 70",
     ]  # fmt: skip
     assert made.beyond[0] == "FW_R_LIM 30 (35..75)"
-    assert parameters_of("FW_R_LIM 35\nNAV_ACC_RAD 200", "a.params").beyond == ()
+    assert Px4Parameters.of_text("FW_R_LIM 35\nNAV_ACC_RAD 200", "a.params").beyond == ()
 
 
 def test_a_documented_range_holds_the_default_and_is_within_what_is_taken() -> None:

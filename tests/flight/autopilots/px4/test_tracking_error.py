@@ -9,7 +9,7 @@ from aircraft.catalog import Aircraft
 from aircraft.tracking import TURNS
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import default_parameters, load_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.px4.tracking_error import WIND_SPREAD, off_height_chance, tracking_error
 from tests.flight.autopilots.px4.kept_flights import kept
 from world.scenario_tables import Px4Version
@@ -20,7 +20,7 @@ CORNERS = {2: 60.0, 3: 90.0, 4: 60.0, 5: 45.0}
 
 def still(aerosonde: Aircraft, version: Px4Version, turn_deg: float, airspeed: float) -> float:
     """The excursion at a corner in still air, what is left for wind taken off."""
-    error = tracking_error(load_parameters(aerosonde, None, version), airspeed, "perfect")
+    error = tracking_error(Px4Parameters.load(aerosonde, None, version), airspeed, "perfect")
     share, more = WIND_SPREAD
     spread = share + more * (TURNS / (0.5 * math.pi)) ** 2
     table = [np.interp(1.0, [0.6, 1.0], row[:2]) for row in error.excursion / spread[:, None]]
@@ -41,7 +41,7 @@ def test_turning_early_halves_a_right_angles_overshoot(aerosonde: Aircraft) -> N
 
 
 def test_a_straight_leg_takes_none(aerosonde: Aircraft) -> None:
-    error = tracking_error(load_parameters(aerosonde, None, "1.16"), 25.0, "perfect")
+    error = tracking_error(Px4Parameters.load(aerosonde, None, "1.16"), 25.0, "perfect")
     assert (error.excursion[0] == 0.0).all()
     assert (error.before[0] == 0.0).all()
     # It turns 2.24 s before a waypoint, at the ground speeds of the table.
@@ -55,7 +55,7 @@ def test_a_straight_leg_takes_none(aerosonde: Aircraft) -> None:
 def test_slopes_are_those_of_the_reference_and_late_by_its_lag(
     turbulence: str, share: float, of_aircraft: float, aerosonde: Aircraft
 ) -> None:
-    made = load_parameters(aerosonde).changed(FW_T_CLMB_R_SP=5.0, FW_T_HRATE_FF=0.5, FW_T_ALT_TC=4.0)
+    made = Px4Parameters.load(aerosonde).changed(FW_T_CLMB_R_SP=5.0, FW_T_HRATE_FF=0.5, FW_T_ALT_TC=4.0)
     error = tracking_error(made, 25.0, "gnss", turbulence=turbulence)  # type: ignore[arg-type]  # a name of the table
     assert (error.climb_rate, error.sink_rate, error.lag, error.step) == pytest.approx(
         (share * 5.0, share * 2.0, 2.0, 0.0)
@@ -81,6 +81,6 @@ def test_calmer_air_has_no_chance_of_it() -> None:
 
 
 def test_px4s_own_acceptance_counts() -> None:
-    made = Px4(default_parameters().changed(NAV_FW_ALT_RAD=6.0))
+    made = Px4(Px4Parameters.defaults().changed(NAV_FW_ALT_RAD=6.0))
     assert made.off_height_chance(100.0, 100.0, "moderate") == pytest.approx(2.0 * 0.0668072)
     assert PlanflyGuidance().off_height_chance(-5.0, -5.0, "moderate") == 0.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import default_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict.measures.circle_reach import _rings, beside_end, within_reach
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.logs.verdict.rules.test_loiter_rule_own_radius import TIME, loiter, radius_at, sphere
@@ -41,7 +41,7 @@ def test_a_missions_end_has_circles_where_the_autopilot_flies_them() -> None:
     """After the last waypoint ArduPlane returns; PX4 circles, within 2.25 radii of 30 degrees of bank."""
     setup = loiter(TIME, {})
     assert beside_end(route_requirements(setup)) is None
-    beside = beside_end(route_requirements(replace(setup, autopilot=Px4(default_parameters()))))
+    beside = beside_end(route_requirements(replace(setup, autopilot=Px4(Px4Parameters.defaults()))))
     assert beside is not None
     assert beside[0] == pytest.approx(2.25 * radius_at(30.0), rel=0.02)
     assert beside[1] == []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import GROUND_WAY, Finding
 from logs.verdict.judge_geometry import judge_geometry
@@ -54,7 +54,7 @@ def over(heights: Ground, *lines: str, home: str = HOME, **tables: Any) -> Fligh
 
 
 def with_arduplane(setup: FlightSetup) -> FlightSetup:
-    return replace(setup, autopilot=ArduPlane(load_parameters(load_aircraft("aerosonde"))))
+    return replace(setup, autopilot=ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))))
 
 
 @cache

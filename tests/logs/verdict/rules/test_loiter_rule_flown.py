@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
@@ -88,7 +88,7 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
 @pytest.mark.parametrize(("mean", "told"), [(259.0, False), (261.0, True)])
 def test_a_circle_flown_more_than_a_quarter_and_10_m_wider_is_told(mean: float, told: bool) -> None:
     """Of ArduPlane, which is on its circle once it flies around: 200 m may be flown with 260."""
-    setup = replace(loiter(), autopilot=ArduPlane(default_parameters()))
+    setup = replace(loiter(), autopilot=ArduPlane(ArduPilotParameters.defaults()))
     _, aligned, _ = laid(setup, mean - 200.0, begins=1000.0)
     item = of(judge(setup, aligned.track), "loiter")
     assert item.flown == pytest.approx(mean, abs=0.9)

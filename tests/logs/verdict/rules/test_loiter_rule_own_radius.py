@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
@@ -49,7 +49,7 @@ def loiter(item: str, parameters: dict[str, float], **tables: Any) -> FlightSetu
     }
     scenario = from_spec(spec | tables, "own")
     airframe = load_airframe(scenario)
-    law = ArduPlane(load_parameters(airframe.aircraft)).with_parameters(**parameters)
+    law = ArduPlane(ArduPilotParameters.load(airframe.aircraft)).with_parameters(**parameters)
     limits = replace(airframe.limits, max_bank=min(airframe.limits.max_bank, bank_limit(scenario, law)))
     flown_by = replace(airframe, autopilot=law, limits=limits)
     return replace(make_setup(scenario, flown_by, parse_mission(text, "own.waypoints"), 1), nav="perfect")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters as arduplane_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import default_parameters, parameters_of
+from flight.autopilots.px4.parameters import Px4Parameters
 from logs.recording.setup_schema import RouteTable
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
@@ -116,14 +116,14 @@ def test_px4s_own_limits_are_named_and_are_no_verdict_on_the_aircraft(case: str)
 @pytest.mark.parametrize("case", sorted(REFUSED))
 def test_where_px4_flies_what_it_refuses_fails(case: str) -> None:
     check, lines, item, _ = REFUSED[case]
-    verdict = judge_geometry(replace(setup_of(*lines), autopilot=Px4(default_parameters())))
+    verdict = judge_geometry(replace(setup_of(*lines), autopilot=Px4(Px4Parameters.defaults())))
     found = [one for one in verdict.findings if one.rule == "mission" and one.check == check]
     assert [(one.ok, one.place) for one in found] == [(False, Place("mission", item=item))]
 
 
 def by_px4(text: str, *lines: str) -> list[Finding]:
     """The rule's findings where PX4 flies with a file of parameters, "" for none."""
-    made = parameters_of(text, "a.params") if text else default_parameters()
+    made = Px4Parameters.of_text(text, "a.params") if text else Px4Parameters.defaults()
     findings = judge_geometry(replace(setup_of(*lines), autopilot=Px4(made))).findings
     return [item for item in findings if item.rule == "mission"]
 
@@ -157,7 +157,7 @@ def test_px4_asks_for_a_takeoff_or_a_landing(text: str, lines: tuple[str, ...], 
 
 
 def test_without_a_landing_a_default_px4_flies_and_the_verdict_says_so() -> None:
-    verdict = judge_geometry(replace(setup_of(*GOOD), autopilot=Px4(default_parameters())))
+    verdict = judge_geometry(replace(setup_of(*GOOD), autopilot=Px4(Px4Parameters.defaults())))
     said = "PX4 would not take it: PX4's fixed-wing default refuses a mission without a landing"
     # Its take-off is not flown, and leaves the verdict open.
     assert verdict.undecided
@@ -172,7 +172,7 @@ def test_a_takeoff_climbs_beyond_the_acceptance_radius_that_is_set(radius: int, 
     (found,) = [item for item in by_px4(f"NAV_ACC_RAD {radius}", *lines) if item.check == "checkTakeoff"]
     assert found.ok is taken
     # As a value that is suggested is tried.
-    law = Px4(default_parameters()).with_parameters(NAV_ACC_RAD=float(radius))
+    law = Px4(Px4Parameters.defaults()).with_parameters(NAV_ACC_RAD=float(radius))
     assert (not judge_geometry(replace(setup_of(*lines), autopilot=law)).failed) is taken
 
 
@@ -333,7 +333,7 @@ def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
 def test_settings_of_arduplane_that_no_flight_shows_leave_the_verdict_open(
     values: dict[str, float], said: tuple[str, ...]
 ) -> None:
-    law = ArduPlane(arduplane_parameters().changed(**values))
+    law = ArduPlane(ArduPilotParameters.defaults().changed(**values))
     lines = wp(0, 0), wp(0, 900), "0 20 0 0 0 0 0 0 0"
     left = [item for item in mission_findings(replace(setup_of(*lines), autopilot=law)) if item.check == "not flown"]
     assert [item.ok for item in left] == [None] * len(said)
@@ -355,7 +355,7 @@ def test_settings_of_arduplane_that_no_flight_shows_leave_the_verdict_open(
 def test_settings_of_px4_that_no_flight_shows_leave_the_verdict_open(
     values: dict[str, float], said: tuple[str, ...]
 ) -> None:
-    law = Px4(default_parameters().changed(**values))
+    law = Px4(Px4Parameters.defaults().changed(**values))
     found = mission_findings(replace(setup_of(wp(0, 0), wp(0, 900)), autopilot=law))
     left = [item for item in found if item.check == "not flown"]
     assert [item.ok for item in left] == [None] * len(said)

@@ -10,7 +10,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import load_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.route import make_route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
@@ -36,7 +36,7 @@ WAY = (wp(500, 1000, 300), wp(2500, 1000, 300), RTL)
 
 def by_arduplane(setup: FlightSetup, **parameters: float) -> FlightSetup:
     """A setup with ArduPlane's law, its mission laid out by its rules."""
-    law = ArduPlane(load_parameters(load_aircraft("aerosonde"))).with_parameters(**parameters)
+    law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(**parameters)
     scenario = setup.scenario
     laid = (setup.mission, scenario.origin, scenario.terrain, 25.0, False, setup.limits)
     route = make_route(*laid, law.route_rules)

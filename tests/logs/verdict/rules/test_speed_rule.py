@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
@@ -87,7 +87,7 @@ def test_arduplane_takes_a_command_for_equivalent_airspeed() -> None:
     for up, ok in ((0.0, True), (1000.0, False)):
         points = [[e, n, up] for e, n, _ in STRAIGHT]
         made = make_setup(points, airspeed=31.0, terrain={"kind": "flat", "amsl_m": -400.0})
-        setup = replace(made, autopilot=ArduPlane(default_parameters()))
+        setup = replace(made, autopilot=ArduPlane(ArduPilotParameters.defaults()))
         item = of(judge_geometry(setup), "speed", leg(0))
         true = 31.0 * math.sqrt(1.225 / (1.225 if up == 0.0 else 1.112))
         assert (item.ok, item.planned) == (ok, pytest.approx(true, rel=1e-3))
@@ -153,7 +153,7 @@ def test_parameters_that_do_not_fit_are_open_without_a_flight() -> None:
     """TRIM_THROTTLE 60 below THR_MIN 74: the throttle never comes down to what the airspeed needs."""
     made = make_setup(STRAIGHT)
     for values, open_ in (({"THR_MIN": 74.0, "TRIM_THROTTLE": 60.0}, True), ({"THR_MIN": 40.0}, False)):
-        parameters = replace(default_parameters().changed(AIRSPEED_MAX=32.0, **values), source="a.param")
+        parameters = replace(ArduPilotParameters.defaults().changed(AIRSPEED_MAX=32.0, **values), source="a.param")
         setup = replace(made, autopilot=ArduPlane(parameters))
         verdict = judge_geometry(setup)
         assert verdict.undecided is open_, verdict.summary

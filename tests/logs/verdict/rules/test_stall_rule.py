@@ -8,7 +8,7 @@ import pytest
 
 from aircraft.envelope import Envelope
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_flight, judge_geometry
@@ -57,7 +57,7 @@ def test_a_stall_speed_at_height_is_a_true_airspeed() -> None:
 def test_an_equivalent_airspeed_that_is_commanded_is_a_higher_true_one() -> None:
     """At 1,000 m the standard atmosphere has 1.1116 of 1.225 kg/m^3: true airspeed is 1.0498 times the equivalent."""
     setup = make_setup([[east, north, 1000] for east, north, _ in CORNER], airspeed=16.5)
-    equivalent = replace(setup, autopilot=ArduPlane(default_parameters()))
+    equivalent = replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults()))
     true = 16.5 * math.sqrt(1.225 / 1.1116)
     for flown, speed in ((setup, 16.5), (equivalent, true)):
         item = of(judge_geometry(flown), "stall", FLIGHT)

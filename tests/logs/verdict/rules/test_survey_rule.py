@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.items import Camera, SurveyPlan
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
@@ -166,7 +166,7 @@ def test_the_camera_tells_where_a_line_begins_and_ends() -> None:
 def test_photos_that_a_waypoint_counted_early_costs() -> None:
     """ArduPlane counts the line's end as reached 90 m before it, so that the camera is off there: two photos of 21."""
     setup = with_camera(1, 2)
-    law = ArduPlane(default_parameters()).with_parameters(WP_RADIUS=90.0)
+    law = ArduPlane(ArduPilotParameters.defaults()).with_parameters(WP_RADIUS=90.0)
     items = []
     # Each line ends at a right angle, before which ArduPlane turns by all of WP_RADIUS.
     for k, (east, north, _) in enumerate(lines(lead=0.0)):

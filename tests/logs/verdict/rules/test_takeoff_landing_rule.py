@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.simulate import simulate
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
@@ -124,7 +124,7 @@ def test_a_launch_too_gentle_for_the_motor_to_start(launch: Launch, ok: bool) ->
     setup = setup_of("3 22 15 0 0 0 0 0 100", *FAR, home=HOME)
     setup = replace(setup, scenario=replace(setup.scenario, launch=launch))
     requirements = route_requirements(setup)
-    asking = ArduPlane(default_parameters().changed(TKOFF_THR_MINACC=15.0))
+    asking = ArduPlane(ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0))
     judged = replace(requirements, setup=replace(setup, autopilot=asking))
     (found,) = takeoff_findings(judged, geometric=True)
     assert found.ok is ok
@@ -137,7 +137,7 @@ def test_a_launch_too_gentle_for_the_motor_to_start(launch: Launch, ok: bool) ->
 def test_a_take_off_item_with_a_place_of_its_own_is_launched_as_any_other() -> None:
     """As QGroundControl places it: ahead of home."""
     setup = setup_of(*climb(5.0), home=HOME)
-    asking = ArduPlane(default_parameters().changed(TKOFF_THR_MINACC=15.0))
+    asking = ArduPlane(ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0))
     for speed, ok in ((13.5, True), (13.3, False)):
         launch = Launch("catapult", speed=speed, length=6.0)
         made = replace(setup, autopilot=asking, scenario=replace(setup.scenario, launch=launch))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4 import parameters as px4_parameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup
@@ -99,7 +99,8 @@ def test_arduplane_turns_at_its_own_radius() -> None:
     for turn, radius in turns.items():
         points = [[e, n, 0.0] for e, n, _ in corner(turn)]
         setup = replace(
-            make_setup(points, terrain={"kind": "flat", "amsl_m": -400.0}), autopilot=ArduPlane(default_parameters())
+            make_setup(points, terrain={"kind": "flat", "amsl_m": -400.0}),
+            autopilot=ArduPlane(ArduPilotParameters.defaults()),
         )
         verdict = judge_geometry(setup)
         assert of(verdict, "waypoint", waypoint(1)).limit == pytest.approx(radius)
@@ -108,14 +109,16 @@ def test_arduplane_turns_at_its_own_radius() -> None:
         assert all(item.ok for item in verdict.findings if item.rule == "waypoint")
     # True by equivalent airspeed squared is the ratio of densities: 1.225 by 1.112 kg/m^3 at 1,000 m (US Standard
     # Atmosphere, 1976).
-    high = replace(make_setup([[e, n, 1000.0] for e, n, _ in corner(90.0)]), autopilot=ArduPlane(default_parameters()))
+    high = replace(
+        make_setup([[e, n, 1000.0] for e, n, _ in corner(90.0)]), autopilot=ArduPlane(ArduPilotParameters.defaults())
+    )
     assert of(judge_geometry(high), "waypoint", waypoint(1)).limit == pytest.approx(90.0 * 1.225 / 1.112, rel=1e-3)
 
 
 @pytest.mark.parametrize(("aside", "ok"), [(59.0, True), (-59.0, True), (61.0, False), (-61.0, False)])
 def test_past_the_line_beside_it_counts_for_arduplane_within_the_corridor(aside: float, ok: bool) -> None:
     stated = make_setup(STRAIGHT, limits={"corridor_m": 60.0})
-    setup = replace(accepting(stated, 10.0), autopilot=ArduPlane(default_parameters()))
+    setup = replace(accepting(stated, 10.0), autopilot=ArduPlane(ArduPilotParameters.defaults()))
     track = fly_path(setup, across=bump(3000.0, aside, 150.0))
     item = of(judge(setup, track), "waypoint", waypoint(1))
     assert item.ok is ok
@@ -151,7 +154,7 @@ def test_a_waypoints_margin_is_what_is_left_of_its_radius(aside: float, ok: bool
 
 
 def test_past_the_line_beside_it_there_is_no_margin() -> None:
-    setup = replace(accepting(make_setup(STRAIGHT), 10.0), autopilot=ArduPlane(default_parameters()))
+    setup = replace(accepting(make_setup(STRAIGHT), 10.0), autopilot=ArduPlane(ArduPilotParameters.defaults()))
     for aside, margin in ((50.0, None), (4.0, 6.0)):
         item = of(judge(setup, fly_path(setup, across=bump(3000.0, aside, 150.0))), "waypoint", waypoint(1))
         assert item.ok
@@ -159,7 +162,9 @@ def test_past_the_line_beside_it_there_is_no_margin() -> None:
 
 
 def test_px4_turns_by_its_own_radius_and_says_so() -> None:
-    setup = replace(accepting(make_setup(STRAIGHT), 120.0), autopilot=Px4(px4_parameters.default_parameters("1.17")))
+    setup = replace(
+        accepting(make_setup(STRAIGHT), 120.0), autopilot=Px4(px4_parameters.Px4Parameters.defaults("1.17"))
+    )
     planned = of(judge_geometry(setup), "waypoint", waypoint(1)).reason
     assert planned == (
         "PX4 turns to the next leg 10 m before it, or where it is past it; PX4 does not read the mission's 120 m"

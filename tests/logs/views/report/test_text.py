@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import default_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import MissionStretch
 from logs.recording.example_log import example_log
@@ -118,7 +118,7 @@ def test_badge_states_the_verdict(
 def test_each_level_says_who_flies_for_it() -> None:
     answers = tuple(LevelAnswer(name, name != "autopilot", f"{name} says") for name in LEVELS)
     verdict = Verdict((), False, True, (), "flown", answers)
-    rows = level_rows(verdict, ArduPlane(default_parameters()))
+    rows = level_rows(verdict, ArduPlane(ArduPilotParameters.defaults()))
     assert [row.flown_by for row in rows] == ["nobody", "planfly's guidance", "ArduPlane, by its parameters"]
     assert [row.state for row in rows] == ["pass", "pass", "fail"]
     assert level_rows(verdict, PlanflyGuidance("path"))[-1].flown_by == "planfly's guidance"
@@ -206,6 +206,6 @@ def test_a_level_that_leaves_something_open_neither_passes_nor_fails() -> None:
     lines = ("not judged in full: slope on leg 1 is within what is not known of the aircraft",)
     levels = (LevelAnswer("geometry", False, lines[0], undecided=True),)
     verdict = Verdict((), False, True, lines, "geometric", levels, unjudged="slope on leg 1")
-    (row,) = level_rows(verdict, ArduPlane(default_parameters()))
+    (row,) = level_rows(verdict, ArduPlane(ArduPilotParameters.defaults()))
     assert (row.state, row.sign) == ("unjudged", "? not judged")
     assert badge_of(verdict).word == "Not judged in full"

@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4.parameters import load_parameters
+from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
@@ -29,7 +29,7 @@ def test_circles_at_the_end_have_their_room_of_the_area(room: float, ok: bool | 
     speed = 25.0 / math.sqrt((1.0 - 0.0065 * 400.0 / 288.15) ** 4.2559)
     reach = 2.25 * speed**2 / (9.80665 * math.tan(math.radians(30.0)))
     made = setup_of(wp(0, 0), wp(6000.0 - reach - room, 0))
-    law = Px4(load_parameters(load_aircraft("aerosonde")))
+    law = Px4(Px4Parameters.load(load_aircraft("aerosonde")))
     setup = replace(made, scenario=replace(made.scenario, external=False), autopilot=law)
     verdict = judge_geometry(setup)
     item = of(verdict, "loiter")

@@ -1,0 +1,268 @@
+"""The parameters of an autopilot: one set of values, and how files, aircraft, logs and defaults make it.
+
+Of three sources the first that states a parameter applies: the file that a person gives, the aircraft, the autopilot's
+default.  `flight.autopilots.arduplane.parameters` and `flight.autopilots.px4.parameters` define which parameters an
+autopilot's law reads.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Self
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.autopilot import Origin, ParameterValue, StoredParameters, find_misfits
+from flight.autopilots.parameter_files import Entry, parse_parameters, read_parameter_file
+from flight.autopilots.parameter_origin import read_parameters_for, refuse_unknown
+from world.errors import ParameterError
+from world.files import TextLine
+
+# File in an aircraft's folder with ArduPlane's parameters of the aircraft.
+AIRCRAFT_FILE = "ardupilot.parm"
+
+# Values by name, and the source that states them.
+Stated = tuple[Origin, Mapping[str, float]]
+
+
+class Definition(NamedTuple):
+    """One parameter.
+
+    name: the autopilot's.
+    default: the autopilot's, in its unit.
+    low, high: range of the values that are accepted, in that unit.
+    to_si: factor to SI and radians.
+    old: an older name, and the factor from its unit to the unit of the present name.
+    documented: range of the autopilot's reference, if that is narrower.
+    """
+
+    name: str
+    default: float
+    low: float
+    high: float
+    to_si: float = 1.0
+    old: tuple[str, float] | None = None
+    documented: tuple[float, float] | None = None
+
+
+class ParameterTable:
+    """The parameters that an autopilot's law reads.
+
+    autopilot: the autopilot's name in a scenario.  title: its name in texts.
+    definitions: by the field of the law's record, in the order of the values.
+    pairs: a minimum and a maximum; the minimum must be lower.
+    orders: names of parameters whose values should not fall from one to the next.
+    log_digits: significant digits of the values in a log.
+    """
+
+    def __init__(
+        self,
+        autopilot: str,
+        title: str,
+        definitions: Mapping[str, Definition],
+        *,
+        pairs: Iterable[tuple[str, str]],
+        orders: Iterable[tuple[str, ...]],
+        log_digits: int = 17,
+    ) -> None:
+        self.autopilot, self.title, self.log_digits = autopilot, title, log_digits
+        self.definitions = tuple(definitions.values())
+        self.pairs, self.orders = tuple(pairs), tuple(orders)
+        self.by_name = {definition.name: definition for definition in self.definitions}
+        # Definition and factor to its unit, by each name that a file may use.
+        self.by_any_name = {name: (definition, 1.0) for name, definition in self.by_name.items()} | {
+            definition.old[0]: (definition, definition.old[1]) for definition in self.definitions if definition.old
+        }
+
+    def read(self, entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return values by present name and in present units, and the names that the law does not read.
+
+        Raises ParameterError for a value that is not accepted, and for two values of one parameter.
+        """
+        values: dict[str, float] = {}
+        unused = []
+        for name, entry in entries.items():
+            if name not in self.by_any_name:
+                unused.append(name)
+                continue
+            definition, factor = self.by_any_name[name]
+            value = entry.value * factor
+            if not definition.low <= value <= definition.high:
+                allowed = f"allowed {definition.low / factor:g}..{definition.high / factor:g}"
+                raise _refused(entry.where, name, entry.value, allowed)
+            if values.setdefault(definition.name, value) != value:
+                allowed = "the same parameter has another value under its other name"
+                raise _refused(entry.where, name, entry.value, allowed)
+        return values, tuple(unused)
+
+    def read_log(self, logged: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
+        """Return the values of a log that are accepted, and a sentence for each value that is not.  logged: by name."""
+        values: dict[str, float] = {}
+        notes = []
+        for name, definition in self.by_name.items():
+            old = definition.old
+            if name in logged:
+                value = logged[name]
+            elif old is not None and old[0] in logged:
+                value = logged[old[0]] * old[1]
+            else:
+                continue
+            value = float(f"{value:.{self.log_digits}g}")
+            if definition.low <= value <= definition.high:
+                values[name] = value
+            else:
+                notes.append(f"{name} {value:g} of the log is not allowed: the default is taken")
+        for low, high in self.pairs:
+            if low in values and high in values and values[low] >= values[high]:
+                notes.append(f"{low} {values[low]:g} and {high} {values[high]:g} of the log: the defaults are taken")
+                del values[low], values[high]
+        if not values:
+            notes.append(f"the log holds no parameters: {self.title}'s defaults are taken")
+        return values, notes
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSet:
+    """The parameters that an autopilot flies with; each autopilot has a subclass with its own `table`.
+
+    values: every parameter that the law reads, in the order of the table's definitions.
+    unused: names in the file that the law does not read.
+    source: the file that a person gave, "" for none.
+    """
+
+    table: ClassVar[ParameterTable]
+    # Names of parameters that are read, but whose effect no flight shows.
+    not_flown: ClassVar[tuple[str, ...]]
+    values: tuple[ParameterValue, ...]
+    unused: tuple[str, ...] = ()
+    source: str = ""
+
+    @classmethod
+    def defaults(cls, *fields: Any) -> Self:
+        """Return the autopilot's own values.  fields: further ones of the subclass, as PX4's version."""
+        return cls._build([], "", (), *fields)
+
+    @classmethod
+    def load(cls, aircraft: Aircraft, path: Path | str | None = None, *fields: Any) -> Self:
+        """Return the parameters that an aircraft is flown with: of a file, of the aircraft, and defaults.
+
+        Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
+        """
+        stated: list[Stated] = []
+        unused: tuple[str, ...] = ()
+        if path is not None:
+            entries = read_parameters_for(Path(path), cls.table.autopilot)
+            values, unused = cls.table.read(entries)
+            refuse_unknown(Path(path), cls.table.autopilot, entries, values)
+            stated.append(("file", values))
+        file = aircraft.folder / AIRCRAFT_FILE
+        if file.exists():
+            stated.append(("aircraft", cls._of_aircraft(read_parameter_file(file))))
+        return cls._build(stated, "" if path is None else str(path), unused, *fields)
+
+    @classmethod
+    def of_text(cls, text: str, source: str, *fields: Any) -> Self:
+        """Return the parameters of a file's text, with defaults for the others.  Raises ParameterError."""
+        values, unused = cls.table.read(parse_parameters(text, source))
+        return cls._build([("file", values)], source, unused, *fields)
+
+    @classmethod
+    def restore(cls, stored: StoredParameters, *fields: Any) -> Self:
+        """Return recorded parameters; a parameter that was not yet recorded has its default.
+
+        Raises ParameterError for a value that is not allowed.
+        """
+        origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
+        for name, value, origin in stored.values:
+            if definition := cls.table.by_name.get(name):
+                if not definition.low <= value <= definition.high:
+                    allowed = f"allowed {definition.low:g}..{definition.high:g}"
+                    raise _refused(stored.source, name, value, allowed)
+                origins[origin][name] = value
+        return cls._build(list(origins.items()), stored.source, stored.unused, *fields)
+
+    @classmethod
+    def of_log(cls, logged: Mapping[str, float], source: str, *fields: Any) -> tuple[Self, tuple[str, ...]]:
+        """Return the parameters of a flight log, and a sentence for each value that could not be used.
+
+        A log without parameters has the autopilot's defaults, and a sentence says so.  logged: by the names of any
+        release.  source: the log's file.
+        """
+        values, notes = cls.table.read_log(logged)
+        try:
+            return cls._build([("file", values)], source, (), *fields), tuple(notes)
+        except ParameterError as error:
+            return cls.defaults(*fields), (*notes, f"{error}: {cls.table.title}'s defaults are taken")
+
+    @classmethod
+    def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
+        """Return the values of the aircraft's file that the law reads."""
+        return cls.table.read(entries)[0]
+
+    @classmethod
+    def _is_stated(cls, definition: Definition, value: float) -> bool:
+        """Return True if a value in a file counts as stated by the file."""
+        return True
+
+    @classmethod
+    def _build(cls, stated: list[Stated], source: str, unused: tuple[str, ...], *fields: Any) -> Self:
+        """Take each parameter from the first source that states it, and refuse a minimum above its maximum."""
+
+        def find(definition: Definition) -> ParameterValue:
+            for origin, values in stated:
+                value = values.get(definition.name)
+                if value is not None and cls._is_stated(definition, value):
+                    return ParameterValue(definition.name, value, origin)
+            return ParameterValue(definition.name, definition.default, "default")
+
+        made = cls(tuple(map(find, cls.table.definitions)), unused, source, *fields)
+        found = {name: value for name, value, _ in made.values}
+        for low, high in cls.table.pairs:
+            if found[low] >= found[high]:
+                value, allowed = found[low], f"must be below {high} {found[high]:g}"
+                where = source or AIRCRAFT_FILE
+                message = f"{where}: {low} {value:g}: {allowed}"
+                raise ParameterError(message, file=where, field=low, value=value, allowed=allowed)
+        return made
+
+    def __getitem__(self, name: str) -> float:
+        """Return a parameter's value by the autopilot's name, in SI and radians."""
+        return next(value * self.table.by_name[name].to_si for known, value, _ in self.values if known == name)
+
+    def changed(self, **values: float) -> Self:
+        """Return the same parameters with other values, by the autopilot's names and in its units."""
+        if unknown := sorted(set(values) - self.table.by_name.keys()):
+            raise ValueError(f"{unknown[0]}: not a parameter of the law")
+        made = tuple(
+            parameter._replace(value=values[parameter.name], origin="file") if parameter.name in values else parameter
+            for parameter in self.values
+        )
+        return replace(self, values=made)
+
+    def by_origin(self, origin: Origin) -> dict[str, float]:
+        """Return the values that one source states, by name and in the autopilot's units."""
+        return {name: value for name, value, stated in self.values if stated == origin}
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """Values of the file outside their documented ranges, which are flown all the same, with the ranges."""
+        found = []
+        for name, value in self.by_origin("file").items():
+            low, high = self.table.by_name[name].documented or (-math.inf, math.inf)
+            if not low <= value <= high:
+                found.append(f"{name} {value:g} ({low:g}..{high:g})")
+        return tuple(found)
+
+    @property
+    def misfits(self) -> tuple[str, ...]:
+        """Values of the file that contradict another parameter, in words; the autopilot flies with them."""
+        return find_misfits(self.values, self.table.orders)
+
+
+def _refused(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
+    """Make the error of a value.
+
+    where: its line; or the source of recorded parameters, which the message does not name.
+    """
+    at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
+    return ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)
