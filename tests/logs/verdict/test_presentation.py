@@ -1,0 +1,90 @@
+"""A verdict in the order in which it is shown, the same for terminal, report page, notebook, studio and JUnit."""
+
+from xml.etree import ElementTree
+
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, make_finding
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.presentation import findings_by_rule
+from logs.verdict.rule_words import RULE_WORDS
+from logs.verdict.rules.registry import RULES
+from logs.verdict.verdict import Verdict
+from logs.views.report.text import failed_groups, rule_rows
+from planfly.studio.sheet import findings_json
+from planfly.terminal.verdict_lines import verdict_lines
+
+
+def leg(
+    index: int, *, ok: bool | None, margin: float | None = None, rule: str = "clearance", check: str = ""
+) -> Finding:
+    reason = f"{rule} on leg {index}"
+    return make_finding(rule, Place("leg", index), ok=ok, reason=reason, margin=margin, limit=60.0, check=check)
+
+
+# In the order of the rules: slope comes before clearance, and speed after it.
+FINDINGS = (
+    leg(0, ok=None, rule="slope", check=UNKNOWN_AIRCRAFT),
+    leg(1, ok=False, rule="slope", margin=-1.0),
+    leg(0, ok=False, margin=-2.0),
+    leg(1, ok=False, margin=-8.0),
+    leg(2, ok=True, margin=5.0),
+    leg(0, ok=True, margin=9.0, rule="speed"),
+    leg(1, ok=True, margin=3.0, rule="speed"),
+    make_finding("completion", FLIGHT, ok=False, reason="ended early"),
+)
+VERDICT = Verdict(FINDINGS, flyable=False, complete=False, lines=("not flyable", "Start: in the air"), level="flown")
+
+
+def test_every_rule_has_words_and_a_judge() -> None:
+    assert list(RULES) == list(RULE_WORDS)
+    assert {name: rule.name for name, rule in RULES.items()} == {name: name for name in RULE_WORDS}
+
+
+def test_findings_stand_by_rule_in_the_order_of_the_rules() -> None:
+    shown = findings_by_rule(FINDINGS[::-1])
+    assert [rule.words.name for rule in shown] == ["slope", "clearance", "speed", "completion"]
+    assert [rule.count_text for rule in shown] == ["0 of 1 ok", "1 of 3 ok", "2 of 2 ok", "0 of 1 ok"]
+
+
+def test_what_ends_a_flight_is_named_first_and_of_a_rule_the_worst() -> None:
+    failed = VERDICT.present().failed_rules
+    # Urgencies: completion 3, slope 1, clearance 0.
+    assert [rule.words.name for rule in failed] == ["completion", "slope", "clearance"]
+    assert [finding.place.index for finding in failed[-1].failed] == [1, 0]
+
+
+def test_the_list_has_what_failed_or_is_open_and_then_the_closest_of_each_other_rule() -> None:
+    assert [number for number, _ in VERDICT.present().worth_listing(60)] == [0, 1, 2, 3, 7, 6]
+    # Of many failures as many as are asked for; a rule whose worst failure is left out has no other finding.
+    assert [number for number, _ in VERDICT.present().worth_listing(2)] == [0, 1, 6]
+
+
+def test_the_state_is_open_where_nothing_failed_and_a_part_was_not_judged() -> None:
+    def state(flyable: bool, unjudged: str, findings: tuple[Finding, ...] = ()) -> str:
+        return (
+            Verdict(findings, flyable=flyable, complete=True, lines=("a",), level="flown", unjudged=unjudged)
+            .present()
+            .state
+        )
+
+    assert state(True, "") == "ok"
+    assert state(False, "slopes") == "open"
+    assert state(False, "slopes", FINDINGS) == "fail"
+
+
+def test_every_rendering_shows_the_same_failures_in_the_same_order() -> None:
+    """Clearance: the worst on leg 1, then leg 0; one of three passes."""
+    lines = verdict_lines(VERDICT, [])
+    failing = [line.split()[1] for line in lines if "  failed  " in line]
+    assert failing == ["completion", "slope", "clearance,"]
+    assert [group.rule for group in failed_groups(VERDICT)] == ["completion", "slope", "clearance"]
+    assert "1 of 3 ok" in next(line for line in lines if line.startswith("  clearance"))
+    page = ElementTree.fromstring(VERDICT._repr_html_())
+    cells = [[cell.text or "" for cell in row] for row in page.find("table/tbody") or ()]
+    assert ["clearance", "1 of 3 ok", "", ""] in cells
+    assert [row.counts for row in rule_rows(FINDINGS) if row.rule == "clearance"] == ["2 of 3 fail"]
+    listed = [(row["number"], row["ok"]) for row in findings_json(VERDICT) if row["kind"] == "leg"]
+    assert listed == [(0, None), (1, False), (2, False), (3, False), (6, True)]
+    suite = ElementTree.fromstring(VERDICT.to_junit("m"))[0]
+    # Four findings failed, and the verdict.
+    assert suite.get("failures") == "5"
+    assert suite.get("skipped") == "1"
