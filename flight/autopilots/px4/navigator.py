@@ -278,7 +278,7 @@ def past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - com
 def leg_height(
     end_east: float, end_north: float, end_up: float, early: float, own: Record
 ) -> float:  # pragma: no cover - compiled
-    """Return the altitude setpoint of a leg at the aircraft, m: a slope that ends ``early`` m before its end.
+    """Return a leg's altitude setpoint at the aircraft, m: a slope that ends ``early`` m before its end.
 
     PX4 calls it a first-order hold.  The slope uses the smallest horizontal distance to the end that was reached on
     this leg; a leg no longer than ``early`` is a step.

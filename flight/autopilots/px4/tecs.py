@@ -108,18 +108,16 @@ def _set_pitch(
     weight = parameters.speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
     # Clip both weights at 1, so that a weight above 1 lowers the other instead of raising the loop gain.
     ske_weight, spe_weight = min(1.0, max(0.0, weight)), min(1.0, max(0.0, 2.0 - weight))
-    seb_rate_demand = GRAVITY * climb_rate * spe_weight - speed * acceleration * ske_weight
-    seb_rate_error = seb_rate_demand - (
-        GRAVITY * estimated.velocity_up * spe_weight - speed * own.airspeed_rate * ske_weight
-    )
+    rate_demand = GRAVITY * climb_rate * spe_weight - speed * acceleration * ske_weight
+    rate_error = rate_demand - (GRAVITY * estimated.velocity_up * spe_weight - speed * own.airspeed_rate * ske_weight)
     rate_per_pitch = speed * GRAVITY
     pitch_max, pitch_min = (
         parameters.pitch_limit_max - parameters.pitch_trim,
         parameters.pitch_limit_min - parameters.pitch_trim,
     )
-    increment = seb_rate_error * parameters.pitch_integral * dt
+    increment = rate_error * parameters.pitch_integral * dt
     angle = (
-        seb_rate_error * parameters.pitch_damping + parameters.balance_share * seb_rate_demand + own.balance_sum
+        rate_error * parameters.pitch_damping + parameters.balance_share * rate_demand + own.balance_sum
     ) / rate_per_pitch
     # In saturation the integrator may only move away from the limit.
     if not ((angle >= pitch_max and increment > 0.0) or (angle <= pitch_min and increment < 0.0)):
@@ -138,18 +136,18 @@ def _set_throttle(
     """Set the throttle demand from the STE rate of a climb rate (m/s) and an acceleration (m/s^2)."""
     max_rate, min_rate = GRAVITY * parameters.climb_max, -GRAVITY * parameters.sink_min
     roll_drag = parameters.roll_to_throttle * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)
-    wanted = min(max_rate, max(min_rate, GRAVITY * climb_rate + own.airspeed * acceleration + roll_drag))
+    rate_demand = min(max_rate, max(min_rate, GRAVITY * climb_rate + own.airspeed * acceleration + roll_drag))
     ste_rate = GRAVITY * estimated.velocity_up + own.airspeed * own.airspeed_rate
     own.energy_rate += (ste_rate - own.energy_rate) * dt / (dt + parameters.energy_rate_time)
-    amiss, span = wanted - own.energy_rate, max_rate - min_rate
+    rate_error, span = rate_demand - own.energy_rate, max_rate - min_rate
     # In thin air level flight needs more throttle.
     trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * factor))
-    if wanted >= 0.0:
-        throttle = trim + wanted * (parameters.throttle_max - trim) / max_rate
+    if rate_demand >= 0.0:
+        throttle = trim + rate_demand * (parameters.throttle_max - trim) / max_rate
     else:
-        throttle = trim + wanted * (trim - parameters.throttle_min) / -min_rate
-    throttle += amiss * parameters.throttle_damping / span + own.throttle_sum
-    increment = amiss * parameters.throttle_integral / span * dt
+        throttle = trim + rate_demand * (trim - parameters.throttle_min) / -min_rate
+    throttle += rate_error * parameters.throttle_damping / span + own.throttle_sum
+    increment = rate_error * parameters.throttle_integral / span * dt
     full, idle = throttle >= parameters.throttle_max, throttle <= parameters.throttle_min
     if not ((full and increment > 0.0) or (idle and increment < 0.0)):
         own.throttle_sum += increment
