@@ -68,17 +68,17 @@ class Guard:
 
     def keep_folder(self, folder: Path) -> None:
         """Guard a folder, whose name has no line break."""
-        self._tell(f"folder {folder}")
+        self._write_line(f"folder {folder}")
 
     def keep_file(self, file: Path) -> None:
         """Guard a file that may be created, whose name has no line break."""
-        self._tell(f"file {file}")
+        self._write_line(f"file {file}")
 
     def keep_group(self, group: int) -> None:
         """Guard a process group."""
-        self._tell(f"group {group}")
+        self._write_line(f"group {group}")
 
-    def _tell(self, line: str) -> None:
+    def _write_line(self, line: str) -> None:
         with contextlib.suppress(BrokenPipeError):
             self._words.write(f"{line}\n".encode())
 
@@ -90,6 +90,6 @@ class Guard:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the guard process."""
-        self._tell("done")
+        self._write_line("done")
         self._words.close()
         self._process.wait()
