@@ -1,11 +1,11 @@
-"""What steers a flight, as an interface: everything that the rest of planfly asks of an autopilot.
+"""Interface of an autopilot: everything that the rest of planfly asks of what controls a flight.
 
-An `Autopilot` carries its own settings: a `FlightSetup` holds one, and whoever plans, flies, judges or records asks it
-and never tests which one it is.  Each has a folder beside this file; `flight.autopilots.catalog.AUTOPILOTS` lists them.
+An `Autopilot` carries its own settings.  A `FlightSetup` holds one; planning, flights, verdicts and recordings ask it,
+and never test which autopilot it is.  Each has a folder next to this file; `flight.autopilots.catalog.AUTOPILOTS` lists
+them.
 
-The base class answers for an autopilot that flies the fly-by path as it was planned, at the true airspeeds that it is
-told, without parameters, and returns to launch as ArduPlane does by its defaults.  An autopilot overrides what it does
-otherwise.
+The base class describes an autopilot without parameters that flies the fly-by path as it was planned, at the commanded
+true airspeeds, and returns to launch as ArduPlane does by its defaults.  An autopilot overrides what it does otherwise.
 """
 
 import math
@@ -38,29 +38,29 @@ Floats = NDArray[np.float64]
 # One tick of the compiled loop, on the block of a `flight.simulation.tick.Workspace`: a key of `ENDS`, 0 to fly on.
 Tick = Callable[[Floats, Heights], int]
 
-# What a flight answers: whether the aircraft can fly it at all, or whether it goes well with an autopilot.
+# Question that a flight answers: can the aircraft fly it at all, or can it fly it with an autopilot.
 Level = Literal["airframe", "autopilot"]
 
 # ----------------------------------------------------------------------
-# Parameters: what a person's file, the aircraft's folder or the autopilot itself states.
+# Parameters, from the user's file, the aircraft's folder or the autopilot's defaults.
 
 Origin = Literal["file", "aircraft", "default"]
 
 
 class ParameterValue(NamedTuple):
-    """A parameter's value in the autopilot's unit, and who states it."""
+    """A parameter's value in the autopilot's unit, with its source."""
 
     name: str
     value: float
     origin: Origin
 
 
-# Who states a value, in words.
-_STATED_BY: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraft", "default": "the defaults"}
+# Sources of a value, in words.
+_SOURCE_NAMES: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraft", "default": "the defaults"}
 
 
 def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Name the values of a file that are above or below a parameter that has to be the other way round.
+    """Name the values of a file that contradict the order of two parameters.
 
     orders: names of parameters whose values must not fall from one to the next.
 
@@ -75,7 +75,7 @@ def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, .
             if low.value <= high.value or "file" not in (low.origin, high.origin):
                 continue
             first, word, second = (high, "below", low) if high.origin == "file" else (low, "above", high)
-            texts = (f"{one.name} {one.value:g} of {_STATED_BY[one.origin]}" for one in (first, second))
+            texts = (f"{one.name} {one.value:g} of {_SOURCE_NAMES[one.origin]}" for one in (first, second))
             found.append(f" is {word} ".join(texts))
     return tuple(found)
 
@@ -83,8 +83,8 @@ def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, .
 class Parameters(Protocol):
     """An autopilot's parameters by its own names and in its own units.
 
-    values: every parameter that its law knows.  unused: names that the file states and the law has no use for.
-    source: the file that a person gave, "" for none.  not_flown: read, but no flight shows them.
+    values: every parameter that its law uses.  unused: names in the file that the law does not use.
+    source: the user's file, "" if there is no file.  not_flown: parameters that are read but not flown.
     beyond: values of the file outside their documented ranges, which are flown all the same, with those ranges.
     misfits: values of the file that contradict another parameter, in words; the autopilot flies with them all the same.
     """
@@ -112,16 +112,16 @@ class Parameters(Protocol):
         """As above."""
 
     def changed(self, **values: float) -> Self:
-        """The same parameters but for these."""
+        """Return a copy with other values for some parameters."""
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
-        """The values that one source states, by name."""
+        """Return the values that one source states, by name."""
 
 
 class SpeedLimits(NamedTuple):
-    """Airspeeds (m/s) that an autopilot takes from a mission, and the parameters that set them.
+    """Airspeeds (m/s) that an autopilot accepts from a mission, and the parameters that set them.
 
-    nearest: whether it flies the nearest of them for a command of another, which it else ignores.
+    nearest: True if it flies the nearer limit for a command outside; otherwise it ignores such a command.
     """
 
     min: float
@@ -132,12 +132,12 @@ class SpeedLimits(NamedTuple):
 
 
 class MissionChecks(NamedTuple):
-    """What PX4's feasibility checks go by, by default as its fixed wings do.
+    """Settings of PX4's feasibility checks, by default as for its fixed wings.
 
     acceptance: NAV_ACC_RAD, m.
     landing_angle: FW_LND_ANG, rad.
     requires: MIS_TKO_LAND_REQ: 0 nothing, 1 a takeoff, 2 a landing, 3 both, 4 and 5 both or neither.
-    stated: whether a person's file decides what it requires.
+    stated: True if the user's file decides what it requires.
     """
 
     acceptance: float = 10.0
@@ -147,11 +147,11 @@ class MissionChecks(NamedTuple):
 
 
 class LandingGlide(NamedTuple):
-    """The way down to a landing point: straight to where the flare begins, and from there to the ground.
+    """Glide to a landing point: straight to the start of the flare, and from there to the ground.
 
-    slope: m of height per m of way.
-    flare_height: of the flare's beginning over the landing point, m; 0 where none is known of.
-    flare_distance: of the flare's beginning before the landing point, m.
+    slope: m of altitude per m of distance.
+    flare_height: of the start of the flare above the landing point, m; 0 if unknown.
+    flare_distance: of the start of the flare before the landing point, m.
     """
 
     slope: float
@@ -160,13 +160,13 @@ class LandingGlide(NamedTuple):
 
 
 class Candidate(NamedTuple):
-    """A parameter that may decide a flight that fails.
+    """A parameter that may cause a flight to fail.
 
-    name: the autopilot's.
-    step: the increment that its parameter reference gives, or a few of them.
-    far: the farthest value that is tried, within the range that the reference gives.
+    name: the autopilot's name.
+    step: the increment in its parameter reference, or a few of them.
+    far: the farthest value to try, within the range of the reference.
     unit: of both.
-    least: what is named as passing at the least, in steps from here where the present value is below it.
+    least: the lowest value that may be suggested, in steps from here if the present value is below it.
     """
 
     name: str
@@ -178,7 +178,7 @@ class Candidate(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AutopilotProgram(DocumentConfig):
-    """The SITL program that flew."""
+    """SITL program of a flight."""
 
     version: str
     """The version that the program states."""
@@ -204,7 +204,7 @@ class StoredAutopilot(NamedTuple):
     """An autopilot's settings as a log stores them.
 
     guidance: the law of planfly's guidance, "path" for every other autopilot.
-    version: of an autopilot whose releases have laws of their own, "" for any other.
+    version: of an autopilot whose releases have different laws, "" for any other.
     """
 
     guidance: Guidance = "path"
@@ -217,27 +217,27 @@ class StoredAutopilot(NamedTuple):
 
 
 class Autopilot(ABC):
-    """What steers a flight, with its settings; subclasses are frozen dataclasses.
+    """Autopilot of a flight, with its settings; subclasses are frozen dataclasses.
 
-    name: as `[flight] autopilot` states it.
-    title: as texts name it.
-    level: which question its flight answers.  At "airframe" it stands for the aircraft alone; at "autopilot" its
-    verdict is set beside a reference flight by planfly's guidance.
-    parameters: None for an autopilot that has none.
-    program: that flew it, None for a law and before the flight.
-    own: type of the record that its law keeps beside `flight.guidance.inner_loops.GUIDANCE_MEMORY`; None for none.
-    cruise_parameter: that states its cruise airspeed; "" for none.
-    equivalent_airspeeds: whether commanded airspeeds count as equivalent ones, which are less than true ones at height;
-    it then takes over in level flight.
-    acceptance_limit: largest acceptance radius that it reads of an item, m.
-    refuses: whether it takes no mission that PX4's feasibility checks refuse.
-    refuses_as_arduplane: whether it takes no mission with a command that ArduPlane refuses.
-    reads_as_px4: whether it reads nothing but the value of a mission's change of speed, goes back to its own airspeed
-        for any that is not positive, and reads gates.
-    flies_ground: whether it flies take-offs and landings, see `from_ground`.
-    flies_both_ends: whether it does so only in a mission that has both.
-    height_parameter: says how far off a waypoint's height it circles there; "" for one that flies on.
-    height_candidates, side_candidates: parameters that may decide a flight which fails by its height or its track.
+    name: as in `[flight] autopilot`.
+    title: as in texts.
+    level: the question that its flight answers.  At "airframe" it stands for the aircraft alone; at "autopilot" its
+        verdict is compared with a reference flight by planfly's guidance.
+    parameters: None for an autopilot without parameters.
+    program: that flew it; None for a law and before the flight.
+    own: type of the record that its law has in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
+    cruise_parameter: parameter of its cruise airspeed; "" if it has no such parameter.
+    equivalent_airspeeds: True if commanded airspeeds are equivalent airspeeds, which are lower than true ones at
+        altitude; it then takes over in level flight.
+    acceptance_limit: largest acceptance radius that it reads from an item, m.
+    refuses: True if it refuses missions that fail PX4's feasibility checks.
+    refuses_as_arduplane: True if it refuses missions with a command that ArduPlane refuses.
+    reads_as_px4: True if it reads only the value of a mission's change of speed, goes back to its own airspeed for any
+        value that is not positive, and reads gates.
+    flies_ground: True if it flies take-offs and landings, see `from_ground`.
+    flies_both_ends: True if it does so only in a mission that has both.
+    height_parameter: the altitude tolerance outside which it circles at a waypoint; "" if it flies on.
+    height_candidates, side_candidates: parameters that may cause an altitude or a track to fail.
     """
 
     name: ClassVar[str]
@@ -258,13 +258,13 @@ class Autopilot(ABC):
     parameters: Parameters | None = None
     program: AutopilotProgram | None = None
 
-    # How it is made: of a scenario, of a log.
+    # Construction from a scenario or a log.
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """The autopilot of a scenario's [flight] table, which `scenario` names in messages.
+        """Return the autopilot of a scenario's [flight] table, which `scenario` names in messages.
 
-        Raises ScenarioError for an entry that it does not take, and ParameterError for a bad file of parameters.
+        Raise ScenarioError for an entry that it does not accept, and ParameterError for a bad parameter file.
         """
         if table.params is not None:
             allowed = f'not a key of autopilot = "{cls.name}", which has no parameters'
@@ -273,99 +273,106 @@ class Autopilot(ABC):
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """The autopilot that a log stores.  Raises ParameterError for a value that is not allowed."""
+        """Return the autopilot that a log stores.
+
+        Raise ParameterError for a value that is not allowed.
+        """
         return cls()
 
     def store(self) -> StoredAutopilot:
-        """Its settings as a log stores them: what `restore` takes."""
+        """Return its settings as a log stores them, for `restore`."""
         return StoredAutopilot()
 
     @classmethod
     def of_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """The autopilot that wrote a log, and what of its parameters could not be used; None for another's log.
+        """Return the autopilot that wrote a log, and notes on its parameters; None for another's log.
 
-        program: as the log names what flew.  parameters: by name.  source: the log's file.
+        program: name of the flown program in the log.  parameters: by name.  source: the log's file.
+        The notes name the parameters that could not be used.
         """
         return None
 
     @classmethod
     def recognises(cls, program: Path) -> bool:
-        """Whether it is flown by such a program, which --autopilot names; False for a law."""
+        """Return True if the program that --autopilot names flies this autopilot; False for a law."""
         return False
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """What an aircraft's folder lacks to be flown by it, in sentences.  Raises PlanflyError for a broken file."""
+        """Return what an aircraft's folder lacks for this autopilot, in sentences.
+
+        Raise PlanflyError for a broken file.
+        """
         return []
 
-    # What flies.
+    # Flight.
 
     @property
     def law(self) -> "Autopilot":
-        """The autopilot whose law flies where no program does: itself, but for a program."""
+        """Autopilot whose law flies when no program does: itself, unless it is a program."""
         return self
 
     @property
     @abstractmethod
     def tick(self) -> Tick:
-        """One tick of its law, compiled."""
+        """Compiled function for one tick of its law."""
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Set what its law needs to know before the first tick.
+        """Set what its law needs before the first tick.
 
-        memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.  own: of the type `own`, None where that is None.
+        memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.  own: of the type `own`, or None if that is None.
         """
         return
 
     def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "GroundAutopilot":
-        """The autopilot that flies these ways from the ground and to it as well; only of one that `flies_ground`.
+        """Return the autopilot that also flies this take-off and landing; only if it `flies_ground`.
 
         contacts: of the aircraft.
         """
         raise ValueError(f"{self.title} flies no take-off and no landing")
 
     def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """Begin another way where the aircraft is, and keep what the law has learnt of the aircraft.
+        """Begin another route at the aircraft's position, and keep the law's state of the aircraft.
 
-        before: the record that the law kept on the way it was on.  own: the one for this way, which `begin` has seen.
-        here: (3,) where it begins, m.
+        before: the law's record on the previous route.  own: the record for this route, after `begin`.
+        here: (3,) start of the route, m.
         """
         return
 
-    # What a plan, a mission and a verdict have to know of it.
+    # Properties for planning, missions and verdicts.
 
     def described(self, aircraft: str) -> str:
-        """Who steers, in words, with the settings that decide most of the flight."""
+        """Return a description of the autopilot with the settings that matter most in the flight."""
         return self.title
 
     @property
     def version(self) -> str:
-        """The release that flies, or whose law does; "" for planfly's own guidance, which has planfly's version."""
+        """Release of the program or law that flies; "" for planfly's own guidance."""
         return ""
 
     @property
     def acceptance_radius(self) -> float | None:
-        """Distance (m) from a waypoint at which it turns to the next leg where the mission states none.
+        """Distance (m) from a waypoint at which it turns to the next leg if the mission states none.
 
-        None for an autopilot that follows the fly-by path.  Any other flies from leg to leg, and has reached a
-        waypoint too where it passes the line across the leg there.
+        None for an autopilot that follows the fly-by path.  Any other flies from leg to leg, and has reached a waypoint
+        also where it passes the line across the leg there.
         """
         return None
 
     @property
     def reads_acceptance(self) -> bool:
-        """Whether the radius that a mission states at a waypoint decides when it turns to the next leg."""
+        """True if the radius of a mission's waypoint decides when it turns to the next leg."""
         return True
 
     @property
     def follows_path(self) -> bool:
-        """Whether it follows the fly-by path, and does not turn by an acceptance radius."""
+        """True if it follows the fly-by path, and does not turn by an acceptance radius."""
         return self.acceptance_radius is None
 
     def settings_not_flown(self, *, returns: bool) -> list[str]:
-        """Return the settings that change the flight path and that no flight shows, as sentences without a full stop.
+        """Return the settings that change the flight path but are not flown, as sentences without a full stop.
 
         returns: True if the mission returns to launch.
         """
@@ -378,25 +385,26 @@ class Autopilot(ABC):
 
     @property
     def keeps_to_arcs(self) -> bool:
-        """Whether how closely it passes a waypoint tells the radius of its turn."""
+        """True if the radius of a turn follows from its distance to the waypoint."""
         return True
 
     def turn_distance(self, turn: float, amsl: float) -> float:
-        """How far (m) before a waypoint it turns to the next leg at most; 0 for one that follows the fly-by path.
+        """Return the maximum distance (m) before a waypoint at which it turns to the next leg.
 
-        turn: rad, positive; pi at the mission's end.  amsl: height of the waypoint, m.
+        It is 0 for an autopilot that follows the fly-by path.
+        turn: rad, positive; pi at the mission's end.  amsl: altitude of the waypoint, m.
         """
         return 0.0
 
     def airspeed_factor(self, amsl: float) -> float:
-        """True airspeed that it flies by the commanded one, at a height (m AMSL)."""
+        """Return the ratio of flown true airspeed to commanded airspeed, at an altitude (m AMSL)."""
         return 1.0
 
     def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """The way down to a landing point from the waypoint before it: straight to the point, and no flare is told.
+        """Return the glide from the waypoint before the landing point: straight to the point, without a flare.
 
-        height, run: of that waypoint over the landing point and before it, m, both positive.
-        tail_wind: m/s, negative from ahead.  amsl: height of the landing point, m.
+        height, run: of that waypoint above the landing point and before it, m, both positive.
+        tail_wind: m/s, negative for a head wind.  amsl: altitude of the landing point, m.
 
         >>> from flight.autopilots.planfly.autopilot import PlanflyGuidance
         >>> PlanflyGuidance().landing_glide(50.0, 1000.0, 0.0, 0.0)
@@ -405,54 +413,55 @@ class Autopilot(ABC):
         return LandingGlide(height / run)
 
     def landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
-        """True airspeed on the glide to a landing point, m/s: that of the cruise, m/s.
+        """Return the true airspeed on the glide to a landing point, m/s: the cruise airspeed.
 
-        tail_wind: m/s, negative from ahead.  amsl: height of the landing point, m.
+        cruise: m/s.  tail_wind: m/s, negative for a head wind.  amsl: altitude of the landing point, m.
         """
         return cruise
 
     def as_asked(
         self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
     ) -> "Autopilot":
-        """The autopilot with what a scenario sets of its returns; as it is where it has no parameters for it.
+        """Return the autopilot with a scenario's RTL settings; unchanged if it has no such parameters.
 
-        rtl_altitude: over home, m.  rtl_autoland: ArduPlane's; None where the scenario leaves them as they are.
-        lands: whether the scenario's missions end with a landing sequence.  lower: by so much than home, m.
+        rtl_altitude: over home, m.  rtl_autoland: in ArduPlane; None for either leaves the setting unchanged.
+        lands: True if the scenario's missions end with a landing sequence.  lower: of the field below home, m.
         """
         return self
 
     def go_around_height(self, asked: float, takeoff: float) -> float | None:
-        """Height over home (m) that it climbs to on its landing course before it goes around; None where that is open.
+        """Return the altitude over home (m) of its climb before it goes around, or None if unknown.
 
-        asked: by the landing item, m, 0 for nothing.  takeoff: of the mission's take-off over home, m, 0 for none.
+        asked: by the landing item, m, 0 if not stated.  takeoff: of the mission's take-off over home, m, 0 if there is
+        none.
         """
         return None
 
     @property
     def launch_trigger(self) -> tuple[float, str] | None:
-        """Least acceleration of a launch that starts its motor, m/s^2, and the parameter; None where none is needed."""
+        """Minimum launch acceleration that starts its motor, m/s^2, and the parameter; None if none is needed."""
         return None
 
     @property
     def speed_limits(self) -> SpeedLimits | None:
-        """Airspeeds that it takes from a mission; None for no limits."""
+        """Airspeeds that it accepts from a mission; None for no limits."""
         return None
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Airspeeds (l,) that it flies on each leg, of those commanded (l,), m/s.
+        """Return the airspeeds (l,) that it flies on each leg for commanded ones (l,), m/s.
 
-        cruise: its airspeed until it takes up the first.
+        cruise: its airspeed until it accepts the first command.
         """
         return commanded
 
     @property
     def return_rules(self) -> ReturnRules:
-        """How it returns to launch: where to, how high, how it turns and circles."""
+        """Rules of its RTL: target, altitude, turn and loiter."""
         return USUAL_RULES
 
     @property
     def loiter_rules(self) -> LoiterRules:
-        """How it flies loiters: how wide where the mission does not say, how it joins and leaves them."""
+        """Rules of its loiters: default radius, entry and exit."""
         return USUAL_LOITERS
 
     @property
@@ -464,58 +473,59 @@ class Autopilot(ABC):
 
     @property
     def mission_checks(self) -> MissionChecks:
-        """What PX4's feasibility checks go by: with its default parameters where it is another autopilot."""
+        """Settings of PX4's feasibility checks; PX4's defaults for another autopilot."""
         return MissionChecks()
 
     @property
     def stated_airspeed(self) -> tuple[float, str] | None:
-        """Cruise airspeed (m/s) that a person's file of parameters states, and the parameter; None for none."""
+        """Cruise airspeed (m/s) in the user's parameter file, and the parameter; None if not stated."""
         stated = {} if self.parameters is None else self.parameters.by_origin("file")
         return (stated[self.cruise_parameter], self.cruise_parameter) if self.cruise_parameter in stated else None
 
     @property
     def stated_bank(self) -> float | None:
-        """Bank limit (rad) that a person's file of parameters states; None for none."""
+        """Bank limit (rad) in the user's parameter file, or None if not stated."""
         return None
 
     @property
     def bank_limit(self) -> float:
-        """Steepest bank that it demands, rad; inf for whatever the aircraft's limits allow."""
+        """Maximum bank that it demands, rad; inf if only the aircraft's limits apply."""
         return math.inf
 
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """How far it strays from the legs it is given, which a plan has to leave free; None where it holds its path.
+        """Return its deviations from the legs, for which a plan leaves room; None if it holds its path.
 
-        airspeed: commanded, m/s.  nav: how well it knows where it is.  fly_over: whether it flies on to each waypoint
-        before it turns.  turbulence: of the wind.
+        airspeed: commanded, m/s.  nav: accuracy of navigation.  fly_over: True if it flies on to each waypoint before
+        it turns.
+        turbulence: of the wind.
         """
         return None
 
     def off_height_chance(self, climb: float, sink: float, turbulence: Turbulence) -> float:
-        """Chance (0..1) that gusts have it so far off a waypoint's height that it circles there; 0 if it flies on.
+        """Return the probability (0..1) that gusts make it circle at a waypoint; 0 if it flies on.
 
-        climb, sink: what the aircraft has in hand against gusts, m/s.
+        climb, sink: spare rates of the aircraft against gusts, m/s.
         """
         return 0.0
 
     def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
-        """How far (m) below its path downdrafts of one in a hundred take it; 0 if its tracking error allows for them.
+        """Return the altitude loss (m) in a one-in-a-hundred downdraft; 0 if in its tracking error.
 
-        climb: rate of climb that the aircraft has unused against them, m/s.
+        climb: spare climb rate of the aircraft, m/s.
         """
         return 0.0
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """How far (m) above its path updrafts of one in a hundred lift it; 0 if it holds its height against them.
+        """Return the altitude gain (m) in a one-in-a-hundred updraft; 0 if it holds its altitude.
 
-        sink: rate of sink that the aircraft has unused against them, m/s.
+        sink: spare sink rate of the aircraft, m/s.
         """
         return 0.0
 
     def with_parameters(self, **values: float) -> "Autopilot":
-        """The same law with other values of parameters, by its own names and in its own units."""
+        """Return the same law with other parameter values, by its own names and in its own units."""
         raise ValueError(f"{self.title} has no parameters")
 
 
@@ -525,13 +535,13 @@ class GroundAutopilot(Autopilot):
     @property
     @abstractmethod
     def released_throttle(self) -> float:
-        """Throttle (0..1) where rail or hand lets go of the aircraft, or where it stands on the runway."""
+        """Throttle (0..1) at the end of the rail, at the throw, or at rest on the runway."""
 
 
 def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -> str:
-    """A program in words; every parameter stands in the verdict's data.
+    """Return a description of a program; the verdict's data contains every parameter.
 
-    named: changed parameters that are named.
+    named: number of changed parameters to name.
     """
     changed = [f"{name} {value:g}" for name, value in program.changed.items()]
     more = f", +{len(changed) - named} more" if len(changed) > named else ""

@@ -1,4 +1,4 @@
-"""Every autopilot that planfly knows: the one list that a new autopilot is added to."""
+"""List of all autopilots that planfly knows; a new autopilot is added here."""
 
 import math
 from collections.abc import Mapping
@@ -24,15 +24,15 @@ AUTOPILOTS: tuple[type[Autopilot], ...] = (
     Px4Sitl,
     ArduPlaneSitl,
 )
-# By the name that a scenario states.
+# Laws by the name in a scenario.
 _LAWS = {kind.name: kind for kind in AUTOPILOTS if not issubclass(kind, ProgramAutopilot)}
 _PROGRAMS = tuple(kind for kind in AUTOPILOTS if issubclass(kind, ProgramAutopilot))
 
 
 def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
-    """The autopilot that a scenario names, with its settings.
+    """Return the autopilot that a scenario names, with its settings.
 
-    Raises ScenarioError for a name that is not listed, and as `Autopilot.load` does.
+    Raise ScenarioError for a name that is not listed, and as `Autopilot.load` does.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from world.scenario import load_scenario
@@ -52,7 +52,7 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
 
 
 def _lower_field(scenario: Scenario) -> float:
-    """By how much the ground at the landing is lower than home, m; 0 where either is not known."""
+    """Return the height of home above the ground at the landing, m; 0 if either is unknown."""
     landing, home = scenario.landing, scenario.home
     if landing is None or home is None or scenario.terrain is None:
         return 0.0
@@ -61,7 +61,7 @@ def _lower_field(scenario: Scenario) -> float:
 
 
 def _refuse_conflict(scenario: Scenario, made: Autopilot, asked: Autopilot) -> None:
-    """Raise ScenarioError where a scenario asks for another value than a person's file of parameters states."""
+    """Raise ScenarioError if a scenario and the user's parameter file state different values."""
     if made.parameters is None or asked.parameters is None:
         return
     values = asked.parameters.by_origin("file")
@@ -72,7 +72,7 @@ def _refuse_conflict(scenario: Scenario, made: Autopilot, asked: Autopilot) -> N
 
 
 def program_autopilot(program: Path) -> type[ProgramAutopilot]:
-    """The autopilot that such a program is.
+    """Return the autopilot of a program.
 
     >>> program_autopilot(Path("arduplane")).name
     'ardupilot'
@@ -83,24 +83,26 @@ def program_autopilot(program: Path) -> type[ProgramAutopilot]:
 def autopilot_of_log(
     program: str, parameters: Mapping[str, float], source: str
 ) -> tuple[Autopilot, tuple[str, ...]] | None:
-    """The law of the autopilot that wrote a flight log, and what could not be used of its parameters.
+    """Return the law of the autopilot that wrote a flight log, and notes on its parameters.
 
-    None for an autopilot that planfly does not know.  program: as the log names it.  source: the log's file.
+    None for an autopilot that planfly does not know.  The notes name the parameters that could not be used.
+    program: its name in the log.  source: the log's file.
     """
     return next(filter(None, (kind.of_flight_log(program, parameters, source) for kind in _LAWS.values())), None)
 
 
 def restore_autopilot(name: str | None, stored: StoredAutopilot) -> Autopilot:
-    """The autopilot that a log stores.  Raises ParameterError for a value that is not allowed, KeyError for a name.
+    """Return the autopilot that a log stores.
 
-    name: None where what is stored says who it is.
+    Raise ParameterError for a value that is not allowed, KeyError for an unknown name.
+    name: None if the stored settings imply it.
     """
     kinds = _LAWS if stored.program is None else {kind.name: kind for kind in _PROGRAMS}
     return kinds[name or _implied_name(stored)].restore(stored)
 
 
 def stored_name(autopilot: Autopilot) -> str | None:
-    """The name that a log has to state of an autopilot; None where what it stores says who it is.
+    """Return the name that a log has to state for an autopilot, or None if its settings imply the name.
 
     >>> stored_name(PlanflyGuidance("l1")) is None
     True
@@ -109,5 +111,5 @@ def stored_name(autopilot: Autopilot) -> str | None:
 
 
 def _implied_name(stored: StoredAutopilot) -> str:
-    """Who flew by a log without a name: ArduPlane where it has parameters or a program, else planfly's guidance."""
+    """Return who flew by a log without a name: ArduPlane if it has parameters or a program, else planfly."""
     return (PlanflyGuidance if stored.parameters is None and stored.program is None else ArduPlane).name

@@ -1,7 +1,7 @@
-"""A guard of what a flight has started: where we are killed, the program and its folder go too.
+"""Guard of a flight's program: if planfly is killed, the program and its folder are removed too.
 
-The kernel kills a program whose parent is killed, but not that program's own children, as a wrapper script has one, and
-removes no folder.  The guard is a small process of its own that outlives us by as much as that takes.
+The kernel kills a program whose parent is killed, but not that program's own children, such as the child of a wrapper
+script, and it removes no folder.  The guard is a small process that outlives planfly by the time that this takes.
 """
 
 import contextlib
@@ -12,9 +12,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-# It reads what it is told until the line "done" or, where we are gone, the end; it then kills the group, first so that
-# nothing is written any more, and removes the folder and the files.
-_GUARD = """
+# Source of the guard process.  It reads commands until the line "done" or, if planfly was killed, the end of its input;
+# then it kills the process group, first so that nothing is written any more, and removes the folder and the files.
+_GUARD_SOURCE = """
 import os, shutil, signal, sys, time
 group, folder, files = 0, "", []
 for line in sys.stdin:
@@ -56,9 +56,9 @@ class Guard:
         read, write = os.pipe()
         with os.fdopen(read, "rb") as end:
             self._words = os.fdopen(write, "wb", buffering=0)
-            # Of its own session: what ends us by our group does not end it.
+            # It has a session of its own: a signal to planfly's process group does not end it.
             self._process = subprocess.Popen(
-                [sys.executable, "-I", "-S", "-c", _GUARD],
+                [sys.executable, "-I", "-S", "-c", _GUARD_SOURCE],
                 stdin=end,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -68,17 +68,17 @@ class Guard:
 
     def keep_folder(self, folder: Path) -> None:
         """Guard a folder, whose name has no line break."""
-        self._tell(f"folder {folder}")
+        self._write_line(f"folder {folder}")
 
     def keep_file(self, file: Path) -> None:
-        """Guard a file that may come to be there, whose name has no line break."""
-        self._tell(f"file {file}")
+        """Guard a file that may be created, whose name has no line break."""
+        self._write_line(f"file {file}")
 
     def keep_group(self, group: int) -> None:
         """Guard a process group."""
-        self._tell(f"group {group}")
+        self._write_line(f"group {group}")
 
-    def _tell(self, line: str) -> None:
+    def _write_line(self, line: str) -> None:
         with contextlib.suppress(BrokenPipeError):
             self._words.write(f"{line}\n".encode())
 
@@ -89,7 +89,7 @@ class Guard:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Have it end."""
-        self._tell("done")
+        """End the guard process."""
+        self._write_line("done")
         self._words.close()
         self._process.wait()

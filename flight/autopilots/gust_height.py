@@ -1,21 +1,24 @@
-"""How far gusts move an aircraft up or down that cannot climb or sink as fast as they do."""
+"""Altitude gain or loss from gusts that exceed an aircraft's climb or sink rate."""
 
 from world.wind import W20, Turbulence
 
-# Standard deviations of a gust that one in a hundred exceeds, and how long it is taken to last, s.  Of 303 flights of
-# planfly's guidance in moderate turbulence (scenarios 4000 to 4599 and 12000 to 12299 of
-# `benchmarks.plans_and_verdicts`, three streams each) one leg in a hundred came down by 34 m with 0.3 to 1.2 m/s of
-# climb unused, 28 with 1.4, 21 with 1.8 and 9 with 3.5.  Of 132 legs of ArduPlane with 1.3 to 1.6 m/s of sink unused
-# (two streams, from 16000) three in a hundred came up by 18 m and one by 34, of 54 with 2 to 2.5 none by 19.
-_SIGMAS, _LASTS = 2.33, 12.0
-# Where less than this many standard deviations are left, several gusts add up, and it is moved by what one standard
-# deviation moves it in this time, s: of 64 legs of ArduPlane with 0.4 to 0.7 m/s left one came up by 93 m.
+# Number of standard deviations of the gust that is exceeded with a probability of one in a hundred.
+_GUST_SIGMAS = 2.33
+# Assumed duration of that gust, s.  In 303 flights of planfly's guidance in moderate turbulence (scenarios 4000 to 4599
+# and 12000 to 12299 of `benchmarks.plans_and_verdicts`, three streams each) one leg in a hundred sank by 34 m with 0.3
+# to 1.2 m/s of spare climb rate, by 28 m with 1.4, by 21 m with 1.8 and by 9 m with 3.5.  Of 132 legs of ArduPlane
+# with 1.3 to 1.6 m/s of spare sink rate (two streams, from 16000) three in a hundred rose by 18 m and one by 34 m; of
+# 54 legs with 2 to 2.5 m/s none rose by 19 m.
+_GUST_DURATION_S = 12.0
+# If the spare rate is below this many standard deviations, several gusts add up.
 LEAST_SIGMAS = 0.6
-_LASTS_WITH_LESS = 60.0
+# The aircraft then moves by one standard deviation for this time, s: of 64 legs of ArduPlane with 0.4 to 0.7 m/s of
+# spare rate one rose by 93 m.
+_LOW_RATE_DURATION_S = 60.0
 
 
 def gust_deviation(turbulence: Turbulence) -> float:
-    """Standard deviation of the vertical gusts near the ground, m/s (MIL-F-8785C).
+    """Return the standard deviation of the vertical gusts near the ground, m/s (MIL-F-8785C).
 
     >>> round(gust_deviation("moderate"), 2)
     1.54
@@ -24,21 +27,21 @@ def gust_deviation(turbulence: Turbulence) -> float:
 
 
 def height_in_gusts(rate: float, turbulence: Turbulence) -> float:
-    """How far (m) a gust that one in a hundred exceeds moves an aircraft, which works against it at a rate (m/s).
+    """Return the displacement (m) by a one-in-a-hundred gust, opposed by a climb or sink rate (m/s).
 
     >>> round(height_in_gusts(2.0, "moderate"), 1), height_in_gusts(4.0, "moderate"), height_in_gusts(0.0, "none")
     (19.1, 0.0, 0.0)
     """
-    return _LASTS * max(0.0, _SIGMAS * gust_deviation(turbulence) - rate)
+    return _GUST_DURATION_S * max(0.0, _GUST_SIGMAS * gust_deviation(turbulence) - rate)
 
 
 def height_in_updrafts(sink: float, turbulence: Turbulence) -> float:
-    """How far (m) updrafts lift an aircraft whose autopilot keeps its airspeed, by the sink (m/s) that it has unused.
+    """Return the altitude gain (m) in updrafts if the autopilot keeps airspeed, from the spare sink rate (m/s).
 
     >>> round(height_in_updrafts(2.0, "moderate"), 1), round(height_in_updrafts(0.5, "moderate"), 1)
     (19.1, 92.4)
     """
     deviation = gust_deviation(turbulence)
     if sink < LEAST_SIGMAS * deviation:
-        return _LASTS_WITH_LESS * deviation
+        return _LOW_RATE_DURATION_S * deviation
     return height_in_gusts(sink, turbulence)

@@ -1,8 +1,9 @@
-"""Files of an autopilot's parameters, in the forms that ground stations write.
+"""Parameter files of an autopilot, in the formats of ground stations.
 
 QGroundControl writes five columns with tabs between: vehicle, component, name, value, type.  MAVProxy and ArduPilot's
-own default files have a name and a value with blanks between, Mission Planner has a comma.  In all of them a `#` begins
-a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's, "Plain-Text File Format").
+own default files have a name and a value with blanks between, Mission Planner has a comma.  In all formats a `#` begins
+a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's documentation, "Plain-Text File
+Format").
 """
 
 import math
@@ -14,19 +15,19 @@ from pathlib import Path
 from world.errors import ParameterError
 from world.files import TextLine, read_small_file, utf8_text
 
-# A vehicle has some 1,500 parameters in lines of 40 bytes.
+# Largest file, bytes: a vehicle has some 1,500 parameters in lines of 40 bytes.
 MAX_BYTES = 4 * 2**20
-# Characters that a parameter's name has at most (MAVLink, PARAM_VALUE): no autopilot knows a longer one.
+# Maximum length of a parameter name (MAVLink, PARAM_VALUE): no autopilot has a longer one.
 LONGEST_NAME = 16
-# Names that are read: longer ones stand in files that were edited by hand, and are passed over by ground stations.
-_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,63}")
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-# A line of QGroundControl's: vehicle, component, name, value, type.
-_QGC_FIELDS = 5
-_WHOLE = re.compile(r"[0-9]{1,5}")
-# MAV_COMP_ID_AUTOPILOT1; others of a vehicle (a gimbal, a second computer) may have parameters of the same names.
+# Pattern of a name: longer names occur in files that were edited by hand, and ground stations skip them.
+_NAME_PATTERN = re.compile(r"[A-Z][A-Z0-9_]{0,63}")
+_NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+# Number of columns in QGroundControl's format: vehicle, component, name, value, type.
+_QGC_COLUMN_COUNT = 5
+_INTEGER_PATTERN = re.compile(r"[0-9]{1,5}")
+# MAV_COMP_ID_AUTOPILOT1; other components (a gimbal, a second computer) may have parameters of the same names.
 AUTOPILOT = 1
-_BETWEEN = re.compile(r"[\s,=]+")
+_SEPARATOR_PATTERN = re.compile(r"[\s,=]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,7 @@ class Entry:
     """One parameter of a file.
 
     where: file and line, for messages.
-    component: of the vehicle, by MAVLink's numbers.
+    component: MAVLink component of the vehicle.
     """
 
     name: str
@@ -44,16 +45,18 @@ class Entry:
 
 
 def read_parameter_file(path: Path) -> dict[str, Entry]:
-    """Read a file of parameters, by name in the order of the file.
+    """Read a parameter file, by name in the order of the file.
 
-    Raises ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
+    Raise ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
     """
     data = read_small_file(path, MAX_BYTES, "parameter", ParameterError)
     return parse_parameters(utf8_text(data, path, ParameterError), str(path))
 
 
 def parameters_text(values: Mapping[str, float], title: str) -> str:
-    r"""Parameters as a file that every ground station reads, a name and a value a line, below a comment.
+    r"""Return parameters as text in a format that every ground station reads.
+
+    The text has a comment, then a name and a value on each line.
 
     >>> parameters_text({"RTL_ALTITUDE": 180.0, "LAND_FLARE_SEC": 2.5}, "made for a field")
     '# made for a field\nRTL_ALTITUDE 180\nLAND_FLARE_SEC 2.5\n'
@@ -62,11 +65,11 @@ def parameters_text(values: Mapping[str, float], title: str) -> str:
 
 
 def parse_parameters(text: str, source: str) -> dict[str, Entry]:
-    r"""Read the text of a parameter file, in any of the forms; ``source`` names it in messages.
+    r"""Read the text of a parameter file, in any of the formats; ``source`` names it in messages.
 
-    Raises ParameterError with file, line, field, value and what is allowed, for a line that is none, a value that is no
-    finite number, a name that comes twice, and a file without a parameter.  Of a name that several components of a
-    vehicle have, the autopilot's counts.  A name that is too long is read as any that no autopilot knows.
+    Raise ParameterError with file, line, field, value and what is allowed, for a line in no known format, a value that
+    is not a finite number, a name that occurs twice, and a file without a parameter.  If several components of a
+    vehicle have the same name, the autopilot's value is taken.  A name that is too long is read like any unknown name.
 
     >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
     >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)
@@ -79,9 +82,9 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
         line = text_line.partition("#")[0].strip()
         if not line:
             continue
-        entry = _entry(line, TextLine(source, number))
+        entry = _parse_entry(line, TextLine(source, number))
         if entry.name in found and found[entry.name].component != entry.component:
-            # Two devices of one vehicle: what flies is the autopilot's.
+            # Two devices of one vehicle: the autopilot's value is the one that flies.
             if entry.component == AUTOPILOT:
                 found[entry.name] = entry
             continue
@@ -98,30 +101,30 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
     return found
 
 
-def _entry(line: str, where: TextLine) -> Entry:
+def _parse_entry(line: str, where: TextLine) -> Entry:
     fields, component = line.split("\t"), AUTOPILOT
-    if len(fields) == _QGC_FIELDS and _WHOLE.fullmatch(fields[0].strip()):
+    if len(fields) == _QGC_COLUMN_COUNT and _INTEGER_PATTERN.fullmatch(fields[0].strip()):
         name, text = fields[2].strip(), fields[3].strip()
-        component = int(fields[1]) if _WHOLE.fullmatch(fields[1].strip()) else AUTOPILOT
+        component = int(fields[1]) if _INTEGER_PATTERN.fullmatch(fields[1].strip()) else AUTOPILOT
     else:
-        fields = _BETWEEN.split(line)
+        fields = _SEPARATOR_PATTERN.split(line)
         if len(fields) != 2:
             allowed = "a name and a value are expected, or QGroundControl's five columns"
-            message = f"{where}: {_shown(line)}: {allowed}"
+            message = f"{where}: {_shorten(line)}: {allowed}"
             raise ParameterError(message, file=where.file, value=line, allowed=allowed)
         name, text = fields
-    if not _NAME.fullmatch(name):
+    if not _NAME_PATTERN.fullmatch(name):
         allowed = f"up to {LONGEST_NAME} capitals, digits and _ are expected"
-        message = f"{where}: name {_shown(name)}: {allowed}"
+        message = f"{where}: name {_shorten(name)}: {allowed}"
         raise ParameterError(message, file=where.file, field="name", value=name, allowed=allowed)
-    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    value = float(text) if _NUMBER_PATTERN.fullmatch(text) else math.nan
     if not math.isfinite(value):
         allowed = "a finite number is expected"
         raise ParameterError(
-            f"{where}: {name}: {_shown(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
+            f"{where}: {name}: {_shorten(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
         )
     return Entry(name, value, where, component)
 
 
-def _shown(text: str) -> str:
+def _shorten(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:37] + "...")

@@ -1,8 +1,8 @@
-"""The autopilot and the vehicle that a parameter file was written for.
+"""Find the autopilot and the vehicle that a parameter file was written for.
 
-QGroundControl writes both as comments at the head of the file ("# Stack: PX4 Pro", "# Vehicle: Fixed Wing"). Every
-other file shows them by its names: PX4 and ArduPilot share nearly none, and ArduPilot's vehicles differ in the names of
-their controllers (ArduPilot's and PX4's parameter references).
+QGroundControl writes both as comments at the head of the file ("# Stack: PX4 Pro", "# Vehicle: Fixed Wing").  In other
+files the names show them: PX4 and ArduPilot share hardly any, and ArduPilot's vehicles differ in the names of their
+controllers (parameter references of ArduPilot and PX4).
 """
 
 import re
@@ -14,17 +14,17 @@ from flight.autopilots.parameter_files import MAX_BYTES, Entry, parse_parameters
 from world.errors import ParameterError
 from world.files import read_small_file, utf8_text
 
-# Autopilots by the name that a scenario states, and the option that chooses each.
+# Autopilots by the name in a scenario, with the option that chooses each.
 ARDUPILOT = "ardupilot"
 PX4 = "px4"
 TITLES: Mapping[str, str] = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
 _MODELS: Mapping[str, str] = {ARDUPILOT: "ArduPlane", PX4: "PX4", "ideal": "planfly's own guidance"}
 
-# A header weighs as much as this many names: a file may be edited below its header.
+# Weight of a header, in names: a file may be edited below its header.
 _HEADER_WEIGHT = 3
-# The autopilot with this many times the names of the other one is the file's; a file with fewer is of both.
+# A file belongs to the autopilot that has this many times the names of the other one, otherwise to both.
 _CLEAR_MAJORITY = 4
-# Names that are shown as evidence.
+# Number of names that are shown as evidence.
 _SHOWN_NAMES = 3
 
 _STACK = re.compile(r"^\s*#+\s*stack\s*:\s*(.+?)\s*$", re.IGNORECASE | re.MULTILINE)
@@ -44,7 +44,7 @@ _PX4_NAMES = _pattern(
     "RTL_CONE_ RTL_DESCEND_ALT RTL_LAND_DELAY RTL_LOITER_RAD RTL_MIN_DIST RTL_RETURN_ALT RTL_TYPE RWTO_ SDLOG_ SENS_ "
     "SER_ SYS_ THR_MDL_FAC TRIG_ TRIM_PITCH TRIM_ROLL TRIM_YAW UUV_ VT_ WEIGHT_BASE WEIGHT_GROSS WV_"
 )
-# Names that only an aeroplane of ArduPilot has; ArduPlane's VTOL parameters begin with Q_.
+# Names of ArduPilot's aeroplanes alone; ArduPlane's VTOL parameters begin with Q_.
 _ARDUPLANE_NAMES = _pattern(
     "AIRSPEED_CRUISE AIRSPEED_MAX AIRSPEED_MIN ALT_CTRL_ALG ALT_HOLD_ ALT_OFFSET ARSPD_ CRUISE_ALT_FLOOR DSPOILER_ "
     "DSPOILR_ ELEVON_ FBW[AB]_ FLAP_ FS_LONG_ FS_SHORT_ GLIDE_SLOPE_ GROUND_STEER_ KFF_ LAND_FLARE_ LAND_PF_ "
@@ -61,7 +61,7 @@ _ARDUPILOT_NAMES = _pattern(
     "NTF_ RALLY_ RCMAP_ RNGFND RNGFND[0-9]?_ RSSI_ SCHED_ SERIAL[0-9]_ SERVO[0-9_].* SR[0-9]_ STAT_ SYSID_ "
     "TERRAIN_ WP_RADIUS"
 )
-# What ArduPilot's other vehicles are, by the names that only they have.
+# ArduPilot's other vehicles, by names of their own.
 _ARDUPILOT_VEHICLES: Mapping[str, re.Pattern[str]] = {
     "a multicopter or helicopter": _pattern(
         "ANGLE_MAX ATC_ACCEL_ ATC_ANG_ ATC_INPUT_TC ATC_RATE_ ATC_RAT_ ATC_THR_ CIRCLE_ FRAME FRAME_CLASS "
@@ -77,7 +77,7 @@ _ARDUPILOT_VEHICLES: Mapping[str, re.Pattern[str]] = {
     ),
     "a submarine": _pattern("FS_LEAK_ENABLE FS_TERRAIN_ENAB JS_ MOT_[0-9]+_DIRECTION SURFACE_DEPTH"),
 }
-# What PX4's other vehicles are, by the names that only their controllers have.
+# PX4's other vehicles, by names of their controllers.
 _PX4_PLANE = _pattern("FW_ LNDFW_ NPFG_ RWTO_")
 _PX4_VEHICLES: Mapping[str, re.Pattern[str]] = {
     "a multicopter or helicopter": _pattern("LNDMC_ MC_ MPC_"),
@@ -85,9 +85,9 @@ _PX4_VEHICLES: Mapping[str, re.Pattern[str]] = {
     "a submarine": _pattern("UUV_"),
 }
 _VTOL = "a VTOL aircraft"
-# Names that PX4 has for a VTOL alone: its navigator asks for VT_B_ in every vehicle.
+# Names of a PX4 VTOL alone: PX4's navigator asks for VT_B_ in every vehicle.
 _PX4_VTOL = _pattern("VT_ARSP_ VT_FW_ VT_F_ VT_TRANS_ VT_TYPE")
-# Words of a "# Vehicle:" header, the first that fits: QGroundControl's and MAVLink's names of vehicles.
+# Words of a "# Vehicle:" header; the first match decides: vehicle names of QGroundControl and MAVLink.
 _VEHICLE_WORDS: tuple[tuple[str, str], ...] = (
     (r"vtol|tail-?sitter|tilt-?rotor", _VTOL),
     (r"fixed|plane\b", ""),
@@ -119,8 +119,8 @@ _PROGRAMS: Mapping[str, str] = {
 class ParameterOrigin(NamedTuple):
     """Autopilot and vehicle that a parameter file was written for.
 
-    autopilot: "ardupilot" or "px4"; "" where neither is clear.
-    vehicle: of another kind than an aeroplane, in words; "" for an aeroplane, or where nothing says so.
+    autopilot: "ardupilot" or "px4"; "" if neither is clear.
+    vehicle: another kind than an aeroplane, in words; "" for an aeroplane, or if unknown.
     evidence: the header or the names that show it.
     mixed: True for a file with names of both autopilots, in which neither has a clear majority.
     """
@@ -176,7 +176,7 @@ def _is_ardupilot(name: str) -> bool:
 
 
 def _header_vehicle(text: str) -> str | None:
-    """Return the vehicle that the head of a file states, "" for an aeroplane, None where it states none."""
+    """Return the vehicle that the head of a file states, "" for an aeroplane, or None if it states none."""
     found = _VEHICLE.search(text)
     if found is not None:
         return next((kind for words, kind in _VEHICLE_WORDS if re.search(words, found[1], re.I)), None)
@@ -187,7 +187,7 @@ def _header_vehicle(text: str) -> str | None:
 def _voted_vehicle(
     text: str, entries: Mapping[str, Entry], plane: re.Pattern[str], others: Mapping[str, re.Pattern[str]]
 ) -> str:
-    """Return the vehicle that most names are of; a tie is an aeroplane's."""
+    """Return the vehicle with the most names; in a tie, an aeroplane."""
     stated = _header_vehicle(text)
     votes = {"": len(_matching(entries, plane.fullmatch))}
     votes |= {kind: len(_matching(entries, names.fullmatch)) for kind, names in others.items()}
@@ -210,19 +210,22 @@ def _ardupilot_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
 
 
 # ----------------------------------------------------------------------
-# A file of parameters for one autopilot.
+# Parameter file for one autopilot.
 
 
 def read_origin(path: Path) -> ParameterOrigin:
-    """Return what the parameter file at a path was written for.  Raises ParameterError for one that cannot be read."""
+    """Return the autopilot and the vehicle that the parameter file at a path was written for.
+
+    Raise ParameterError for a file that cannot be read.
+    """
     text = _read(path)
     return parameter_origin(text, parse_parameters(text, str(path)))
 
 
 def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
-    """Read a parameter file that an autopilot, by its name, is to fly with.
+    """Read a parameter file with which an autopilot, by its name, is to fly.
 
-    Raises ParameterError for a file that cannot be read, and for one of another autopilot or another vehicle.
+    Raise ParameterError for a file that cannot be read, and for a file of another autopilot or another vehicle.
     """
     text = _read(path)
     entries = parse_parameters(text, str(path))
@@ -237,7 +240,7 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
 
 
 def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]) -> None:
-    """Raise ParameterError for a file of which the autopilot's law knows no name, and which is not clearly its own."""
+    """Raise ParameterError if the law knows no name of a file that is not clearly for its autopilot."""
     if known or parameter_origin("", entries).autopilot == autopilot:
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
@@ -247,7 +250,7 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
 
 
 def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
-    """Make the error of a file that was written for another autopilot than the one that is to fly."""
+    """Return the error for a file that was written for another autopilot than the one that is to fly."""
     because = f" ({evidence})" if evidence else ""
     allowed = f"{_MODELS[flying]} is to fly: --autopilot-law {written_for} flies it by {_MODELS[written_for]}'s law"
     message = f"{where}: written for {TITLES[written_for]}{because}, and {allowed}"

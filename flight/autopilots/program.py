@@ -1,4 +1,4 @@
-"""An autopilot that is a program of its own, and the flight that it steers."""
+"""Autopilot that is an external program, and its flight."""
 
 from abc import abstractmethod
 from contextlib import AbstractContextManager
@@ -15,31 +15,34 @@ from flight.simulation.setup import FlightSetup
 
 
 class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
-    """A flight that a program steers, in lockstep with our physics; on leaving it the program has ended."""
+    """Flight of an external program in lockstep with planfly's physics; on exit the program has ended."""
 
     @abstractmethod
     def prepare(self) -> None:
-        """Have the program take the mission and fly to the first waypoint.  Raises FlightError."""
+        """Make the program accept the mission and fly to the first waypoint.
+
+        Raise FlightError if it fails.
+        """
 
     @abstractmethod
     def keep_log(self, target: Path) -> bool:
-        """End the program in order, and move its own log to a file; whether there was one."""
+        """End the program in order, and move its own log to a file; return True if there was a log."""
 
 
 @dataclass(frozen=True)
 class ProgramAutopilot(Autopilot):
-    """An autopilot that is a program of its own; `law` is the autopilot that models it.
+    """Autopilot that is an external program; `law` is the autopilot that models it.
 
     log_suffix: suffix of the log that the program itself writes.
     program: the program that flew; None before the flight.
-    binary: the program's file; None for a flight that a log holds.
+    binary: the program's file; None for a flight from a log.
     """
 
     own: ClassVar[np.dtype[np.record] | None] = None
     log_suffix: ClassVar[str]
     program: AutopilotProgram | None = None
     binary: Path | None = field(default=None, compare=False)
-    # Whatever its law does: unless its own class says otherwise, a program is put into the air on a rail.
+    # A program is put into the air on a rail, even if its law takes off, unless its own class says otherwise.
     flies_ground: ClassVar[bool] = False
 
     @property
@@ -50,7 +53,10 @@ class ProgramAutopilot(Autopilot):
     @classmethod
     @abstractmethod
     def flying(cls, law: Any, binary: Path) -> Self:
-        """The program, with the settings of its law.  binary: its file."""
+        """Return the program's autopilot with the settings of its law.
+
+        binary: the program's file.
+        """
 
     def described(self, aircraft: str) -> str:
         """Describe the program and the parameters that a person changed; before the flight its law."""
@@ -58,16 +64,22 @@ class ProgramAutopilot(Autopilot):
 
     @property
     def version(self) -> str:
-        """The version that the program states, or the release of the law before the flight."""
+        """Version that the program states, or before the flight the release of the law."""
         return super().version if self.program is None else self.program.version
 
     @property
     def file(self) -> Path:
-        """The program's file.  Raises ValueError if the autopilot is that of a recorded flight."""
+        """The program's file.
+
+        Raise ValueError if the autopilot belongs to a recorded flight.
+        """
         if self.binary is None:
             raise ValueError("the program of a recorded flight is not at hand")
         return self.binary
 
     @abstractmethod
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
-        """Start the program for a flight.  Raises FlightError."""
+        """Start the program for a flight.
+
+        Raise FlightError if it does not start.
+        """

@@ -1,6 +1,6 @@
-"""What makes ArduPlane leave its mission, and what it does then, by its parameters.
+"""Causes that end ArduPlane's mission, and its reactions, by its parameters.
 
-Read in ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event`, `failsafe_long_on_event` and
+Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event`, `failsafe_long_on_event` and
 `handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp; AP_BattMonitor for the thresholds.
 """
 
@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 
-# What it does: "return" to launch by RTL; "land" by the mission's landing sequence; by mode AUTOLAND ("autoland"), or
-# else by RTL; it goes "on" with its mission; it has "landed"; what should happen "never" does, for nothing triggers it;
-# or something that brings nobody home.
+# Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or else RTL;
+# "on": it continues the mission; "landed": it is on the ground; "never": nothing can trigger the cause; the others do
+# not lead home.
 Does = Literal[
     "return",
     "land",
@@ -28,10 +28,10 @@ Does = Literal[
 
 
 class Cause(NamedTuple):
-    """Something that can happen on the way.
+    """A possible cause of leaving the mission.
 
-    name: for people.  does: what ArduPlane does then.
-    parameter, value: the one that decides it; "" for what no parameter decides.
+    name: for people.  does: ArduPlane's reaction.
+    parameter, value: the parameter that decides it; "" if no parameter decides.
     """
 
     name: str
@@ -41,15 +41,15 @@ class Cause(NamedTuple):
 
     @property
     def returns(self) -> bool:
-        """Whether it flies a return to launch; a landing is none."""
+        """True if it flies an RTL; a landing is not an RTL."""
         return self.does == "return"
 
 
-_LONG: dict[int, Does] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
+_LONG_FAILSAFE: dict[int, Does] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
 # FBWA without a pilot: wings level, nose level, throttle at its minimum.
-_SHORT: dict[int, Does] = {0: "on", 1: "circle", 2: "glide", 3: "on", 4: "level"}
-# What only a quadplane can do, to land on its rotors (4, 6), is to any other aeroplane what 2 is.
-_BATTERY: dict[int, Does] = {
+_SHORT_FAILSAFE: dict[int, Does] = {0: "on", 1: "circle", 2: "glide", 3: "on", 4: "level"}
+# Without a quadplane's rotors a landing on them (4, 6) is the same as 2.
+_BATTERY_FAILSAFE: dict[int, Does] = {
     0: "on",
     1: "return",
     2: "land",
@@ -59,17 +59,17 @@ _BATTERY: dict[int, Does] = {
     6: "land",
     7: "autoland",
 }
-_FENCE: dict[int, Does] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "autoland"}
+_FENCE_REACTION: dict[int, Does] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "autoland"}
 
 
 def failsafe_causes(
     parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
 ) -> tuple[Cause, ...]:
-    """What can take an aircraft off its mission in AUTO, in the order in which a person asks.
+    """Return what can take an aircraft off its mission in AUTO, in the usual order of questions.
 
-    has_fence: whether the mission carries a fence.
-    has_landing: whether it has a landing sequence; without one a landing is a return.
-    ends_landed: whether it ends on the ground.
+    has_fence: True if the mission carries a fence.
+    has_landing: True if it has a landing sequence; without one a landing is an RTL.
+    ends_landed: True if it ends on the ground.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
@@ -87,35 +87,35 @@ def failsafe_causes(
     short = int(parameters.short_failsafe)
     # THR_FAILSAFE 2 notices the loss, and starts no failsafe.
     notices = parameters.throttle_failsafe == 1.0
-    leaves_auto = _SHORT.get(short, "on") != "on" and notices
+    leaves_auto = _SHORT_FAILSAFE.get(short, "on") != "on" and notices
     if leaves_auto:
-        causes.append(Cause("RC lost for 1.5 s", _SHORT[short], "FS_SHORT_ACTN", short))
+        causes.append(Cause("RC lost for 1.5 s", _SHORT_FAILSAFE[short], "FS_SHORT_ACTN", short))
     if leaves_auto and long == 0:
-        # It is no longer in AUTO, and from any other mode FS_LONG_ACTN 0 is a return.
+        # It is no longer in AUTO, and from any other mode FS_LONG_ACTN 0 is an RTL.
         causes.append(Cause("RC lost", "return", "FS_SHORT_ACTN", short))
     elif notices:
-        causes.append(Cause("RC lost", _LONG.get(long, "on"), "FS_LONG_ACTN", long))
+        causes.append(Cause("RC lost", _LONG_FAILSAFE.get(long, "on"), "FS_LONG_ACTN", long))
     else:
         causes.append(Cause("RC lost", "on", "THR_FAILSAFE", int(parameters.throttle_failsafe)))
     if parameters.station_failsafe > 0.0:
-        causes.append(Cause("station lost", _LONG.get(long, "on"), "FS_LONG_ACTN", long))
+        causes.append(Cause("station lost", _LONG_FAILSAFE.get(long, "on"), "FS_LONG_ACTN", long))
     else:
         causes.append(Cause("station lost", "on", "FS_GCS_ENABL", 0))
-    causes += _of_battery(parameters, has_landing=has_landing)
+    causes += _battery_causes(parameters, has_landing=has_landing)
     if has_fence:
         action = int(parameters.fence_action)
         if parameters.fence_enable > 0.0 or parameters.fence_auto_enable > 0.0:
-            causes.append(Cause("fence broken", _FENCE.get(action, "on"), "FENCE_ACTION", action))
+            causes.append(Cause("fence broken", _FENCE_REACTION.get(action, "on"), "FENCE_ACTION", action))
         else:
             causes.append(Cause("fence broken", "on", "FENCE_ENABLE", 0))
     return tuple(causes)
 
 
-def _of_battery(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
-    """What a low and a critical battery lead to.
+def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
+    """Return the reactions to a low and a critical battery.
 
-    Nothing triggers them without a monitor, or without a threshold.  What BATT_MONITOR is by default depends on the
-    board, so that a file that does not state it is taken to have one.
+    Nothing triggers them without a monitor or without a threshold.  The default of BATT_MONITOR depends on the board,
+    so a file that does not state it is taken to have a monitor.
     """
     unstated = "BATT_MONITOR" in parameters.by_origin("default")
     monitored = unstated or parameters.battery_monitor > 0.0
@@ -126,7 +126,7 @@ def _of_battery(parameters: ArduPilotParameters, *, has_landing: bool) -> list[C
         ("battery low", parameters.low_battery, "BATT_FS_LOW_ACT", low),
         ("battery critical", parameters.critical_battery, "BATT_FS_CRT_ACT", critical),
     ):
-        does = _BATTERY.get(int(value), "on")
+        does = _BATTERY_FAILSAFE.get(int(value), "on")
         if does == "land" and not has_landing:
             does = "return"
         if does != "on" and not (monitored and triggered):

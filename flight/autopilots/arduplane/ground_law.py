@@ -1,20 +1,20 @@
-"""How ArduPlane takes off and lands, compiled: one tick of a flight from the ground, or to it, or both.
+"""ArduPlane's take-off and landing, compiled: one tick of a flight that begins or ends on the ground.
 
-In the air it is the law of `flight.autopilots.arduplane.law`.  A take-off and a landing are the same law with other
-parameters and demands:
+In the air the law is `flight.autopilots.arduplane.law`.  Take-off and landing use the same law with other parameters
+and demands:
 
 Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp): wings level until the ground speed has
-been above 5 m/s for two seconds; then the heading is held that the course over the ground had then, less what the nose
-has turned since the launch.  Full throttle, speed by pitch, never below the pitch that the item states; bank no more
-than LEVEL_ROLL_LIMIT until TKOFF_LVL_ALT, free from three times that.  It ends above the item's height, and the next
-leg begins where the aircraft is.
+been above 5 m/s for two seconds; then the course over the ground at that time is held as heading, less the yaw since
+the launch.  Full throttle, speed by pitch, never below the pitch of the item; bank limited to LEVEL_ROLL_LIMIT up to
+TKOFF_LVL_ALT, unrestricted from three times that height.  It ends above the item's altitude, and the next leg begins at
+the aircraft.
 
 Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the line beyond the landing point, on the glide of
-`flight.autopilots.arduplane.landing`.  The approach stage begins when it is lined up, and with it the flare may begin:
-below LAND_FLARE_ALT, or LAND_FLARE_SEC before the ground at this sink on the second half, or beyond the point.  In the
-flare the motor is off, the bank at most LEVEL_ROLL_LIMIT, the pitch at least LAND_PITCH_DEG, and the sink is brought
-to TECS_LAND_SINK by the pitch, with what weight TECS_LAND_SPDWGT leaves the airspeed.  How ArduPlane's sink really
-comes to the ground is not known so well: see `docs/measured.md`.
+`flight.autopilots.arduplane.landing`.  The approach stage begins when the aircraft is lined up.  From then on the flare
+may begin: below LAND_FLARE_ALT, or LAND_FLARE_SEC before the ground at the current sink rate on the second half, or
+beyond the point.  In the flare the motor is off, bank is at most LEVEL_ROLL_LIMIT, pitch at least LAND_PITCH_DEG, and
+pitch controls the sink rate to TECS_LAND_SINK, as far as TECS_LAND_SPDWGT weights altitude over airspeed.  ArduPlane's
+real touchdown sink rate is known less well: see `docs/measured.md`.
 """
 
 import math
@@ -58,40 +58,48 @@ from world.terrain import Heights
 
 Floats = NDArray[np.float64]
 
-# Points of an aircraft that may meet the ground, at most: JSBSim's own models have up to 19.
+# Maximum number of points of an aircraft that may touch the ground: JSBSim's own models have up to 19.
 CONTACTS = 24
-# What it is doing, in the order of a flight.
-TAKING_OFF, IN_AIR, ON_GLIDE, APPROACHING, FLARING = 0, 1, 2, 3, 4
+# Stages of a flight, in order: the take-off ...
+TAKING_OFF = 0
+# ... the legs of the mission ...
+IN_AIR = 1
+# ... the landing leg before the approach stage ...
+ON_GLIDE = 2
+# ... the approach stage ...
+APPROACHING = 3
+# ... and the flare.
+FLARING = 4
 GROUND_STATE = record_dtype(
     ("stage", np.int64),
     ("lands", np.bool_),
-    ("rolls", np.bool_),  # whether it takes off from a runway, where it may touch the ground
+    ("rolls", np.bool_),  # True for a take-off from a runway, which the aircraft may touch
     ("lifted", np.bool_),
-    ("landed", np.bool_),  # it has touched down
+    ("landed", np.bool_),  # True once it touched down
     "time",  # s since the release
-    # Where it may meet the ground, from the centre of gravity: m forward, right, down.
+    # Points that may touch the ground, from the center of gravity: m forward, right, down.
     ("contact", np.float64, (CONTACTS, 3)),
-    ("stands", np.int64, (CONTACTS,)),  # whether it stands on that point, 0 or 1
+    ("stands", np.int64, (CONTACTS,)),  # 1 for a point on which the aircraft stands, else 0
     ("contacts", np.int64),
     ("touches", np.bool_),
-    ("tipped", np.bool_),  # what touches first is a point that the aircraft does not stand on
-    "turnover",  # m/s, over which that ends the flight
+    ("tipped", np.bool_),  # True if the lowest touching point is not one on which the aircraft stands
+    "turnover",  # m/s, ground speed above which that ends the flight
     "rest",  # s at rest
     # Take-off.
-    "motor",  # s, when it starts
-    "slew",  # of the throttle's range, 1/s
+    "motor",  # s, time of the motor start
+    "slew",  # fraction of the throttle range, 1/s
     "full",  # 0..1, throttle
-    "base",  # m AMSL, of home; and where the take-off ends
+    "base",  # m AMSL, of home; below: where the take-off ends
     "top",
-    "low",  # m AMSL, where the launch was
-    "pitch",  # rad, least of the climb
-    ("leg", np.int64),  # that follows
-    "fast",  # s since the ground speed was first above `_MOVES`
-    "yaw",  # rad, of the nose at the launch
+    "low",  # m AMSL, of the launch
+    "pitch",  # rad, minimum of the climb
+    ("leg", np.int64),  # leg after the take-off
+    "fast",  # s since the ground speed was first above `_COURSE_SPEED_MPS`
+    "yaw",  # rad, at the launch
     ("held", np.bool_),
-    "heading",  # rad, that is held
-    "leveling",  # m, below the end at which it began to level off; 0 before
-    "fastest",  # m/s, equivalent
+    "heading",  # rad, heading that is held
+    "leveling",  # m below the end, where leveling off began; 0 before
+    "fastest",  # m/s, maximum equivalent airspeed since the launch
     # Landing.
     ("landing_leg", np.int64),
     "east",  # m, of the landing point
@@ -100,45 +108,58 @@ GROUND_STATE = record_dtype(
     "home",  # m AMSL, of home
     "begin",  # m AMSL, of the waypoint before
     "slope",
-    "flare_height",  # m over the landing point, and before it
+    "flare_height",  # m above the landing point; below: m before it
     "flare_distance",
     "airspeed",  # m/s, equivalent
-    "entry_sink",  # m/s and m, where the flare began
+    "entry_sink",  # m/s, sink rate at the start of the flare; below: height there, m
     "entry_height",
-    # Heights that the flare demands, m: over home, on from the glide's; over the landing point, on from its own.
+    # Altitude demands of the flare, m: above home, continued from the glide; above the landing point, from its own
+    # height.
     "flare_adjusted",
     "flare_ideal",
 )
 ARDUPLANE_GROUND = record_dtype(
     ("memory", ARDUPILOT_MEMORY),
     ("parameters", ARDUPILOT_PARAMETERS),
-    ("staged", ARDUPILOT_PARAMETERS),  # those of the present stage
+    ("staged", ARDUPILOT_PARAMETERS),  # parameters of the current stage
     ("ground", GROUND_STATE),
 )
 GROUND_NUMBERS = ARDUPLANE_GROUND.itemsize // 8
 
-# Faster over the ground than this its course is known, m/s; it is held from so long after, s (GPS_GND_CRS_MIN_SPD).
-_MOVES, _SETTLES = 5.0, 2.0
-# L1's frequency at a period: sqrt(2) pi over it.
+# Ground speed above which the course is known, m/s (GPS_GND_CRS_MIN_SPD).
+_COURSE_SPEED_MPS = 5.0
+# Time above that speed after which the heading is held, s.
+_HEADING_HOLD_DELAY_S = 2.0
+# L1's frequency times its period: sqrt(2) pi.
 _HEADING_GAIN = 4.4428
-# A take-off levels off only above so much over home, m.
-_LEVELS_ABOVE = 10.0
-# An aircraft is lined up within this angle (rad) and this far beside the line (m); it is on its approach by then, below
-# where the glide began beyond this share of it, and beyond the next in any case.
-_LINED_UP, _ON_LINE, _SOME, _HALF = math.radians(10.0), 5.0, 0.15, 0.5
-# The line is followed to so far beyond the aircraft, m.
-_AHEAD = 200.0
-# Nearer than this to the landing point (m) the first contact is a touch-down.
-_NEAR_POINT = 150.0
-# At rest: slower than this (m/s) for so long (s).
-_STANDS, _RESTS = 0.2, 5.0
+# A take-off levels off only above this height over home, m.
+_MIN_LEVELING_HEIGHT_M = 10.0
+# The aircraft is lined up within this angle of the landing line, rad ...
+_LINE_UP_ANGLE_RAD = math.radians(10.0)
+# ... and within this cross-track distance, m.  Lined up, it begins the approach.
+_LINE_UP_CROSS_TRACK_M = 5.0
+# Past this fraction of the line, within the angle and below the start of the glide, it begins the approach as well ...
+_APPROACH_START_FRACTION = 0.15
+# ... and past this fraction in any case.
+_APPROACH_LATEST_FRACTION = 0.5
+# Distance beyond the aircraft to which the landing line is extended, m.
+_LINE_EXTENSION_M = 200.0
+# First ground contact closer to the landing point than this is a touchdown, m.
+_TOUCHDOWN_DISTANCE_M = 150.0
+# The aircraft is at rest below this ground speed, m/s ...
+_STOPPED_SPEED_MPS = 0.2
+# ... for this time, s.
+_STOPPED_TIME_S = 5.0
 # An aircraft on a runway whose motor has not started by then never takes off, s.
-_GIVEN_UP = 10.0
+_MOTOR_START_TIMEOUT_S = 10.0
 
 
 @compiled
 def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
-    """One tick on the block of a `flight.simulation.tick.Workspace`: a key of its `ENDS`, or 0 to fly on."""
+    """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
+
+    Return a key of its `ENDS`, or 0 to fly on.
+    """
     path_begins = WORKSPACE_NUMBERS + GROUND_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     own = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE_GROUND)[0]
@@ -151,7 +172,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
     pieces = path.piece[: settings.pieces]
     feel(work.state, work.place.clearance, ground)
     if ground.stage == TAKING_OFF:
-        _take_off(work, own, waypoints, pieces)
+        _tick_take_off(work, own, waypoints, pieces)
     elif ground.stage == IN_AIR:
         look_ahead(work, heights, waypoints, own.parameters, memory)
         fly_as_ardupilot(
@@ -162,16 +183,16 @@ def ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - c
             ground.stage = ON_GLIDE
     else:
         find_on_path(work.estimated, pieces, work.memory)
-        _land(work, own)
+        _tick_landing(work, own)
     fill_tick(work)
     return ended(work, ground)
 
 
 @inner
 def feel(state: Record, clearance: float, ground: Record) -> None:  # pragma: no cover - compiled
-    """Note which points touch the ground, which is level as JSBSim has it.
+    """Update which points touch the ground, which is level as in JSBSim.
 
-    state: of `flight.dynamics.state.STATE`.  clearance: of the centre of gravity, m.  ground: of `GROUND_STATE`.
+    state: of `flight.dynamics.state.STATE`.  clearance: of the center of gravity, m.  ground: of `GROUND_STATE`.
     """
     ground.touches, ground.tipped = False, False
     lowest = clearance
@@ -180,15 +201,15 @@ def feel(state: Record, clearance: float, ground: Record) -> None:  # pragma: no
         place = ground.contact[k]
         down = tilt * (math.sin(state.roll) * place[1] + math.cos(state.roll) * place[2]) - nose * place[0]
         if down >= lowest:
-            # Of points that touch the lowest counts: on its skids an aircraft may be pressed into the ground.
+            # The lowest touching point decides: an aircraft on its skids may be pressed into the ground.
             lowest, ground.touches, ground.tipped = down, True, ground.stands[k] == 0
 
 
 @inner
 def ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
-    """How the flight ends by now: a key of `ENDS`, or 0 to fly on.
+    """Return how the flight has ended, a key of `ENDS`, or 0 to fly on.
 
-    work: of `flight.simulation.tick.WORKSPACE`.  ground: of `GROUND_STATE`, whoever sets its stage.
+    work: of `flight.simulation.tick.WORKSPACE`.  ground: of `GROUND_STATE`, whose stage any law may set.
     """
     state, speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     empty = work.air.energy >= work.settings.battery
@@ -201,16 +222,16 @@ def ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
     if ground.stage == TAKING_OFF:
         if ground.touches and (ground.lifted or not ground.rolls):
             return GROUND
-        if ground.rolls and ground.motor > ground.time and ground.time > _GIVEN_UP:
+        if ground.rolls and ground.motor > ground.time and ground.time > _MOTOR_START_TIMEOUT_S:
             return NO_MOTOR
         return EMPTY if empty else 0
     if ground.touches and not ground.landed:
-        if math.hypot(ground.east - work.true.east, ground.north - work.true.north) > _NEAR_POINT:
+        if math.hypot(ground.east - work.true.east, ground.north - work.true.north) > _TOUCHDOWN_DISTANCE_M:
             return GROUND
         ground.landed = True
-    if ground.touches and speed < _STANDS:
+    if ground.touches and speed < _STOPPED_SPEED_MPS:
         ground.rest += work.timing.dt
-        return COMPLETED if ground.rest >= _RESTS else 0
+        return COMPLETED if ground.rest >= _STOPPED_TIME_S else 0
     ground.rest = 0.0
     if not ground.touches and ground.stage < FLARING and state.airspeed < work.settings.slowest:
         return STALLED
@@ -218,16 +239,18 @@ def ended(work: Record, ground: Record) -> int:  # pragma: no cover - compiled
 
 
 # ----------------------------------------------------------------------
-# The take-off.
+# Take-off.
 
 
 @inner
-def _take_off(work: Record, own: Record, waypoints: Records, pieces: Records) -> None:  # pragma: no cover - compiled
-    """One tick of the take-off: commands, and at its end the first leg."""
+def _tick_take_off(
+    work: Record, own: Record, waypoints: Records, pieces: Records
+) -> None:  # pragma: no cover - compiled
+    """Run one tick of the take-off: fill the commands, and at its end begin the first leg."""
     state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
     dt, staged = work.timing.dt, own.staged
     factor = true_by_equivalent(estimated.up)
-    # What the track is measured against begins where the take-off ends.
+    # The measured track begins where the take-off ends.
     work.memory.leg, work.memory.distance = ground.leg, pieces[0].start
     work.memory.cross_track, work.memory.height_error = 0.0, 0.0
     if not memory.begun:
@@ -242,7 +265,7 @@ def _take_off(work: Record, own: Record, waypoints: Records, pieces: Records) ->
         memory.height_asked, memory.height_limited = estimated.up, estimated.up
         memory.height_demand, memory.height_rate = estimated.up, 0.0
         memory.climb_share, memory.sink_share = 1.0, 1.0
-        _stage_take_off(estimated, own.parameters, staged, ground)
+        _set_take_off_parameters(estimated, own.parameters, staged, ground)
         wanted = min(staged.airspeed_max, max(staged.airspeed_min, waypoints[ground.leg].airspeed))
         work.memory.speed_command = wanted * factor
         update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
@@ -254,18 +277,19 @@ def _take_off(work: Record, own: Record, waypoints: Records, pieces: Records) ->
     memory.throttle_demand = throttle
     follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
     if estimated.up > ground.top:
-        _leave(estimated, waypoints, pieces, work.memory, ground, memory)
+        _begin_first_leg(estimated, waypoints, pieces, work.memory, ground, memory)
 
 
 @inner
-def _stage_take_off(
+def _set_take_off_parameters(
     estimated: Record, parameters: Record, staged: Record, ground: Record
 ) -> None:  # pragma: no cover - compiled
-    """Parameters of the take-off's law: speed by pitch, a least pitch, and a bank limit that goes with the height."""
+    """Set the take-off's parameters: speed by pitch, fixed pitch, and a bank limit that grows with height."""
     staged.tecs_speed_weight = 2.0
     staged.tecs_pitch_min = 0.0
-    staged.pitch_limit_min = ground.pitch * _levels_off(estimated, parameters, ground)
-    # A least pitch, but no take-off that was seen had more: TECS's integrals are wound up, and unwind for longer.
+    staged.pitch_limit_min = ground.pitch * _leveling_fraction(estimated, parameters, ground)
+    # The minimum pitch is also the maximum: no observed take-off had more, as TECS's integrators are wound up, and stay
+    # so for longer.
     staged.pitch_limit_max = staged.pitch_limit_min
     low, over = parameters.takeoff_level_height, estimated.up - ground.low
     share = min(1.0, max(0.0, (over - low) / (2.0 * low))) if low > 0.0 else 1.0
@@ -274,14 +298,17 @@ def _stage_take_off(
 
 
 @inner
-def _levels_off(estimated: Record, parameters: Record, ground: Record) -> float:  # pragma: no cover - compiled
-    """Share of the least pitch that is kept near the take-off's end, where it would come to it in TKOFF_PLIM_SEC."""
+def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:  # pragma: no cover - compiled
+    """Return the fraction of the minimum pitch that remains near the take-off's end.
+
+    The pitch is reduced from where the climb would reach the end within TKOFF_PLIM_SEC.
+    """
     left = ground.top - estimated.up
     if ground.leveling > 0.0:
         share: float = min(1.0, max(0.0, left / ground.leveling))
         return share
     soon = left <= parameters.takeoff_leveling * estimated.velocity_up
-    if soon and left > 0.0 and estimated.velocity_up > 0.1 and estimated.up - ground.base >= _LEVELS_ABOVE:
+    if soon and left > 0.0 and estimated.velocity_up > 0.1 and estimated.up - ground.base >= _MIN_LEVELING_HEIGHT_M:
         ground.leveling = left
     return 1.0
 
@@ -290,11 +317,11 @@ def _levels_off(estimated: Record, parameters: Record, ground: Record) -> float:
 def _hold_heading(
     state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record
 ) -> None:  # pragma: no cover - compiled
-    """Demand the side acceleration to the heading that is held; none before it is known."""
+    """Demand the side acceleration to the held heading, or zero before it is known."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    if ground.fast > 0.0 or speed > _MOVES:
+    if ground.fast > 0.0 or speed > _COURSE_SPEED_MPS:
         ground.fast += NAVIGATION_TICK
-    if not ground.held and ground.fast >= _SETTLES:
+    if not ground.held and ground.fast >= _HEADING_HOLD_DELAY_S:
         ground.held = True
         course = math.atan2(estimated.velocity_east, estimated.velocity_north)
         ground.heading = course - wrap(state.yaw - ground.yaw)
@@ -305,25 +332,25 @@ def _hold_heading(
 
 
 @inner
-def _leave(
+def _begin_first_leg(
     estimated: Record, waypoints: Records, pieces: Records, guided: Record, ground: Record, memory: Record
 ) -> None:  # pragma: no cover - compiled
     """Begin the leg that follows the take-off, from here."""
     ground.stage = IN_AIR
     memory.leg = ground.leg
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
-    # At the first piece of that leg.
+    # Go to the first piece of that leg.
     while pieces[guided.piece].leg < ground.leg and guided.piece + 1 < pieces.shape[0]:
         guided.piece += 1
 
 
 # ----------------------------------------------------------------------
-# The landing.
+# Landing.
 
 
 @inner
-def _land(work: Record, own: Record) -> None:  # pragma: no cover - compiled
-    """One tick of the landing."""
+def _tick_landing(work: Record, own: Record) -> None:  # pragma: no cover - compiled
+    """Run one tick of the landing."""
     state, estimated, ground, memory = work.state, work.estimated, own.ground, own.memory
     dt, staged = work.timing.dt, own.staged
     factor = true_by_equivalent(estimated.up)
@@ -332,12 +359,12 @@ def _land(work: Record, own: Record) -> None:  # pragma: no cover - compiled
     if memory.clock < 0.5 * dt:
         memory.clock += NAVIGATION_TICK
         left = _follow_line_to_point(estimated, own.parameters, ground, memory)
-        _find_stage(estimated, own.parameters, ground, memory, left)
+        _update_stage(estimated, own.parameters, ground, memory, left)
         _demand_glide(estimated, own.parameters, ground, memory, left[0])
-        _stage_landing(estimated, own.parameters, staged, ground, left[1])
+        _set_landing_parameters(estimated, own.parameters, staged, ground, left[1])
         work.memory.speed_command = ground.airspeed * factor
         if ground.stage == FLARING:
-            # Slow with no throttle, it is not short of speed: in the flare that counts for nothing.
+            # Slow and without throttle it must not be in underspeed: the flare ignores it.
             memory.throttle_demand = 0.0
         update_tecs(state, estimated, staged, memory, ground.airspeed * factor, factor, NAVIGATION_TICK)
     work.memory.height_error = estimated.up - memory.height_demand
@@ -345,7 +372,7 @@ def _land(work: Record, own: Record) -> None:  # pragma: no cover - compiled
     follow_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
     if ground.stage == FLARING:
         slew = own.parameters.throttle_slew
-        # One that knows no limit is closed at once.
+        # Without a slew limit the throttle closes at once.
         work.commands.throttle = max(0.0, before - slew * dt) if slew > 0.0 else 0.0
 
 
@@ -355,15 +382,15 @@ def _follow_line_to_point(
 ) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
     """Demand the side acceleration along the line to the landing point and beyond.
 
-    Returns how far before the point the aircraft is (m), which share of the line it has flown, how far off the angle is
-    that it flies at (rad), and how far beside the line it is (m).
+    Return the distance to the point along the line (m), the flown fraction of the line, the angle between course and
+    line as L1 measures it (rad), and the cross-track distance (m).
     """
     leg_e, leg_n = ground.east - memory.from_east, ground.north - memory.from_north
     run = max(1e-6, math.hypot(leg_e, leg_n))
     unit_e, unit_n = leg_e / run, leg_n / run
     off_e, off_n = estimated.east - memory.from_east, estimated.north - memory.from_north
-    along, aside = off_e * unit_e + off_n * unit_n, off_e * unit_n - off_n * unit_e
-    far = math.hypot(off_e, off_n) + _AHEAD
+    along, cross_track = off_e * unit_e + off_n * unit_n, off_e * unit_n - off_n * unit_e
+    far = math.hypot(off_e, off_n) + _LINE_EXTENSION_M
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
     angle, aim = l1_angles(
@@ -374,26 +401,35 @@ def _follow_line_to_point(
     if not math.isnan(aim):
         angle += aim + memory.cross_track_sum
     memory.side_acceleration = l1_acceleration(angle, speed, length, parameters.navl1_damping)
-    return run - along, along / run, abs(angle), abs(aside)
+    return run - along, along / run, abs(angle), abs(cross_track)
 
 
 @inner
-def _find_stage(
+def _update_stage(
     estimated: Record, parameters: Record, ground: Record, memory: Record, left: tuple[float, float, float, float]
 ) -> None:  # pragma: no cover - compiled
-    """Go on to the approach and to the flare when their time has come.  left: as `_follow_line_to_point` returns it."""
-    _, share, angle, aside = left
+    """Change to the approach and to the flare when it is time.
+
+    left: as `_follow_line_to_point` returns it.
+    """
+    _, share, angle, cross_track = left
     height, sink = estimated.up - ground.up, -estimated.velocity_up
     if ground.stage == ON_GLIDE:
-        lined_up = angle < _LINED_UP
-        below = share > _SOME and lined_up and estimated.up < ground.begin
-        if (share >= 0.0 and lined_up and aside < _ON_LINE) or below or share > _HALF:
+        lined_up = angle < _LINE_UP_ANGLE_RAD
+        below = share > _APPROACH_START_FRACTION and lined_up and estimated.up < ground.begin
+        if (
+            (share >= 0.0 and lined_up and cross_track < _LINE_UP_CROSS_TRACK_M)
+            or below
+            or share > _APPROACH_LATEST_FRACTION
+        ):
             ground.stage = APPROACHING
     if ground.stage == FLARING:
         return
-    low = height <= parameters.flare_height
-    soon = parameters.flare_time > 0.0 and height <= sink * parameters.flare_time and share > _HALF
-    if (ground.stage == APPROACHING and (low or soon)) or share >= 1.0:
+    flare_height_reached = height <= parameters.flare_height
+    flare_time_reached = (
+        parameters.flare_time > 0.0 and height <= sink * parameters.flare_time and share > _APPROACH_LATEST_FRACTION
+    )
+    if (ground.stage == APPROACHING and (flare_height_reached or flare_time_reached)) or share >= 1.0:
         ground.stage = FLARING
         ground.entry_sink, ground.entry_height = sink, height
         ground.flare_adjusted, ground.flare_ideal = memory.height_demand - ground.home, height
@@ -403,7 +439,10 @@ def _find_stage(
 def _demand_glide(
     estimated: Record, parameters: Record, ground: Record, memory: Record, left: float
 ) -> None:  # pragma: no cover - compiled
-    """Demand the height of the glide, and in the flare a sink that goes to its last.  left: m before the point."""
+    """Demand the altitude of the glide, and in the flare a sink rate that blends to its final value.
+
+    left: m before the point.
+    """
     memory.climb_share, memory.sink_share = 1.0, 1.0
     if ground.stage < FLARING:
         speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -419,18 +458,22 @@ def _demand_glide(
         memory.height_rate = -ground.entry_sink * (1.0 - share) - last * share
         ground.flare_adjusted += memory.height_rate * NAVIGATION_TICK
         ground.flare_ideal += memory.height_rate * NAVIGATION_TICK
-        # As `AP_TECS::_update_height_demand` has it, which mixes a height over home with one over the landing point: on
-        # a field lower than home it asks for as much more height, up to twice, and on a higher one for less.
+        # As in `AP_TECS::_update_height_demand`, which mixes a height over home with a height over the landing point:
+        # on a field lower than home it demands more altitude, by up to twice the difference, and on a higher field
+        # less.
         over_home = ground.flare_adjusted * (1.0 - share) + ground.flare_ideal * share
         memory.height_demand = ground.home + over_home + (ground.home - ground.up)
     memory.height_asked, memory.height_limited = memory.height_demand, memory.height_demand
 
 
 @inner
-def _stage_landing(
+def _set_landing_parameters(
     estimated: Record, parameters: Record, staged: Record, ground: Record, share: float
 ) -> None:  # pragma: no cover - compiled
-    """Parameters of the landing's law.  share: of the line that is flown."""
+    """Set the landing's parameters.
+
+    share: flown fraction of the line.
+    """
     staged.tecs_time = parameters.landing_time
     weight = parameters.landing_speed_weight
     if weight < 0.0:

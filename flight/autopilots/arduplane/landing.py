@@ -1,8 +1,8 @@
-"""How ArduPlane lands: the glide that it lays out at the waypoint before the landing point, and its go-around.
+"""ArduPlane's landing: the glide from the waypoint before the landing, and the go-around altitude.
 
-From that waypoint it flies a straight slope to a point before and above the landing point, where the flare is to begin:
-so high that the slope's sink takes LAND_FLARE_SEC to the ground, but no higher than twice LAND_FLARE_ALT, and so far
-before the point as it flies over the ground while the sink falls to TECS_LAND_SINK.  The law is that of
+From that waypoint it flies a straight slope to the start of the flare, before and above the landing point.  The flare
+starts at the height which the slope's sink rate covers in LAND_FLARE_SEC, but no higher than twice LAND_FLARE_ALT, and
+at the distance which it flies over the ground while the sink rate falls to TECS_LAND_SINK.  Follows
 `AP_Landing::type_slope_setup_landing_glide_slope` and `type_slope_get_target_airspeed_cm`
 (libraries/AP_Landing/AP_Landing_Slope.cpp) in ArduPlane 4.6.
 """
@@ -10,18 +10,20 @@ before the point as it flies over the ground while the sink falls to TECS_LAND_S
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.autopilot import LandingGlide
 
-# The flare begins on the second half of the way at the earliest.
-_LATEST_HALF = 0.5
-# Slower over the ground than this it does not count itself, and slower than this it does not sink in its flare, m/s.
-_SLOWEST, _MIN_SINK = 0.5, 0.1
-# Height over home that a go-around climbs to where neither the landing item nor a take-off says one, m.
-_GO_AROUND = 30.0
+# Limit of the flare's length, as a fraction of the distance from the waypoint to the landing point.
+_MAX_FLARE_FRACTION = 0.5
+# Lower limit of the ground speed in the computation of the glide, m/s.
+_MIN_GROUND_SPEED_MPS = 0.5
+# Lower limit of the mean sink rate in the flare, m/s.
+_MIN_SINK_MPS = 0.1
+# Default altitude of a go-around over home, m, if neither the landing item nor a take-off states one.
+_GO_AROUND_ALTITUDE_M = 30.0
 
 
 def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float:
-    """Equivalent airspeed on the glide, m/s: between minimum and cruise, faster against the wind up to the cruise's.
+    """Return the equivalent airspeed on the glide, m/s: minimum to cruise, increased by a head wind.
 
-    No landing is faster than the cruise, whatever TECS_LAND_ARSPD says.
+    No landing is faster than the cruise airspeed, whatever TECS_LAND_ARSPD is.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> default = ArduPilotParameters.defaults()  # minimum 9, cruise 12
@@ -36,38 +38,38 @@ def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float
 
 
 def landing_glide(height: float, run: float, ground_speed: float, parameters: ArduPilotParameters) -> LandingGlide:
-    """The glide to a landing point from a waypoint so high over it and so far before it, m.
+    """Return the glide to a landing point from the waypoint before it.
 
-    ground_speed: m/s.
+    height, run: of the waypoint above and before the landing point, m.  ground_speed: m/s.
 
-    At 20 m/s over 600 m the sink from 54 m is 1.8 m/s, and the flare's two seconds 3.6 m; the flare lasts
-    3.6 / (0.125 + 0.9) s, which is 70 m of way.
+    At 20 m/s the sink rate from 54 m over 600 m is 1.8 m/s, and the flare's two seconds 3.6 m; the flare lasts
+    3.6 / (0.125 + 0.9) s, in which the aircraft flies 70 m.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> glide = landing_glide(54.0, 600.0, 20.0, ArduPilotParameters.defaults())
     >>> [round(number, 3) for number in glide]
     [0.095, 3.6, 70.244]
 
-    A flare at TECS_LAND_SINK alone, 0.05 m/s, counts as one at 0.1: 1 m, twice LAND_FLARE_ALT, takes 10 s.
+    A flare at TECS_LAND_SINK alone, 0.05 m/s, is computed with 0.1 m/s: 1 m, twice LAND_FLARE_ALT, takes 10 s.
 
     >>> gentle = ArduPilotParameters.defaults().changed(TECS_LAND_SINK=0.05, LAND_FLARE_AIM=100.0, LAND_FLARE_ALT=0.5)
     >>> [round(landing_glide(54.0, 600.0, 20.0, gentle)[k], 3) for k in (1, 2)]
     [1.0, 200.0]
     """
-    speed = max(_SLOWEST, ground_speed)
+    speed = max(_MIN_GROUND_SPEED_MPS, ground_speed)
     sink = height * speed / run
-    aim = parameters.flare_time * sink or parameters.flare_height
+    flare_height = parameters.flare_time * sink or parameters.flare_height
     if parameters.flare_height > 0.0:
-        aim = min(aim, 2.0 * parameters.flare_height)
-    mean = parameters.flare_weight * parameters.landing_sink + (1.0 - parameters.flare_weight) * sink
-    away = min(speed * aim / max(_MIN_SINK, mean), _LATEST_HALF * run)
-    return LandingGlide((height - aim) / (run - away), aim, away)
+        flare_height = min(flare_height, 2.0 * parameters.flare_height)
+    mean_sink = parameters.flare_weight * parameters.landing_sink + (1.0 - parameters.flare_weight) * sink
+    flare_distance = min(speed * flare_height / max(_MIN_SINK_MPS, mean_sink), _MAX_FLARE_FRACTION * run)
+    return LandingGlide((height - flare_height) / (run - flare_distance), flare_height, flare_distance)
 
 
 def go_around_height(asked: float, takeoff: float) -> float:
-    """Height over home that a go-around climbs to, m: the landing item's, or the take-off's, or 30 m.
+    """Return the altitude of a go-around over home, m: from the landing item, the take-off, or 30 m.
 
     >>> go_around_height(50.0, 80.0), go_around_height(0.0, 80.0), go_around_height(0.0, 0.0)
     (50.0, 80.0, 30.0)
     """
-    return next((height for height in (asked, takeoff) if height > 0.0), _GO_AROUND)
+    return next((height for height in (asked, takeoff) if height > 0.0), _GO_AROUND_ALTITUDE_M)

@@ -1,30 +1,33 @@
-"""When ArduPlane starts the motor of a launched aircraft: what its acceleration, its speed and its attitude say.
+"""Motor start of a launched aircraft in ArduPlane, from acceleration, speed and attitude.
 
-With TKOFF_THR_MINACC it waits for an acceleration along the nose, and from there TKOFF_THR_DELAY; then the ground speed
-has to be above TKOFF_THR_MINSPD within a tenth of a second, and the nose between -30 and 45 degrees, or it waits anew
-(`Plane::auto_takeoff_check`, ArduPlane/takeoff.cpp, of ArduPlane 4.6).  Without MINACC it waits for the speed alone,
-and without either the motor runs as soon as the mission does.
+With TKOFF_THR_MINACC it waits for an acceleration along the nose, and then for TKOFF_THR_DELAY; then within a tenth of
+a second the ground speed must be above TKOFF_THR_MINSPD, and the nose between -30 and 45 degrees, or it waits for an
+acceleration again (`Plane::auto_takeoff_check`, ArduPlane/takeoff.cpp, of ArduPlane 4.6).  Without MINACC it waits for
+the speed alone, and without either the motor runs as soon as the mission does.
 """
 
 import math
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 
-# It looks so often, s, and gives up waiting for the speed so long after the delay, s.
-_LOOK, _PATIENCE = 0.02, 0.1
-# Nose up, between which it takes a launch for one, rad.
-_NOSE = (math.radians(-30.0), math.radians(45.0))
-# A launched aircraft that has not got its motor after so long flies without, s.
-_LATEST = 5.0
+# Interval of its checks, s.
+_CHECK_INTERVAL_S = 0.02
+# It gives up waiting for the speed this long after the delay, s.
+_SPEED_TIMEOUT_S = 0.1
+# Range of pitch within which it accepts a launch, rad.
+_PITCH_RANGE_RAD = (math.radians(-30.0), math.radians(45.0))
+# A launched aircraft whose motor has not started after this time flies without it, s.
+_MOTOR_START_TIMEOUT_S = 5.0
 
 
 def motor_start(acceleration: float, speed: float, incline: float, parameters: ArduPilotParameters) -> float:
-    """When the motor starts, s after the release, negative on the rail; inf for never, -inf for before the launch.
+    """Return the time of the motor start, s after the release, negative on the rail.
 
+    The result is inf if it never starts, -inf if it runs before the launch.
     acceleration: steady along the rail, m/s^2; 0 for a runway.  speed: at its end over the ground, m/s.
     incline: of the nose, rad.
 
-    A rail of 6 m takes 0.6 s to 20 m/s, at 33 m/s^2; 10 m/s are 8.3 m/s^2.
+    A rail of 6 m takes 0.6 s to 20 m/s, at 33 m/s^2; 10 m/s need 8.3 m/s^2.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)
@@ -36,21 +39,21 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
     least, delay = parameters.takeoff_acceleration, parameters.takeoff_delay
     if least <= 0.0 and parameters.takeoff_ground_speed <= 0.0:
         return -math.inf
-    pushed = speed / acceleration if acceleration > 0.0 else 0.0
-    began = math.nan
-    for k in range(round((pushed + _LATEST) / _LOOK)):
-        now = k * _LOOK - pushed
-        # The level part of what the accelerometer feels on the rail; after it the aircraft slows down.
-        felt = acceleration if now < 0.0 else 0.0
-        if math.isnan(began):
-            if felt < least:
+    push_time = speed / acceleration if acceleration > 0.0 else 0.0
+    push_start = math.nan
+    for k in range(round((push_time + _MOTOR_START_TIMEOUT_S) / _CHECK_INTERVAL_S)):
+        now = k * _CHECK_INTERVAL_S - push_time
+        # The horizontal part of the acceleration on the rail; after the rail the aircraft slows down.
+        measured = acceleration if now < 0.0 else 0.0
+        if math.isnan(push_start):
+            if measured < least:
                 continue
-            began = now
-        if now - began > delay + _PATIENCE or not _NOSE[0] < incline < _NOSE[1]:
-            began = math.nan
+            push_start = now
+        if now - push_start > delay + _SPEED_TIMEOUT_S or not _PITCH_RANGE_RAD[0] < incline < _PITCH_RANGE_RAD[1]:
+            push_start = math.nan
             continue
-        over_ground = speed * math.cos(incline) * min(1.0, 1.0 + now / pushed if pushed else 1.0)
-        if now - began >= delay - 1e-9 and (
+        over_ground = speed * math.cos(incline) * min(1.0, 1.0 + now / push_time if push_time else 1.0)
+        if now - push_start >= delay - 1e-9 and (
             over_ground > parameters.takeoff_ground_speed or parameters.takeoff_ground_speed <= 0.0
         ):
             return now
@@ -58,7 +61,7 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
 
 
 def takeoff_slew(parameters: ArduPilotParameters) -> float:
-    """How fast the throttle opens in a take-off, of its range a second; inf for at once.
+    """Return the throttle slew rate of a take-off, fraction of its range per s; inf for no limit.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> [takeoff_slew(ArduPilotParameters.defaults().changed(TKOFF_THR_SLEW=slew)) for slew in (0.0, -1.0, 50.0)]
@@ -70,9 +73,9 @@ def takeoff_slew(parameters: ArduPilotParameters) -> float:
 
 
 def run_up(starts: float, parameters: ArduPilotParameters) -> float:
-    """How long whoever launches waits for all of the motor, s; 0 where it starts on the rail, in the hand or later.
+    """Return the wait on the ground for full throttle, s; 0 if the motor starts in the launch or later.
 
-    starts: what `motor_start` says.
+    starts: the result of `motor_start`.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> round(run_up(-math.inf, ArduPilotParameters.defaults()), 2), run_up(-0.4, ArduPilotParameters.defaults())

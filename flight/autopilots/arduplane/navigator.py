@@ -1,15 +1,15 @@
-"""ArduPlane's navigation: the L1 law along a mission's legs, when it turns to the next one, loiters and returns.
+"""ArduPlane's navigation: L1 guidance along legs, changes of leg, loiters, and RTL.
 
-The L1 law is that of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) as
-ArduPlane's documentation gives its parameters (ardupilot.org, Plane, "Navigation Tuning"), with the formulas of
-`flight.guidance.lateral_reference_laws`.  ArduPlane navigates ten times a second: what it demands stays until then.
+L1 guidance follows Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) with
+the parameters of ArduPlane's documentation (ardupilot.org, Plane, "Navigation Tuning") and the formulas of
+`flight.guidance.lateral_reference_laws`.  ArduPlane navigates ten times a second and holds its demands in between.
 
-Of loiters, facts of ArduPlane's `Plane::update_loiter`, `verify_loiter_*` and `ModeLoiter::isHeadingLinedUp`: it
-follows the line to a circle's middle until it is within three radii of that, then flies at the middle until the circle
-asks for the sharper turn, and around.  Turns, seconds and heights count from there on.  Once they are reached it goes
-on around until it heads for what follows, within ten degrees and ten more for each circle of waiting; the next leg's
-line begins in the circle's middle, or where it is, if the item asks for that.  Circles grow with height as the square
-of true by equivalent airspeed (`AP_L1_Control::loiter_radius`).
+Loiters follow ArduPlane's `Plane::update_loiter`, `verify_loiter_*` and `ModeLoiter::isHeadingLinedUp`.  The aircraft
+follows the line to the center of the loiter until it is within three radii, then steers to the center until the loiter
+demands the sharper turn, and then flies around.  Turns, time and altitude are measured from there on.  Once they are
+done, it keeps loitering until it heads for what follows, within ten degrees plus ten for each lap of waiting.  The
+next leg's line begins in the loiter's center, or at the aircraft if the item says so.  The radius grows with altitude
+as the square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).
 """
 
 import math
@@ -21,33 +21,38 @@ from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l
 from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner
 
-# An acceptance is sent as whole metres in a byte.
+# Upper limit of an acceptance radius, m: it is sent as whole metres in a byte.
 MAX_ACCEPTANCE = 255.0
-# A circle's line is followed to so many of its radii from its middle.
-_FAR = 3.0
-# A loiter to a height has reached it within this, m; one that came no nearer than that in so many circles leaves too.
-REACHED_HEIGHT, _STUCK_CIRCLES = 5.0, 3.0
-# It heads for what follows within this, rad, and so much more for each circle that it has waited.
-_LINED_UP, _WIDENS = math.radians(10.0), math.radians(10.0)
-# A return leaves its circle for the landing sequence within so much of the height there, m.
+# Distance from the center, in radii, up to which the line to a loiter is followed.
+_APPROACH_LINE_RADII_RATIO = 3.0
+# Altitude tolerance at which a loiter to an altitude is done, m.
+REACHED_HEIGHT = 5.0
+# A loiter to an altitude is also done when the altitude changed by less than that tolerance in this many laps.
+_ALTITUDE_CHECK_INTERVAL_LAPS = 3.0
+# Heading tolerance for leaving a loiter towards what follows, rad ...
+_EXIT_HEADING_TOLERANCE_RAD = math.radians(10.0)
+# ... and its growth for each lap of waiting, rad.
+_EXIT_HEADING_GROWTH_RAD = math.radians(10.0)
+# Altitude tolerance for leaving the RTL loiter to join the landing sequence, m.
 JOINS_WITHIN = 10.0
-# Nothing within so many radii of the middle can be headed for from the circle.
-_WITHIN = 1.05
+# A place closer to the center than this, in radii, cannot be headed for from the loiter: no heading is awaited.
+_MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
 @compiled
 def turn_distance(
     acceptance: float, turn: float, radius: float, length: float, air_density_factor: float
 ) -> float:  # pragma: no cover - compiled
-    """How far before a waypoint ArduPlane turns to the next leg, m; 0 where it flies on to the waypoint.
+    """Return the distance before a waypoint at which ArduPlane turns to the next leg, m.
 
-    acceptance: that the mission states, m, 0 for none: it is taken as it is, in whole metres.
-    turn: rad, positive.  radius: WP_RADIUS, m.  length: of L1, m.
-    air_density_factor: true by equivalent airspeed; with height a turn takes its square more room.
+    The result is 0 if it flies on to the waypoint.
+    acceptance: from the mission, m, used as stated, in whole metres; 0 if the mission states none.
+    turn: rad, positive.  radius: WP_RADIUS, m.  length: L1 distance, m.
+    air_density_factor: ratio of true to equivalent airspeed; the room for a turn grows as its square.
     """
-    stated = math.floor(min(MAX_ACCEPTANCE, acceptance))
-    if stated > 0.0:
-        return stated
+    acceptance_m = math.floor(min(MAX_ACCEPTANCE, acceptance))
+    if acceptance_m > 0.0:
+        return acceptance_m
     right_angle: float = min(radius * air_density_factor * air_density_factor, length)
     return right_angle * min(1.0, turn / (0.5 * math.pi))
 
@@ -56,7 +61,7 @@ def turn_distance(
 def past_line(
     estimated: Record, from_east: float, from_north: float, east: float, north: float
 ) -> bool:  # pragma: no cover - compiled
-    """Whether the line across the leg at its end (east, north) is passed; a leg without length is."""
+    """Return True past the line across the leg at its end (east, north), and for a leg without length."""
     leg_e, leg_n = east - from_east, north - from_north
     ahead_e, ahead_n = east - estimated.east, north - estimated.north
     passed: bool = ahead_e * leg_e + ahead_n * leg_n <= 0.0
@@ -72,21 +77,21 @@ def navigate_legs(
     air_density_factor: float,
     dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """Demand a side acceleration for the present leg, and then turn to the next one if its time has come.
+    """Demand a side acceleration for the current leg, and change to the next leg when it is time.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     parameters: of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
     own: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
-    air_density_factor: true by equivalent airspeed.
-    dt: s since the last time.
+    air_density_factor: ratio of true to equivalent airspeed.
+    dt: s since the last update.
     """
     b = waypoints[own.leg + 1]
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
     if b.returns:
-        # A return is one leg; it goes on until the flight ends, or to the mission's landing sequence.
-        _return(estimated, b, parameters, own, air_density_factor)
+        # An RTL is one leg, which lasts until the flight ends or joins the mission's landing sequence.
+        _navigate_rtl(estimated, b, parameters, own, air_density_factor)
         _join_landing(estimated, waypoints, b, own)
         return
     if b.circle != 0.0:
@@ -94,14 +99,16 @@ def navigate_legs(
         return
     own.on_circle = False
     _follow_line(estimated, b.east, b.north, parameters, own, length, speed, dt, b.straight)
-    turn = _turn_after(waypoints, b, own)
-    if own.leg + 2 < waypoints.shape[0] and _reached(estimated, b, turn, parameters, own, length, air_density_factor):
+    turn = _turn_at(waypoints, b, own)
+    if own.leg + 2 < waypoints.shape[0] and _is_leg_over(
+        estimated, b, turn, parameters, own, length, air_density_factor
+    ):
         _begin_leg(estimated, waypoints, own.leg + 1, own)
 
 
 @inner
 def target_of(b: Record) -> tuple[float, float]:  # pragma: no cover - compiled
-    """East and north (m) of the place that a waypoint of the route belongs to: a loiter's is its middle."""
+    """Return east and north (m) of a waypoint of the route, or of the center if it belongs to a loiter."""
     return (b.centre_east, b.centre_north) if b.circle != 0.0 and not b.returns else (b.east, b.north)
 
 
@@ -110,9 +117,9 @@ def _follow_line(
     estimated: Record, east: float, north: float, parameters: Record, own: Record, length: float, speed: float,
     dt: float, straight: bool,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Demand the side acceleration along the line from where the leg began to its end, m.
+    """Demand the side acceleration along the line from the leg's start to its end, m.
 
-    straight: whether the line is that from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
+    straight: True for a line from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
     """
     from_e, from_n = (estimated.east, estimated.north) if straight else (own.from_east, own.from_north)
     angle, aim = l1_angles(estimated, from_e, from_n, east, north, length)
@@ -123,8 +130,11 @@ def _follow_line(
 
 
 @inner
-def _turn_after(waypoints: Records, b: Record, own: Record) -> float:  # pragma: no cover - compiled
-    """The turn at b that ArduPlane reckons with, rad, positive: beside a loiter that from or to its middle."""
+def _turn_at(waypoints: Records, b: Record, own: Record) -> float:  # pragma: no cover - compiled
+    """Return the turn angle at b that ArduPlane uses, rad, positive.
+
+    Next to a loiter that is the turn from or to the loiter's center.
+    """
     turn: float = b.turn
     if own.leg + 2 >= waypoints.shape[0]:
         return turn
@@ -138,10 +148,10 @@ def _turn_after(waypoints: Records, b: Record, own: Record) -> float:  # pragma:
 
 @inner
 def _begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:  # pragma: no cover - compiled
-    """Turn to a leg: its line leads from its waypoint to the next, or from here where that is passed already."""
+    """Begin a leg: its line leads from its waypoint to the next, or from the aircraft if past the end."""
     a, b = waypoints[leg], waypoints[leg + 1]
     own.leg = leg
-    # The next circle is another one, though a return's height is asked for before it is flown to.
+    # The next loiter has not been captured yet, even if the current one was.
     own.on_circle = False
     own.loitering, own.over, own.at_height = False, False, False
     own.stayed, own.circled, own.waited, own.next_look = 0.0, 0.0, 0.0, 0.0
@@ -155,16 +165,19 @@ def _begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> 
 
 
 @inner
-def _reached(
+def _is_leg_over(
     estimated: Record, b: Record, turn: float, parameters: Record, own: Record, length: float,
     air_density_factor: float,
 ) -> bool:  # pragma: no cover - compiled  # fmt: skip
-    """Whether the leg to b, where the route turns (rad), is over: near enough to b, or past the line across it."""
+    """Return True if the leg to b is over: b is within the turn distance, or the line across it passed.
+
+    turn: of the route at b, rad.
+    """
     distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
     passed = past_line(estimated, own.from_east, own.from_north, b.east, b.north)
     if parameters.wp_max_radius > 0.0 and distance > parameters.wp_max_radius:
         if passed:
-            # Passed too far away: it turns back to the waypoint.
+            # Passed beyond WP_MAX_RADIUS: it turns back to the waypoint.
             own.from_east, own.from_north = estimated.east, estimated.north
         return False
     if b.fly_over:
@@ -178,34 +191,36 @@ def _loiter(
     estimated: Record, waypoints: Records, b: Record, parameters: Record, own: Record, length: float, speed: float,
     air_density_factor: float, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Fly to a loiter's circle and around it until it is over and what follows lies ahead.
+    """Fly to a loiter and around it until it is over and the aircraft heads for what follows.
 
-    b: a corner of the route that stands for it; its circle has the radius at its height.
+    b: the corner of the route that stands for the loiter; its circle has the radius at its altitude.
     """
-    thinner = air_density_factor / true_by_equivalent(b.up)
-    radius = abs(b.circle) * thinner * thinner
-    away = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
-    if not own.loitering and away > _FAR * radius:
+    density_ratio = air_density_factor / true_by_equivalent(b.up)
+    radius = abs(b.circle) * density_ratio * density_ratio
+    distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
+    if not own.loitering and distance > _APPROACH_LINE_RADII_RATIO * radius:
         own.on_circle = False
         _follow_line(estimated, b.centre_east, b.centre_north, parameters, own, length, speed, dt, b.straight)
         return
-    own.side_acceleration = _around(estimated, b, radius, parameters, own, length, speed)
-    _count(estimated, b, own, dt)
-    if not own.over and _is_over(estimated, b, own):
+    own.side_acceleration = _loiter_acceleration(estimated, b, radius, parameters, own, length, speed)
+    _update_loiter_progress(estimated, b, own, dt)
+    if not own.over and _is_loiter_done(estimated, b, own):
         own.over, own.waited = True, 0.0
     after = own.leg + 2
     while after < waypoints.shape[0] and waypoints[after].stop == b.stop:
         after += 1
     if after >= waypoints.shape[0]:
         return
-    if own.over and (own.on_circle or b.turns == 0.0) and _heads_for(estimated, waypoints[after], b, radius, own):
+    if own.over and (own.on_circle or b.turns == 0.0) and _is_lined_up(estimated, waypoints[after], b, radius, own):
         own.left_for = after - 1
         _begin_leg(estimated, waypoints, after - 1, own)
 
 
 @inner
-def _count(estimated: Record, b: Record, own: Record, dt: float) -> None:  # pragma: no cover - compiled
-    """Count the seconds and the way around a loiter, once its circle is followed."""
+def _update_loiter_progress(
+    estimated: Record, b: Record, own: Record, dt: float
+) -> None:  # pragma: no cover - compiled
+    """Update the time and the angle around a loiter, from its capture on."""
     bearing = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
     if own.loitering:
         own.stayed += dt
@@ -214,21 +229,21 @@ def _count(estimated: Record, b: Record, own: Record, dt: float) -> None:  # pra
         own.waited += turned
     elif own.on_circle:
         own.loitering = True
-        own.next_look, own.up_before = _STUCK_CIRCLES * 2.0 * math.pi, estimated.up
+        own.next_look, own.up_before = _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi, estimated.up
     own.bearing = bearing
     if own.on_circle and abs(estimated.up - b.up) < REACHED_HEIGHT:
         own.at_height = True
 
 
 @inner
-def _is_over(estimated: Record, b: Record, own: Record) -> bool:  # pragma: no cover - compiled
-    """Whether what a loiter's item asks for is done: its turns, its seconds or its height."""
+def _is_loiter_done(estimated: Record, b: Record, own: Record) -> bool:  # pragma: no cover - compiled
+    """Return True once the loiter's turns, time or altitude are done."""
     if not own.loitering:
         return False
     if b.to_height:
         if not own.at_height and own.circled >= own.next_look:
             own.at_height = abs(estimated.up - own.up_before) < REACHED_HEIGHT
-            own.next_look, own.up_before = own.next_look + _STUCK_CIRCLES * 2.0 * math.pi, estimated.up
+            own.next_look, own.up_before = own.next_look + _ALTITUDE_CHECK_INTERVAL_LAPS * 2.0 * math.pi, estimated.up
         done: bool = own.at_height
         return done
     if math.isnan(b.stays):
@@ -239,28 +254,33 @@ def _is_over(estimated: Record, b: Record, own: Record) -> bool:  # pragma: no c
 
 
 @inner
-def _heads_for(
+def _is_lined_up(
     estimated: Record, onward: Record, b: Record, radius: float, own: Record
 ) -> bool:  # pragma: no cover - compiled
-    """Whether the course leads to the place after a loiter b; none leads to one within its circle (radius, m)."""
+    """Return True if the course leads to the place after loiter b, or if none can.
+
+    No course from the loiter leads to a place inside its circle (radius, m).
+    """
     east, north = (onward.centre_east, onward.centre_north) if onward.returns else target_of(onward)
-    if math.hypot(east - b.centre_east, north - b.centre_north) < _WITHIN * radius:
+    if math.hypot(east - b.centre_east, north - b.centre_north) < _MIN_EXIT_DISTANCE_RATIO * radius:
         return True
     bearing = math.atan2(east - estimated.east, north - estimated.north)
-    off = abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north)))
-    lined_up: bool = off <= _LINED_UP + _WIDENS * math.floor(abs(own.waited) / (2.0 * math.pi))
+    heading_error = abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north)))
+    lined_up: bool = heading_error <= _EXIT_HEADING_TOLERANCE_RAD + _EXIT_HEADING_GROWTH_RAD * math.floor(
+        abs(own.waited) / (2.0 * math.pi)
+    )
     return lined_up
 
 
 @inner
-def _return(
+def _navigate_rtl(
     estimated: Record, b: Record, parameters: Record, own: Record, air_density_factor: float
 ) -> None:  # pragma: no cover - compiled
-    """Demand the side acceleration of a return to launch (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
+    """Demand the side acceleration of an RTL (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
 
-    It turns to the middle of its circle at once, whatever leg it was on; the circle grows with height as the square of
-    true by equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until it has climbed what it has to, its bank is
-    LEVEL_ROLL_LIMIT, and only then its slope begins.
+    The aircraft turns to the center of the RTL loiter at once, from any leg; the radius grows with altitude as the
+    square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until the initial climb is
+    done, bank is limited to LEVEL_ROLL_LIMIT; only then the altitude slope begins.
     """
     if not own.returning:
         own.returning = True
@@ -268,7 +288,7 @@ def _return(
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
     radius = abs(b.circle) * air_density_factor * air_density_factor
-    own.side_acceleration = _around(estimated, b, radius, parameters, own, length, speed)
+    own.side_acceleration = _loiter_acceleration(estimated, b, radius, parameters, own, length, speed)
     if own.climbed:
         return
     if int(parameters.flight_options) & CLIMB_BEFORE_TURN:
@@ -278,15 +298,15 @@ def _return(
     if own.climbed:
         own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
         return
-    most = GRAVITY * math.tan(parameters.level_roll_limit)
-    own.side_acceleration = min(most, max(-most, own.side_acceleration))
+    max_acceleration = GRAVITY * math.tan(parameters.level_roll_limit)
+    own.side_acceleration = min(max_acceleration, max(-max_acceleration, own.side_acceleration))
 
 
 @inner
 def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record) -> None:  # pragma: no cover - compiled
-    """Leave a return's circle for the landing sequence, where one follows, as soon as it is followed near its height.
+    """Leave the RTL loiter for the landing sequence, if there is one, once it is flown near its altitude.
 
-    `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The leg begins where the aircraft is.
+    `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The leg begins at the aircraft.
     """
     after = own.leg + 2
     while after < waypoints.shape[0] and waypoints[after].returns:
@@ -300,26 +320,29 @@ def _join_landing(estimated: Record, waypoints: Records, b: Record, own: Record)
 
 
 @inner
-def _around(
+def _loiter_acceleration(
     estimated: Record, b: Record, radius: float, parameters: Record, own: Record, length: float, speed: float
 ) -> float:  # pragma: no cover - compiled
-    """Side acceleration for a loiter: straight to its centre until its circle asks for more, then around it, m/s^2."""
-    side = math.copysign(1.0, b.circle)
+    """Return the side acceleration of a loiter, m/s^2 (`AP_L1_Control::update_loiter`).
+
+    It steers straight to the center until the circle demands the sharper turn, and then around the circle.
+    """
+    direction = math.copysign(1.0, b.circle)
     out_e, out_n = estimated.east - b.centre_east, estimated.north - b.centre_north
     distance = max(0.1, math.hypot(out_e, out_n))
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     inward = wrap(course - math.atan2(-out_e, -out_n))
     capture = l1_acceleration(inward, speed, length, parameters.navl1_damping)
-    # Over the ground: outwards, and around the circle in its direction.
+    # Speeds over the ground: outwards, and around the circle in its direction.
     outwards = -speed * math.cos(inward)
-    around = -side * speed * math.sin(inward)
+    around = -direction * speed * math.sin(inward)
     frequency = 2.0 * math.pi / parameters.navl1_period
     error = distance - radius
-    back = frequency * (frequency * error + 2.0 * parameters.navl1_damping * outwards)
+    correction = frequency * (frequency * error + 2.0 * parameters.navl1_damping * outwards)
     if outwards > 0.0 and around < 0.0:
-        # Flying out and the wrong way round, it turns the way that the circle goes.
-        back = max(back, 0.0)
-    circling = side * (back + around * around / max(0.5 * radius, distance))
-    own.on_circle = not (error > 0.0 and side * capture < side * circling)
+        # Flying outwards against the loiter's direction, it turns in the loiter's direction.
+        correction = max(correction, 0.0)
+    circling = direction * (correction + around * around / max(0.5 * radius, distance))
+    own.on_circle = not (error > 0.0 and direction * capture < direction * circling)
     demanded: float = circling if own.on_circle else capture
     return demanded

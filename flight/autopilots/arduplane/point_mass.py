@@ -1,7 +1,7 @@
-"""An aircraft as a point mass, for compiled code: what its trims say of drag, thrust and power, and how it moves.
+"""Point mass of an aircraft, for compiled code: drag, thrust and power from its trims, and its motion.
 
-Bank and pitch are given; the flight path is below the pitch by the angle of attack, which grows with the load, and
-specific excess power is that of trims at this throttle, airspeed and height, less the induced drag of the bank.
+Bank and pitch are given; the flight path is below the pitch by the angle of attack, which grows with the load factor.
+Specific excess power is taken from trims at the throttle, airspeed and altitude, less the induced drag of the bank.
 """
 
 import functools
@@ -24,21 +24,25 @@ from world.wind import Wind, mean_wind_speed
 
 Floats = NDArray[np.float64]
 
-# Grid of the trims: throttles from 0 to 1, airspeeds from the aircraft's slowest to its fastest, heights AMSL (m).
-_THROTTLES, _SPEEDS, _HEIGHTS = 21, 7, (0.0, 2000.0, 4000.0)
+# Number of throttles in the grid of trims, from 0 to 1.
+_THROTTLE_COUNT = 21
+# Number of airspeeds in the grid, from the aircraft's minimum to its maximum.
+_AIRSPEED_COUNT = 7
+# Altitudes of the grid, m AMSL.
+_ALTITUDES_M = (0.0, 2000.0, 4000.0)
 
-# The aircraft as a point mass, for compiled code.  Its tables have a row for each airspeed and a column for each height
-# of the grid.
+# The aircraft as a point mass, for compiled code.  Its tables have a row for each airspeed and a column for each
+# altitude of the grid.
 POINT_MASS = record_dtype(
     "airspeed",  # m/s, commanded, equivalent
     "slowest",  # m/s, true, of the first row
     "speed_step",
     "height_step",
     "alpha",  # rad, angle of attack without lift
-    "alpha_lift",  # rad m^2/s^2, the rest of it in straight flight, times the airspeed's square
-    "induced",  # m^2/s^2, induced drag by weight in straight flight, times the airspeed's square
+    "alpha_lift",  # rad m^2/s^2, angle of attack from lift in straight flight, times the square of airspeed
+    "induced",  # m^2/s^2, induced drag per weight in straight flight, times the square of airspeed
     "wind_speed",  # m/s at the reference height
-    "wind_east",  # unit vector that it blows to
+    "wind_east",  # unit vector towards which it blows
     "wind_north",
     "wind_gradient",
     "wind_reference",
@@ -47,12 +51,12 @@ POINT_MASS = record_dtype(
 
 
 class PointMass(NamedTuple):
-    """What a return is flown with.
+    """Aircraft model for a simulated RTL.
 
     record: of `POINT_MASS`.
     excess: (t, v, h) specific excess power, by throttle, m/s.
     power: (3, v, h) electric power at idle, in level flight and at full throttle, W.
-    glides: whether its excess power with the throttle closed is that of trims.
+    glides: True if its excess power with closed throttle is from trims.
     """
 
     record: Record
@@ -62,20 +66,20 @@ class PointMass(NamedTuple):
 
 
 def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
-    """An aircraft by its trims, in a wind.
+    """Return the point mass of an aircraft from its trims, in a wind.
 
-    airspeed: commanded, m/s, equivalent.  Beyond the grid of the trims its edge counts.
+    airspeed: commanded, m/s, equivalent.  Beyond the grid of trims, the values at its edge apply.
     """
     speeds, trims, alpha, lift = _trimmed(aircraft)
     excess = filled_excess(trims)
     has_power = bool(envelope.power_level.size)
-    power = np.full((3, len(speeds), len(_HEIGHTS)), np.nan)
+    power = np.full((3, len(speeds), len(_ALTITUDES_M)), np.nan)
     if has_power:
         named = (envelope.power_idle, envelope.power_level, envelope.power_full)
-        power = np.stack([_resampled(envelope, table, speeds) for table in named])
+        power = np.stack([_resample(envelope, table, speeds) for table in named])
     record: Record = np.zeros(1, POINT_MASS)[0]
     record.airspeed, record.slowest, record.has_power = airspeed, speeds[0], has_power
-    record.speed_step, record.height_step = speeds[1] - speeds[0], _HEIGHTS[1] - _HEIGHTS[0]
+    record.speed_step, record.height_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
     record.alpha, record.alpha_lift = alpha, lift
     record.induced = _induced_drag(speeds, excess[0, :, 0])
     record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
@@ -83,45 +87,46 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
     return PointMass(record, excess, power, bool(np.isfinite(trims[0]).any()))
 
 
-# Any change of what `_trims` computes counts this up.
-_SCHEMA = 2
+# Version of the cached tables: increase it with any change of what `_trims` computes.
+_CACHE_VERSION = 2
 
 
 @functools.lru_cache(maxsize=8)
 def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
-    """Airspeeds (v,), specific excess power (t, v, h) and the angle of attack, without lift and times V^2 with it.
+    """Return airspeeds (v,), specific excess power (t, v, h), and two terms of the angle of attack.
 
-    Excess power is NaN where there is no trim.  Trims are kept in the user's cache folder, as the envelope is.
+    The terms are the angle without lift, and the part from lift times the square of airspeed.  Excess power is NaN if
+    there is no trim.  Trims are stored in the user's cache folder, as the envelope is.
     """
-    speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _SPEEDS)
+    speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _AIRSPEED_COUNT)
     version = model_hash(aircraft)
-    file = Path(user_cache_dir("planfly")) / f"trims-{aircraft.name}-{version[:16]}-v{_SCHEMA}.json"
-    key = {"schema": _SCHEMA, "model_hash": version, "jsbsim": JSBSIM_VERSION, "airspeeds": speeds.tolist()}
-    shapes = {"excess": (_THROTTLES, _SPEEDS, len(_HEIGHTS)), "alpha": (_SPEEDS,)}
+    file = Path(user_cache_dir("planfly")) / f"trims-{aircraft.name}-{version[:16]}-v{_CACHE_VERSION}.json"
+    key = {"schema": _CACHE_VERSION, "model_hash": version, "jsbsim": JSBSIM_VERSION, "airspeeds": speeds.tolist()}
+    shapes = {"excess": (_THROTTLE_COUNT, _AIRSPEED_COUNT, len(_ALTITUDES_M)), "alpha": (_AIRSPEED_COUNT,)}
     tables = read_tables(file, key, shapes)
     if tables is None:
         tables = _trims(aircraft, speeds)
         write_tables(file, key, tables)
     alphas = tables["alpha"]
     _fill(alphas)
-    terms = np.stack([np.ones(_SPEEDS), speeds**-2.0], axis=1)
+    terms = np.stack([np.ones(_AIRSPEED_COUNT), speeds**-2.0], axis=1)
     alpha, lift = least_squares(terms, np.nan_to_num(alphas))
     return speeds, tables["excess"], float(alpha), float(lift)
 
 
 def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
-    """Specific excess power (t, v, h), and the angle of attack (v,) at the lowest height; NaN where there is no trim.
+    """Return specific excess power (t, v, h) and angle of attack (v,) at the lowest altitude.
 
-    speeds: (v,) m/s.
+    Both are NaN if there is no trim.  speeds: (v,) m/s.
     """
     simulator = Fdm(aircraft)
-    excess = np.full((_THROTTLES, _SPEEDS, len(_HEIGHTS)), np.nan)
-    alphas = np.full(_SPEEDS, np.nan)
-    for h, amsl in enumerate(_HEIGHTS):
+    excess = np.full((_THROTTLE_COUNT, _AIRSPEED_COUNT, len(_ALTITUDES_M)), np.nan)
+    alphas = np.full(_AIRSPEED_COUNT, np.nan)
+    for h, amsl in enumerate(_ALTITUDES_M):
         for v, speed in enumerate(speeds):
             near = None
-            for t in reversed(range(_THROTTLES)):
-                found = trim(simulator, amsl, {"airspeed": float(speed), "throttle": t / (_THROTTLES - 1.0)}, near)
+            for t in reversed(range(_THROTTLE_COUNT)):
+                found = trim(simulator, amsl, {"airspeed": float(speed), "throttle": t / (_THROTTLE_COUNT - 1.0)}, near)
                 if found is None:
                     continue
                 near = found
@@ -132,10 +137,11 @@ def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
 
 
 def filled_excess(trims: Floats) -> Floats:
-    """Specific excess power (t, v, h) by throttle, airspeed and height, m/s, of trims that are NaN where there is none.
+    """Return specific excess power (t, v, h) in m/s, with values for grid points without a trim (NaN).
 
-    There the nearest throttle's counts, then the nearest airspeed's, then the nearest height's.  But a closed throttle
-    is filled from closed ones alone, as far as there are any: a more open one has thrust, and would be no glide.
+    Such a point takes the value of the nearest throttle, then of the nearest airspeed, then of the nearest
+    altitude.  But a closed throttle is filled from closed throttles alone, as long as there are any: a more open
+    throttle has thrust, and would not be a glide.
 
     >>> trims = np.array([[[-2.0], [np.nan]], [[1.0], [0.5]]])
     >>> filled_excess(trims)[0].tolist(), filled_excess(trims)[1].tolist()
@@ -152,32 +158,32 @@ def filled_excess(trims: Floats) -> Floats:
 
 
 def _fill_along(table: Floats, axis: int) -> None:
-    """Fill each line along an axis."""
+    """Fill the missing values in each line along an axis."""
     lines = np.moveaxis(table, axis, -1)
     for at in np.ndindex(lines.shape[:-1]):
         _fill(lines[at])
 
 
 def _fill(values: Floats) -> None:
-    """Put between and beyond known values what is nearest to them."""
+    """Fill NaN by interpolation between known values, and by the nearest known value beyond them."""
     good = ~np.isnan(values)
     if good.any():
         values[:] = np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
 
 
-def _resampled(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
-    """A table of the envelope at airspeeds (v,) and the grid's heights, its edges extended."""
+def _resample(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
+    """Return a table of the envelope at airspeeds (v,) and the grid's altitudes, with extended edges."""
     filled = np.array(table)
     for column in filled.T:
         _fill(column)
     by_speed = np.stack([np.interp(speeds, envelope.airspeed, column) for column in filled.T], axis=1)
-    return np.stack([np.interp(_HEIGHTS, envelope.amsl, row) for row in by_speed])
+    return np.stack([np.interp(_ALTITUDES_M, envelope.amsl, row) for row in by_speed])
 
 
 def _induced_drag(speeds: Floats, excess: Floats) -> float:
-    """Induced drag by weight times the square of airspeed, of the drag polar through the glides with closed throttle.
+    """Return induced drag per weight times the square of airspeed, from glides with closed throttle.
 
-    Drag by weight is a V^2 + b / V^2 in straight flight; b is what bank adds to, as the square of the load.
+    Drag per weight is a V^2 + b / V^2 in straight flight; bank increases b as the square of the load factor.
     """
     terms = np.stack([speeds**2, speeds**-2.0], axis=1)
     return max(0.0, float(least_squares(terms, -excess / speeds)[1]))
@@ -185,7 +191,7 @@ def _induced_drag(speeds: Floats, excess: Floats) -> float:
 
 @inner
 def angle_of_attack(state: Record, aircraft: Record) -> float:  # pragma: no cover - compiled
-    """Angle of attack at an airspeed in a bank, rad."""
+    """Return the angle of attack at an airspeed in a bank, rad."""
     load = 1.0 / max(0.3, math.cos(state.roll))
     attack: float = aircraft.alpha + aircraft.alpha_lift * load / (state.airspeed * state.airspeed)
     return attack
@@ -202,11 +208,11 @@ def move_on(
     power: Floats,
     dt: float,
 ) -> float:  # pragma: no cover - compiled
-    """Move a point mass on by ``dt`` s on a path angle (rad, to the air); returns the power that it takes, W."""
+    """Move a point mass by ``dt`` s on a path angle (rad, to the air), and return the power used, W."""
     thrust = excess_power(excess, throttle, state.airspeed, motion.up, aircraft)
     tilt = math.tan(min(1.2, abs(state.roll)))
     gain = thrust - aircraft.induced / state.airspeed * tilt * tilt
-    taken = _power(thrust, excess, power, state.airspeed, motion.up, aircraft)
+    taken = _electric_power(thrust, excess, power, state.airspeed, motion.up, aircraft)
     state.yaw += GRAVITY * math.tan(state.roll) / state.airspeed * dt
     state.airspeed = max(3.0, state.airspeed + (GRAVITY * gain / state.airspeed - GRAVITY * math.sin(angle)) * dt)
     wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, motion.up)
@@ -221,16 +227,19 @@ def move_on(
 
 
 @inner
-def _power(
+def _electric_power(
     thrust: float, excess: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
 ) -> float:  # pragma: no cover - compiled
-    """Electric power at a specific excess power, by the parabola of `aircraft.envelope.Envelope.power`, W."""
+    """Return electric power at a specific excess power, W, by the parabola of `Envelope.power`."""
     if not aircraft.has_power:
         return 0.0
-    low = _at(power[0], airspeed, amsl, aircraft)
-    middle = _at(power[1], airspeed, amsl, aircraft)
-    high = _at(power[2], airspeed, amsl, aircraft)
-    full, idle = _at(excess[excess.shape[0] - 1], airspeed, amsl, aircraft), _at(excess[0], airspeed, amsl, aircraft)
+    low = _interpolate(power[0], airspeed, amsl, aircraft)
+    middle = _interpolate(power[1], airspeed, amsl, aircraft)
+    high = _interpolate(power[2], airspeed, amsl, aircraft)
+    full, idle = (
+        _interpolate(excess[excess.shape[0] - 1], airspeed, amsl, aircraft),
+        _interpolate(excess[0], airspeed, amsl, aircraft),
+    )
     if thrust >= full or not idle < 0.0 < full:
         return high
     if thrust <= idle:
@@ -246,17 +255,17 @@ def _power(
 def excess_power(
     excess: Floats, throttle: float, airspeed: float, amsl: float, aircraft: Record
 ) -> float:  # pragma: no cover - compiled
-    """Specific excess power in straight flight at a throttle, an airspeed and a height, m/s."""
+    """Return specific excess power in straight flight at a throttle, an airspeed and an altitude, m/s."""
     x = min(1.0, max(0.0, throttle)) * (excess.shape[0] - 1)
     i = min(excess.shape[0] - 2, int(x))
-    low, high = _at(excess[i], airspeed, amsl, aircraft), _at(excess[i + 1], airspeed, amsl, aircraft)
+    low, high = _interpolate(excess[i], airspeed, amsl, aircraft), _interpolate(excess[i + 1], airspeed, amsl, aircraft)
     value: float = low + (x - i) * (high - low)
     return value
 
 
 @inner
-def _at(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:  # pragma: no cover - compiled
-    """A table (v, h) at an airspeed and a height, bilinear, its edges extended."""
+def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:  # pragma: no cover - compiled
+    """Return the value of a table (v, h) at an airspeed and an altitude, bilinear, with extended edges."""
     x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.slowest) / aircraft.speed_step))
     y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.height_step))
     i, j = min(table.shape[0] - 2, int(x)), min(table.shape[1] - 2, int(y))

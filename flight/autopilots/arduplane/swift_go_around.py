@@ -1,13 +1,13 @@
-"""A landing that is aborted, within a few milliseconds: ArduPlane's law steers a point mass back to its line-up.
+"""Simulate an aborted landing with a point mass in a few milliseconds, back to the line-up.
 
-The law is that of `AP_Landing::type_slope_verify_abort_landing` and `restart_landing_sequence` (libraries/AP_Landing)
-and of `Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6.  With its wings
-level it climbs at the pitch of the last take-off with the throttle open, until it is higher over *home* than its height
-for that says.  Where the field lies higher than home that may be at once.  Then it goes to the landing sequence that is
-nearest there: from where it is to its first place, turning on the short side, on a straight slope from the height that
-it has, and by the sequence's other places back to the line-up.
+It follows `AP_Landing::type_slope_verify_abort_landing` and `restart_landing_sequence` (libraries/AP_Landing) and
+`Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6.  The aircraft climbs with
+level wings at the pitch of the last take-off and open throttle until it is above the go-around altitude, which is
+relative to *home*; if the field lies higher than home, that may be at once.  Then it goes to the nearest landing
+sequence: from its position to the first place of the sequence, turning on the short side, on a straight slope from its
+altitude, and by the sequence's other places back to the line-up.
 
-The point mass and the law of each way are those of `flight.autopilots.arduplane.swift_return`.
+The point mass and the law of each leg are the ones in `flight.autopilots.arduplane.swift_return`.
 """
 
 import math
@@ -40,11 +40,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class GoArounds:
-    """Go-arounds that were flown.
+    """Simulated go-arounds.
 
     flown: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_FLOWN`.
-    ways: n arrays (t, 3) of places a second apart, m.
-    landings: n, the landing sequence that each of them goes to.
+    ways: n arrays (t, 3) of positions at intervals of 1 s, m.
+    landings: n, the landing sequence that each go-around joins.
     """
 
     flown: Records
@@ -53,7 +53,7 @@ class GoArounds:
 
 
 def climb_rows(way: Floats, top: float) -> int:
-    """How many places (t, 3) of a go-around come before the one at which its climb is over; t where it never is.
+    """Return the number of positions (t, 3) of a go-around before its climb is over; t if it never is.
 
     >>> climb_rows(np.array([[0.0, 0.0, 10.0], [0.0, 20.0, 14.0], [0.0, 40.0, 18.0]]), 13.0)
     1
@@ -63,10 +63,10 @@ def climb_rows(way: Floats, top: float) -> int:
 
 
 def aborted_at(place: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass) -> Records:
-    """(1,) of `flight.autopilots.arduplane.swift_return.RETURN_START`: on a glide, where its landing is aborted.
+    """Return (1,) of `flight.autopilots.arduplane.swift_return.RETURN_START`: the abort point on a glide.
 
     place: east, north, up, m.  course: of the glide over the ground, rad.  slope: of the glide, m per m.
-    airspeed: true, m/s.  The wind is the aircraft's.
+    airspeed: true, m/s.  The wind is taken from the aircraft.
     """
     start: Records = np.zeros(1, RETURN_START)
     made = aircraft.record
@@ -89,12 +89,12 @@ def fly_go_arounds(
     aircraft: PointMass,
     around: Surroundings,
 ) -> GoArounds:
-    """Fly a go-around from each of n places on a glide to the last place of a landing sequence.
+    """Simulate a go-around from each of n places on a glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.swift_return.RETURN_START`.
-    top: height above which the climb ends, m AMSL.  pitch: of the climb, rad.
-    landings: one or more landing sequences, of which each goes to the nearest where its climb is over.  A place of it
-        that is a circle is its last: the go-around is over once around it.
+    top: altitude above which the climb ends, m AMSL.  pitch: of the climb, rad.
+    landings: one or more landing sequences; each go-around joins the nearest one where its climb is over.  A loiter in
+        a sequence is the last place: the go-around is over once around it.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -114,7 +114,7 @@ def fly_go_arounds(
     (True, True, True)
     """
     flown = np.zeros(len(starts), RETURN_FLOWN)
-    law, staged, climb = parameters.record(), _climbing(parameters, pitch), np.zeros(1, CLIMB)[0]
+    law, staged, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
     climb.climbs, climb.top, climb.slew = True, top, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
 
@@ -133,7 +133,7 @@ def fly_go_arounds(
     found = []
     for k in range(len(starts)):
         way, landing = fly(k, landings[0]), landings[0]
-        # Until its climb is over it flies to none of them.
+        # The climb leads to none of the sequences, so it is the same for each.
         over = way[min(climb_rows(way, top), len(way) - 1)]
         nearest = nearest_landing((float(over[0]), float(over[1]), float(over[2])), landings)
         if nearest is not None and nearest != landing:
@@ -142,8 +142,8 @@ def fly_go_arounds(
     return GoArounds(flown, tuple(way for way, _ in found), tuple(landing for _, landing in found))
 
 
-def _climbing(parameters: ArduPilotParameters, pitch: float) -> Record:
-    """The parameters of the climb, as of a take-off: speed by pitch, and a pitch that is held."""
+def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
+    """Return the climb's parameters, as in a take-off: speed by pitch, and a fixed pitch."""
     staged = parameters.record()
     staged.tecs_speed_weight = 2.0
     staged.tecs_pitch_min = 0.0
@@ -152,7 +152,7 @@ def _climbing(parameters: ArduPilotParameters, pitch: float) -> Record:
 
 
 def _stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
-    """(n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the places up to the first circle."""
+    """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the places up to the first loiter."""
     flown = until_circle(sequence)
     stages: Records = np.zeros(len(flown), WAYPOINT)
     for stage, one in zip(stages, flown, strict=True):

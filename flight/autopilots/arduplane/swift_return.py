@@ -1,14 +1,13 @@
-"""A return to launch within a millisecond: ArduPlane's law steers a point mass, and not an aircraft in JSBSim.
+"""Simulate an RTL with a point mass in about 2 ms, at least 100 times faster than JSBSim.
 
-The law is that of `flight.autopilots.arduplane.law`, compiled code and all: L1 to the target, the slope or the climb,
-TECS with its limits.  What it steers is a `flight.autopilots.arduplane.point_mass.PointMass`, whose bank and pitch
-follow their demands with the lags of ArduPlane's controllers.  A return takes two milliseconds so, a hundredth and less
-of a flight in JSBSim, and its least clearance is within 7 m of 38 flights of ArduPlane itself
+The law is the compiled code of `flight.autopilots.arduplane.law`: L1 to the target, the slope or the climb, and TECS
+with its limits.  It controls a `flight.autopilots.arduplane.point_mass.PointMass`, whose bank and pitch follow their
+demands with the lags of ArduPlane's controllers.  The least clearance is within 7 m of 38 flights of ArduPlane itself
 (`tests/flight/autopilots/arduplane/test_swift_return.py`).
 
-Without its engine the law does not know that there is no thrust: it asks for all of it, slows down until it is too slow
-(`flight.autopilots.arduplane.law.is_underspeed`), holds its least airspeed from then on, and dives onto its slope where
-it meets that.  Fourteen such flights of ArduPlane are met as well
+After an engine failure the law does not know that there is no thrust: it demands full throttle, slows down until it is
+in underspeed (`flight.autopilots.arduplane.law.is_underspeed`), holds its minimum airspeed from then on, and dives onto
+its slope where it meets the slope.  Fourteen such flights of ArduPlane are reproduced as well
 (`tests/flight/autopilots/arduplane/test_engine_out.py`).
 """
 
@@ -50,74 +49,84 @@ from world.wind import mean_wind_speed
 
 Floats = NDArray[np.float64]
 
-# How far round its circle a return is, since it came there and to its height.
-_CIRCLING = record_dtype(
+# Progress around the RTL loiter since the aircraft captured it at the target altitude.
+_LOITER_PROGRESS = record_dtype(
     "seconds",
     "turned",  # rad, positive to the right
-    "bearing",  # rad, from its middle, at the last tick
+    "bearing",  # rad, bearing from the center, at the last tick
 )
 
-# Where a return begins: places and velocities in map axes, m and m/s over the ground; bank, rad.
+# Start of an RTL: position in map axes, m; velocity over the ground, m/s; bank, rad.
 RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_north", "velocity_up", "roll")
 
-# A climb that a flight begins with, as a landing's go-around does.
+# Climb at the start of a flight, as in a go-around.
 CLIMB = record_dtype(
     ("climbs", np.bool_),
-    "top",  # m AMSL, above which it ends
-    "throttle",  # 0..1, which it opens to
-    "slew",  # of the throttle's range, 1/s
+    "top",  # m AMSL, altitude above which it ends
+    "throttle",  # 0..1, throttle of the climb
+    "slew",  # fraction of the throttle range, 1/s
 )
 NO_CLIMB: Record = np.zeros(1, CLIMB)[0]
 
-# How a return ended: at its landing sequence, or in its circle for `flight.mission.itinerary.UNLIMITED` s and once all
-# around it at its height; in the ground; off the elevation data; neither in three times the time that its way takes; or
-# below the least that was asked of it.
-CIRCLED, HIT, OFF_GROUND, NEVER, CUT = 1, 2, 3, 4, 5
-# What is told of a return.  Heights above ground and distances outside kill spheres, m; -1 for no threat.
+# End of an RTL: it reached its landing sequence, or flew its loiter at the target altitude once around and for
+# `flight.mission.itinerary.UNLIMITED` s.
+CIRCLED = 1
+# End of an RTL: it hit the ground.
+HIT = 2
+# End of an RTL: it left the elevation data.
+OFF_GROUND = 3
+# End of an RTL: it timed out.
+NEVER = 4
+# End of an RTL: it fell below the caller's least clearance or distance.
+CUT = 5
+# Outcome of one simulated RTL.  Heights above ground and distances outside kill spheres in m; threat -1 if none.
 RETURN_FLOWN = record_dtype(
     ("ended", np.int64),
     "seconds",  # to its end
-    "to_circle",  # s, when it is first within `AT_CIRCLE` of its target; NaN for never
-    "circle_up",  # m, its height then
-    "clearance",  # least, over all of it; of one that hits, `DEEPEST` below the ground at the most
-    "clearance_time",  # of one that hits, where it does so first
+    "to_circle",  # s, first time within `AT_CIRCLE` of its target; NaN if it never is
+    "circle_up",  # m, its altitude then
+    "clearance",  # least of the whole RTL; after ground contact at most `DEEPEST` below the ground
+    "clearance_time",  # after ground contact: the time of the first contact
     "clearance_east",
     "clearance_north",
     "clearance_up",
-    "clearance_before",  # least, before it came to its circle
+    "clearance_before",  # least before it arrived at its loiter
     "outside",  # least distance outside any kill sphere
     ("threat", np.int64),
     "threat_time",
-    "outside_before",  # before it came to its circle
-    "energy",  # Wh, NaN where the envelope knows no power
-    ("rows", np.int64),  # of the way that was kept
+    "outside_before",  # least before it arrived at its loiter
+    "energy",  # Wh, NaN if the envelope has no power data
+    ("rows", np.int64),  # number of stored positions
 )
-# Nearer to its target than this (m), or than `flight.simulation.tick.WIDER` of its radii, a return is at its circle: as
-# far as flights of ArduPlane were compared.
+# An RTL has arrived at its loiter within this distance of its target (m), or within `flight.simulation.tick.WIDER` of
+# its radii.  Flights of ArduPlane were compared up to there.
 AT_CIRCLE = 200.0
-# A return that hits the ground is flown on until it is so deep in it (m): by how much it hit is known then, and what a
-# return that barely does so would meet after that.
+# An RTL that hits the ground is continued to this depth (m), to know by how much it hits, and what an RTL that barely
+# hits would meet after that.
 DEEPEST = 10.0
-# Every so many ticks a place of the way is kept, 1 s.
+# Interval between stored positions, ticks; 1 s.
 KEPT_EVERY = 10
-# The flight path follows the pitch so late, s: the time in which lift turns the velocity of a small aircraft.
-_PATH_LAG = 0.4
-# A return that takes this many times as long as its way and its climb is given up, and so many s at least.
-_TOO_LONG, _SPARE = 3.0, 600.0
-# Without thrust an aircraft that is banked by more than this (rad) comes to the airspeed of its turn with this lag (s).
-_TURNS, _SPEED_LAG = math.radians(5.0), 8.0
-# After its engine has stopped an aircraft flies on for this long before it turns back, s: so long did those that
-# ArduPlane's flights were measured with.
+# Lag of the flight path behind the pitch, s: the time in which lift turns the velocity of a small aircraft.
+_PATH_LAG_S = 0.4
+# An RTL times out after this multiple of the nominal time for its distance and climb ...
+_TIMEOUT_RATIO = 3.0
+# ... plus this time, s.
+_TIMEOUT_BASE_S = 600.0
+# Bank above which an aircraft without thrust is treated as turning, rad.
+_TURN_BANK_RAD = math.radians(5.0)
+# Lag with which it settles at the airspeed of that turn, s.
+_TURN_AIRSPEED_LAG_S = 8.0
+# Delay from engine failure to the turn back, s; the delay used in the ArduPlane reference flights.
 REACTION = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """What a return can meet, for compiled code.
+    """Terrain and threats that an RTL can meet, for compiled code.
 
-    heights, to_pixel: of the terrain; one pixel without data where none is known.
-    spheres, radii: (m, 3) middles and (m,) radii of kill spheres, m; a radius of 0 is none.
-    known: whether there is a terrain.
+    heights, to_pixel: of the terrain; one pixel without data if there is no terrain.
+    spheres, radii: (m, 3) centers and (m,) radii of kill spheres, m; a radius of 0 stands for no sphere.
+    known: True if there is a terrain.
     """
 
     heights: Heights
@@ -129,10 +138,10 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True)
 class SwiftReturns:
-    """Returns that were flown.
+    """Simulated RTLs.
 
     flown: (n,) of `RETURN_FLOWN`.
-    ways: n arrays (t, 3) of places a second apart, m; empty where none were kept.
+    ways: n arrays (t, 3) of positions at intervals of 1 s, m; empty if they were not stored.
     """
 
     flown: Records
@@ -140,7 +149,7 @@ class SwiftReturns:
 
 
 def surroundings(scenario: Scenario) -> Surroundings:
-    """Ground and kill spheres of a scenario."""
+    """Return the ground and the kill spheres of a scenario."""
     threats, terrain = scenario.threats, scenario.terrain
     spheres, radii = threats.position.reshape(-1, 3), threats.kill_radius
     if terrain is None:
@@ -161,14 +170,14 @@ def fly_returns(
     least: tuple[Floats, Floats] | None = None,
     engine_out: bool = False,
 ) -> SwiftReturns:
-    """Fly a return from each of n starts.
+    """Simulate an RTL from each of n starts.
 
     starts: (n,) of `RETURN_START`.
-    targets: n circles, where each of them goes; None for one that goes straight to its landing sequence.
-    landings: n landing sequences that they go on to, up to the line-up or a loiter, None for none; or none at all.
-    keep: whether their ways are kept.
-    least: (n,) heights above ground and (n,) distances outside spheres, m, below which a return need not be flown on.
-    engine_out: whether the engine has stopped: it flies on for `REACTION` s, and its circle ends it.
+    targets: n loiters, the target of each start; None to go straight to the landing sequence.
+    landings: n landing sequences to join afterwards, up to the line-up or a loiter, None for no sequence; or empty.
+    keep: True to store the positions.
+    least: (n,) heights above ground and (n,) distances outside spheres, m, below which an RTL is aborted.
+    engine_out: True after an engine failure: the aircraft flies on for `REACTION` s, and ends at its loiter.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -214,9 +223,9 @@ def fly_returns(
 def _stages(
     target: ReturnCircle | None, landing: LandingStart | None, parameters: ArduPilotParameters, aircraft: PointMass
 ) -> Records:
-    """(n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: what a return flies to, one after the other.
+    """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the successive targets of an RTL.
 
-    A place of a landing sequence is a waypoint, or the middle of a loiter that the mission asks for, which is the last.
+    A place of a landing sequence is a waypoint, or the center of a loiter of the mission, which is the last target.
     """
     places = until_circle(() if landing is None else (landing, *landing.onward))
     stages: Records = np.zeros((target is not None) + len(places), WAYPOINT)
@@ -227,13 +236,15 @@ def _stages(
         first.east, first.north, first.returns = target.east, target.north, True
     for stage, place in zip(stages[len(stages) - len(places) :], places, strict=True):
         fill_stage(stage, place, parameters)
-        # A return's first leg to land is flown along no line, as after any change of mode.
+        # The first leg of an RTL to the landing follows no line, as after any change of mode.
         stage.straight = place is landing
     return stages
 
 
 def until_circle(places: Sequence[LandingStart]) -> Sequence[LandingStart]:
-    """The places of a landing sequence up to the first that is a loiter: when that is left, no point mass knows.
+    """Return the places of a landing sequence up to the first loiter.
+
+    A point mass cannot say when the loiter is left.
 
     >>> spots = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), circles=k == 2) for k in (1, 2, 3)]
     >>> [one.item for one in until_circle(spots)]
@@ -244,28 +255,28 @@ def until_circle(places: Sequence[LandingStart]) -> Sequence[LandingStart]:
 
 
 def fill_stage(stage: Record, landing: LandingStart, parameters: ArduPilotParameters) -> None:
-    """Make a place of a landing sequence what is flown to: a waypoint, or the middle of a loiter."""
+    """Fill a stage with a place of a landing sequence: a waypoint, or the center of a loiter."""
     stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = landing.place
-    # Nothing says how its next leg turns: as at a mission's end, it is a right angle.
+    # The turn to its next leg is unknown: use a right angle, as at a mission's end.
     stage.turn = 0.5 * math.pi
     stage.circle = (landing.radius or parameters.loiter_radius) if landing.circles else 0.0
 
 
-# How far away the end of a leg is that is not flown to its end, m.
-_ON = 10_000.0
+# Length of a leg that is not flown to its end, m.
+_STRAIGHT_LEG_LENGTH_M = 10_000.0
 
 
 def straight_on(start: Record) -> Records:
-    """(1,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: far ahead on a start's course and slope."""
+    """Return (1,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: far ahead on course and slope."""
     ahead: Records = np.zeros(1, WAYPOINT)
     over = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
     for axis, velocity in (("east", "velocity_east"), ("north", "velocity_north"), ("up", "velocity_up")):
-        ahead[axis] = start[axis] + _ON * start[velocity] / over
+        ahead[axis] = start[axis] + _STRAIGHT_LEG_LENGTH_M * start[velocity] / over
     return ahead
 
 
 def most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
-    """After how long a return is given up, s."""
+    """Return the time after which an RTL is given up, s."""
     slowest = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
     east, north, up, seconds = start["east"], start["north"], start["up"], 0.0
     for end in stages:
@@ -273,7 +284,7 @@ def most_seconds(start: Record, stages: Records, aircraft: PointMass) -> float:
         around = 2.0 * math.pi * WIDER * abs(end["circle"])
         seconds += (distance + around) / slowest + abs(end["up"] - up) / 2.0
         east, north, up = end["east"], end["north"], end["up"]
-    return float(_SPARE + _TOO_LONG * seconds)
+    return float(_TIMEOUT_BASE_S + _TIMEOUT_RATIO * seconds)
 
 
 @compiled
@@ -282,50 +293,52 @@ def fly_stages(
     power: Floats, heights: Heights, to_pixel: PolyMapRecord, spheres: Floats, radii: Floats, known: bool, most: float,
     floor: float, apart: float, engine_out: bool, way: Floats, out: Record,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Fly from one stage to the next for ``most`` s at the longest, and fill in what is told of it.
+    """Fly from stage to stage for ``most`` s at the longest, and fill in the outcome.
 
-    climb: whether the first stage is a climb, and how far.  staged: the parameters of that climb.
+    climb: whether the first stage is a climb, and up to which altitude.  staged: the parameters of that climb.
     """
-    # As `waypoint_column` has them.  A circle is flown until the return is over: no leg comes after it.
-    spaced, turns = np.zeros(6, WAYPOINT), np.zeros(1, _CIRCLING)
+    # The same spacing as in `waypoint_column`.  A loiter is flown until the RTL is over: no leg follows it.
+    spaced, turns = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
     waypoints, circling = spaced[::2], turns[0]
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
     b, estimated, state, own = waypoints[1], motions[0], states[0], memories[0]
-    _begin(start, estimated, known, out)
-    _fly_to(stages, 0, waypoints, estimated, own)
-    _take_over(start, parameters, aircraft, excess, state, own)
+    _initialise_outcome(start, estimated, known, out)
+    _load_stage(stages, 0, waypoints, estimated, own)
+    _initialise_law(start, parameters, aircraft, excess, state, own)
     pitch, angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK
     roll_share = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
     pitch_share = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
-    path_share = 1.0 - math.exp(-dt / _PATH_LAG)
+    path_share = 1.0 - math.exp(-dt / _PATH_LAG_S)
     stage, used = 0, 0.0
     for tick in range(int(most / dt)):
         time = tick * dt
         if tick % KEPT_EVERY == 0:
-            _keep(estimated, way, out)
+            _store_position(estimated, way, out)
         factor = true_by_equivalent(estimated.up)
         is_last = stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - b.centre_east, estimated.north - b.centre_north)
         wide = WIDER * abs(b.circle) * factor * factor
         if is_last and distance < max(AT_CIRCLE, wide):
-            _arrive(estimated, time, engine_out, out)
+            _record_arrival(estimated, time, engine_out, out)
         out.seconds = time
-        _look(estimated, time, heights, to_pixel, spheres, radii, known, out)
+        _update_clearances(estimated, time, heights, to_pixel, spheres, radii, known, out)
         if out.ended == NEVER and (out.clearance < floor or out.outside < apart):
             out.ended = CUT
         if out.ended != NEVER:
             break
-        if _goes_on(estimated, b, own, circling, climb, engine_out and stage == 0, stage == 0, time, is_last, wide, dt):
+        if _is_stage_complete(
+            estimated, b, own, circling, climb, engine_out and stage == 0, stage == 0, time, is_last, wide, dt
+        ):
             if is_last:
                 out.ended = CIRCLED
                 break
             stage += 1
-            _fly_to(stages, stage, waypoints, estimated, own)
+            _load_stage(stages, stage, waypoints, estimated, own)
         state.pitch, unpowered = pitch, engine_out and stage > 0
         if climb.climbs and stage == 0:
-            _climb(state, estimated, staged, own, climb, b.airspeed, factor, dt)
+            _demand_climb(state, estimated, staged, own, climb, b.airspeed, factor, dt)
         else:
-            _demand(state, estimated, waypoints, parameters, own, aircraft, excess, factor, unpowered, dt)
+            _update_demands(state, estimated, waypoints, parameters, own, aircraft, excess, factor, unpowered, dt)
         banked = roll_demand(own.side_acceleration, state.pitch, state.airspeed / factor, parameters)
         state.roll += roll_share * (banked - state.roll)
         pitch += pitch_share * (own.pitch_demand + parameters.pitch_trim - pitch)
@@ -334,53 +347,56 @@ def fly_stages(
         used += dt * move_on(estimated, state, angle, throttle, aircraft, excess, power, dt)
     if out.clearance <= 0.0:
         out.ended = HIT
-    # Compiled code frees an array after its last use, and a record of it does not count as one.
+    # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     held = motions.size + states.size + memories.size + turns.size + spaced.size == 10
     out.energy = used / 3600.0 if aircraft.has_power and held else math.nan
 
 
 @inner
-def _keep(here: Record, way: Floats, out: Record) -> None:  # pragma: no cover - compiled
-    """Keep a place of the way while there is room."""
+def _store_position(here: Record, way: Floats, out: Record) -> None:  # pragma: no cover - compiled
+    """Store a position while there is room."""
     if out.rows < way.shape[0]:
         way[out.rows, 0], way[out.rows, 1], way[out.rows, 2] = here.east, here.north, here.up
         out.rows += 1
 
 
 @inner
-def _arrive(here: Record, time: float, engine_out: bool, out: Record) -> None:  # pragma: no cover - compiled
-    """Note when it is first at its circle, and how high."""
+def _record_arrival(here: Record, time: float, engine_out: bool, out: Record) -> None:  # pragma: no cover - compiled
+    """Record time and altitude of the first arrival at the loiter."""
     if math.isnan(out.to_circle):
         out.to_circle, out.circle_up = time, here.up
         if engine_out:
-            # What it does there is to come down in circles.
+            # Without an engine it comes down in circles there.
             out.ended = CIRCLED
 
 
 @inner
-def _goes_on(
+def _is_stage_complete(
     here: Record, b: Record, own: Record, circling: Record, climb: Record, waits: bool, is_first: bool, time: float,
     is_last: bool, wide: float, dt: float,
 ) -> bool:  # pragma: no cover - compiled  # fmt: skip
-    """Whether the next stage begins.  waits: whether it flies straight on, until the engine is seen to stand."""
+    """Return True if the next stage begins.
+
+    waits: True while the aircraft flies straight on, until the engine failure is noticed.
+    """
     if waits:
         late: bool = time >= REACTION
         return late
     if climb.climbs and is_first:
-        # It is found to be so high no sooner than it climbs.
+        # The climb ends no earlier than it has begun.
         high: bool = time > 0.0 and here.up > climb.top
         return high
-    through: bool = _is_through(here, b, own, circling, is_last, wide, dt)
+    through: bool = _is_target_reached(here, b, own, circling, is_last, wide, dt)
     return through
 
 
 @inner
-def _climb(
+def _demand_climb(
     state: Record, motion: Record, staged: Record, own: Record, climb: Record, wanted: float, factor: float, dt: float
 ) -> None:  # pragma: no cover - compiled
     """Demand a climb straight ahead: wings level, the pitch of its parameters, and the throttle opened.
 
-    wanted: airspeed, equivalent, m/s.
+    wanted: equivalent airspeed, m/s.
     """
     own.side_acceleration = 0.0
     own.height_asked, own.height_limited, own.height_demand = motion.up, motion.up, motion.up
@@ -389,18 +405,20 @@ def _climb(
     own.airspeed_demand = wanted * factor
     update_tecs(state, motion, staged, own, wanted * factor, factor, dt)
     wind_up_throttle(staged, own)
-    # The pitch's integrals start from its least here (`AP_TECS::_update_pitch`): what it is raised by is not in them.
+    # The pitch integrators stay: `AP_TECS::_update_pitch` starts them from the minimum pitch here, so what the minimum
+    # adds does not enter them.
     own.balance_sum, own.speed_sum = balance, speed
     own.throttle_demand = max(before, min(climb.throttle, before + climb.slew * dt))
 
 
 @inner
-def _is_through(
+def _is_target_reached(
     here: Record, b: Record, own: Record, circling: Record, is_last: bool, wide: float, dt: float
 ) -> bool:  # pragma: no cover - compiled
-    """Whether a stage of a return is over: its waypoint is reached, its last circle flown, or left for what follows.
+    """Return True if a stage is over: waypoint reached, last loiter flown, or loiter left for the landing.
 
-    b: its waypoint.  wide: m from its middle within which it is at its circle.  dt: s since it was asked last.
+    b: its waypoint.  wide: distance from the center, m, within which the aircraft has arrived at the loiter.
+    dt: s since the last call.
     """
     if b.circle == 0.0:
         reached: bool = own.leg > 0
@@ -421,8 +439,8 @@ def _is_through(
 
 
 @inner
-def _begin(start: Record, estimated: Record, known: bool, out: Record) -> None:  # pragma: no cover
-    """Fill in where it begins, and what is told before anything was flown."""
+def _initialise_outcome(start: Record, estimated: Record, known: bool, out: Record) -> None:  # pragma: no cover
+    """Fill in the start, and the outcome before anything was flown."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
@@ -433,10 +451,10 @@ def _begin(start: Record, estimated: Record, known: bool, out: Record) -> None: 
 
 
 @inner
-def _fly_to(
+def _load_stage(
     stages: Records, at: int, waypoints: Records, estimated: Record, own: Record
 ) -> None:  # pragma: no cover - compiled
-    """Make a stage the next two waypoints, on a leg from here; from the waypoint before where that was reached."""
+    """Set both waypoints to a stage, on a leg from here, or from the last waypoint if that was reached."""
     stage, reached = stages[at], own.leg > 0
     for k in range(1, 3):
         b = waypoints[k]
@@ -454,12 +472,12 @@ def _fly_to(
 
 
 @inner
-def _take_over(
+def _initialise_law(
     start: Record, parameters: Record, aircraft: Record, excess: Floats, state: Record, own: Record
 ) -> None:  # pragma: no cover - compiled
-    """Fill the state from what flies over the ground, and the law's memory as after a long steady flight of it.
+    """Fill the state from the motion over the ground, and the law's memory as after a long steady flight.
 
-    As `flight.autopilots.arduplane.law.begin_law` takes over, but on a slope: the height asked for is ahead by its lag.
+    Follows `flight.autopilots.arduplane.law.begin_law`, but on a slope: the altitude setpoint leads by its lag.
     """
     wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
     air_east = start.velocity_east - wind * aircraft.wind_east
@@ -485,47 +503,47 @@ def _take_over(
 
 
 @inner
-def _demand(
+def _update_demands(
     state: Record, estimated: Record, waypoints: Records, parameters: Record, own: Record, aircraft: Record,
     excess: Floats, factor: float, unpowered: bool, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Demand what the law asks for on the way to the second waypoint: side acceleration, height, throttle and pitch."""
+    """Update the demands of bank, altitude, throttle and pitch on the leg to the second waypoint."""
     b = waypoints[1]
     navigate_legs(estimated, waypoints[: 2 if b.circle != 0.0 else 3], parameters, own, factor, dt)
     if own.on_circle and not b.returns:
-        # On a loiter the height of its item is flown at once (`Plane::update_loiter`).
+        # On a loiter of the mission its altitude applies at once (`Plane::update_loiter`).
         own.from_up = b.up
     demand_height(estimated, b, parameters, own, dt)
     wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, b.airspeed))
-    _weigh_energies(state, estimated, parameters, own, aircraft, excess, wanted, factor, unpowered, dt)
+    _demand_throttle_and_pitch(state, estimated, parameters, own, aircraft, excess, wanted, factor, unpowered, dt)
 
 
 @inner
-def _weigh_energies(
+def _demand_throttle_and_pitch(
     state: Record, motion: Record, parameters: Record, own: Record, aircraft: Record, excess: Floats, wanted: float,
     factor: float, unpowered: bool, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Demand throttle and pitch by TECS, but in a turn without thrust the pitch that brings it to an airspeed.
+    """Demand throttle and pitch by TECS, or in a turn without thrust the pitch for an airspeed.
 
-    wanted: airspeed, equivalent, m/s.  In a bank it grows as the root of the load, at the same angle of attack.
+    wanted: equivalent airspeed, m/s.  In a bank it grows as the root of the load factor, at the same angle of attack.
     Of eight flights of ArduPlane six turned back so, and lost 55 m in their turn; the other two, which had been sinking
-    before, held their height and slowed down, which costs half of that.  What is worse stands for both.
+    before, held their altitude and slowed down, which costs half of that.  The worse case stands for both.
     """
     balance, speed = own.balance_sum, own.speed_sum
     update_tecs(state, motion, parameters, own, wanted * factor, factor, dt)
-    if not unpowered or abs(state.roll) < _TURNS:
+    if not unpowered or abs(state.roll) < _TURN_BANK_RAD:
         return
     own.balance_sum, own.speed_sum = balance, speed
     tilt = math.tan(state.roll)
     drag = aircraft.induced / state.airspeed * tilt * tilt
     sink = drag - excess_power(excess, 0.0, state.airspeed, motion.up, aircraft)
-    faster = (wanted * factor / math.sqrt(math.cos(state.roll)) - state.airspeed) / _SPEED_LAG
+    faster = (wanted * factor / math.sqrt(math.cos(state.roll)) - state.airspeed) / _TURN_AIRSPEED_LAG_S
     path = -math.asin(min(0.5, max(-0.5, sink / state.airspeed + faster / GRAVITY)))
     own.pitch_demand = path + angle_of_attack(state, aircraft) - parameters.pitch_trim
 
 
 @inner
-def _look(
+def _update_clearances(
     here: Record,
     time: float,
     heights: Heights,
@@ -535,7 +553,7 @@ def _look(
     known: bool,
     out: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Note how high above ground a place is and how far outside each sphere; whether the return ends there."""
+    """Update the clearances above ground and outside each sphere, and end the RTL where they demand it."""
     for m in range(spheres.shape[0]):
         radius = radii[m]
         if radius <= 0.0:

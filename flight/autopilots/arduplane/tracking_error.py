@@ -1,8 +1,8 @@
-"""How far ArduPlane strays from the legs of a plan with its parameters: corners flown by its own law on the plane.
+"""Deviation of ArduPlane from the legs of a plan: corners flown in the plane by its own guidance.
 
 Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.arduplane.law` and the lag of its
-bank, and the acceptance radius with which it strays least is looked for.  In wind, the still air's excursion at the
-highest ground speed on the way is the measure; `WIND_SPREAD` is how much more the wind made of it.
+bank, to find the acceptance radius with the least deviation.  For wind, the excursion in still air at the highest
+ground speed on the leg is taken, increased by `WIND_SPREAD`.
 """
 
 import math
@@ -29,29 +29,39 @@ from world.wind import Turbulence
 
 Floats = NDArray[np.float64]
 
-# A corner counts as left where the aircraft stays this near to the next leg (m) for so long (s).
-_SETTLED, _STAYS = 2.0, 8.0
-# From a corner the legs reach this far, m; flights end there at the latest, and begin so far before they may turn.
-_LEG, _BEFORE = 4000.0, 200.0
-# Acceptances that are tried: so many, and again about the best.
-_TRIED, _ROUNDS = 9, 2
-# Least acceptance, m: that of a straight leg, which navigation and gusts leave it far inside.
+# A corner is over where the aircraft stays this close to the next leg, m ...
+_SETTLED_CROSS_TRACK_M = 2.0
+# ... for this time, s.
+_SETTLED_TIME_S = 8.0
+# Length of the legs on both sides of a corner, m; the flights end there at the latest.
+_LEG_LENGTH_M = 4000.0
+# Distance before the earliest turn at which the flights begin, m.
+_RUN_IN_M = 200.0
+# Number of acceptance radii that are tried in one round.
+_ACCEPTANCES_PER_ROUND = 9
+# Number of rounds, each after the first around the best radius of the one before.
+_SEARCH_ROUNDS = 2
+# Minimum acceptance radius, m: the one of a straight leg, which navigation errors and gusts do not use up.
 MIN_ACCEPTANCE = 15.0
-# What wind made of still air's excursion at the highest ground speed: of 200 corners of 15 to 90 degrees at 25 m/s, in
-# 5 and 10 m/s from anywhere, at most 1.17 up to 45 degrees, 1.22 at 60 and 1.54 at 90.
+# Margin for wind, as a factor on the excursion in still air at the highest ground speed, and what is added to it at a
+# right angle.  Of 200 corners of 15 to 90 degrees at 25 m/s, in 5 and 10 m/s from any direction, wind made at most 1.17
+# of it up to 45 degrees, 1.22 at 60 and 1.54 at 90.
 WIND_SPREAD = 1.1, 0.5
-# Of navigation's standard deviation, what is left room for.
-_SIGMAS = 3.0
-# How far ArduPlane was beside straight legs in light turbulence, m, and from its lagged height, navigation left out.
-_ACROSS, _UP = 2.0, 3.0
-# Of TECS_CLMB_MAX and TECS_SINK_MAX, the share that a plan asks for, by turbulence.  Where a climb takes all the
-# throttle there is, the height demand waits, and its rate is brought down: 200 m of climb at more than this left the
-# Aerosonde 8 to 60 m below its lagged height, at this hardly further than the same gusts do at 2 m/s (four streams).
-_CLIMB_SHARE = {"none": 0.9, "light": 0.65, "moderate": 0.45}
-_SINK_SHARE = {"none": 0.9, "light": 0.81, "moderate": 0.72}
-# Of what the aircraft itself can climb, where thin air leaves it less than that: at 0.9 of it in light turbulence a
-# downdraft of 40 s took an Aerosonde at 2,900 m 2 m below its clearance; at 0.8 seven streams left 13 m and more.
-_OWN_CLIMB_SHARE = {"none": 1.0, "light": 0.8, "moderate": 0.7}
+# Number of standard deviations of navigation for which room is left.
+_NAVIGATION_SIGMAS = 3.0
+# ArduPlane's deviation across straight legs in light turbulence, without navigation, m.
+_CROSS_TRACK_M = 2.0
+# ArduPlane's deviation from its lagged altitude in light turbulence, without navigation, m.
+_ALTITUDE_ERROR_M = 3.0
+# Fraction of TECS_CLMB_MAX that a plan uses, by turbulence.  Where a climb takes full throttle, the altitude demand is
+# frozen and its rate fades out: 200 m of climb at more than this left the Aerosonde 8 to 60 m below its lagged
+# altitude; at this the error hardly exceeds the one that the same gusts cause at 2 m/s (four streams).
+_CLIMB_FRACTIONS = {"none": 0.9, "light": 0.65, "moderate": 0.45}
+# The same fraction of TECS_SINK_MAX.
+_SINK_FRACTIONS = {"none": 0.9, "light": 0.81, "moderate": 0.72}
+# Fraction of the aircraft's own climb rate, where thin air reduces that below TECS_CLMB_MAX: at 0.9 in light turbulence
+# a downdraft of 40 s took an Aerosonde at 2,900 m 2 m below its clearance; at 0.8 seven streams left 13 m and more.
+_OWN_CLIMB_FRACTIONS = {"none": 1.0, "light": 0.8, "moderate": 0.7}
 
 
 def tracking_error(
@@ -62,9 +72,9 @@ def tracking_error(
     fly_over: bool = False,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """What a plan leaves free for ArduPlane with these parameters, at an equivalent airspeed (m/s).
+    """Return the room that a plan leaves for ArduPlane's deviations at an equivalent airspeed (m/s).
 
-    nav: how well it knows where it is.  fly_over: whether it flies on to each waypoint before it turns.
+    nav: accuracy of navigation.  fly_over: True if it flies on to each waypoint before it turns.
     turbulence: of the wind; gusts leave less of the throttle for a climb.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -74,24 +84,24 @@ def tracking_error(
     (3.0, 15.0, True)
     """
     acceptance, excursion, before, after = _corners(parameters, airspeed, fly_over)
-    known = _SIGMAS * ERRORS[nav][0]
+    navigation_error = _NAVIGATION_SIGMAS * ERRORS[nav][0]
     return TrackingError(
         airspeed=airspeed,
         acceptance=acceptance,
         excursion=excursion,
         before=before,
         after=after,
-        across=math.hypot(_ACROSS, known),
-        up=math.hypot(_UP, known),
+        across=math.hypot(_CROSS_TRACK_M, navigation_error),
+        up=math.hypot(_ALTITUDE_ERROR_M, navigation_error),
         lag=parameters.tecs_height_demand_time,
         step=parameters.glide_slope_min,
-        climb_rate=_CLIMB_SHARE[turbulence] * parameters.tecs_climb_max,
-        sink_rate=_SINK_SHARE[turbulence] * parameters.tecs_sink_max,
-        own_climb_share=_OWN_CLIMB_SHARE[turbulence],
+        climb_rate=_CLIMB_FRACTIONS[turbulence] * parameters.tecs_climb_max,
+        sink_rate=_SINK_FRACTIONS[turbulence] * parameters.tecs_sink_max,
+        own_climb_share=_OWN_CLIMB_FRACTIONS[turbulence],
     )
 
 
-# How a corner is tracked, m: by which acceptance, how far from its legs, along how much of each.
+# Tracking of a corner, m: acceptance radius, greatest distance from the legs, affected length of each leg.
 CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 
@@ -100,10 +110,10 @@ def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -
     """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
-    _fill(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
+    _fill_corners(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
     share, more = WIND_SPREAD
     corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
-    # Plans are the same on every machine, and a library's sines are not.
+    # Rounded because plans must be the same on every machine, and sines differ between libraries.
     acceptance, excursion, before, after = (corners[name].round(2) for name in field_names(CORNER_TRACKING))
     for table in (acceptance, excursion, before, after):
         table.setflags(write=False)
@@ -111,7 +121,7 @@ def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -
 
 
 @compiled
-def _fill(
+def _fill_corners(
     parameters: Record,
     airspeed: float,
     turns: Floats,
@@ -129,9 +139,9 @@ def _fill(
                 continue
             low, high = MIN_ACCEPTANCE, MAX_ACCEPTANCE
             best, nearest = low, math.inf
-            for _ in range(1 if fly_over else _ROUNDS):
-                step = (high - low) / (_TRIED - 1)
-                for k in range(1 if fly_over else _TRIED):
+            for _ in range(1 if fly_over else _SEARCH_ROUNDS):
+                step = (high - low) / (_ACCEPTANCES_PER_ROUND - 1)
+                for k in range(1 if fly_over else _ACCEPTANCES_PER_ROUND):
                     acceptance = math.floor(low + k * step)
                     flown = _fly_corner(parameters, airspeed, turns[i], speeds[j], acceptance, fly_over, waypoints)
                     if flown[0] < nearest:
@@ -152,44 +162,44 @@ def _fly_corner(
     fly_over: bool,
     waypoints: Records,
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Furthest from the two legs, and how far along the second one until it stays near to it, m.
+    """Return the greatest distance from the two legs, and the length of the second until it is settled, m.
 
     The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, own = motions[0], memories[0]
     east, north = math.sin(turn), math.cos(turn)
-    waypoints[0].north = -_LEG
+    waypoints[0].north = -_LEG_LENGTH_M
     waypoints[1].turn, waypoints[1].acceptance, waypoints[1].fly_over = turn, acceptance, fly_over
-    waypoints[2].east, waypoints[2].north = _LEG * east, _LEG * north
-    own.from_north = -_LEG
-    # Between two of its looks the waypoint comes within the acceptance: in the middle, which is what they come to.
+    waypoints[2].east, waypoints[2].north = _LEG_LENGTH_M * east, _LEG_LENGTH_M * north
+    own.from_north = -_LEG_LENGTH_M
+    # The waypoint comes within the acceptance radius in the middle between two updates, which is the average case.
     tick = speed * NAVIGATION_TICK
-    estimated.north = -acceptance - (math.floor(_BEFORE / tick) + 0.5) * tick
+    estimated.north = -acceptance - (math.floor(_RUN_IN_M / tick) + 0.5) * tick
     lag = ROLL_LAG * parameters.roll_time
-    left = math.exp(-NAVIGATION_TICK / lag)
-    course, side, clock, furthest, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while along < 0.75 * _LEG and clock < 120.0:
+    decay = math.exp(-NAVIGATION_TICK / lag)
+    course, lateral_acceleration, clock, excursion, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while along < 0.75 * _LEG_LENGTH_M and clock < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
         navigate_legs(estimated, waypoints, parameters, own, 1.0, NAVIGATION_TICK)
         wanted = GRAVITY * math.tan(roll_demand(own.side_acceleration, 0.0, airspeed, parameters))
-        # The lag to the letter, and the way on the mean course.
-        turned = (wanted * NAVIGATION_TICK + (side - wanted) * lag * (1.0 - left)) / speed
-        side = wanted + (side - wanted) * left
+        # The exact solution of the lag, and the displacement on the mean course.
+        turned = (wanted * NAVIGATION_TICK + (lateral_acceleration - wanted) * lag * (1.0 - decay)) / speed
+        lateral_acceleration = wanted + (lateral_acceleration - wanted) * decay
         estimated.east += tick * math.sin(course + 0.5 * turned)
         estimated.north += tick * math.cos(course + 0.5 * turned)
         course += turned
         clock += NAVIGATION_TICK
         along = estimated.east * east + estimated.north * north
-        away = math.hypot(estimated.east, estimated.north)
-        first = abs(estimated.east) if estimated.north < 0.0 else away
-        second = abs(estimated.east * north - estimated.north * east) if along > 0.0 else away
-        furthest = max(furthest, min(first, second))
-        if own.leg == 1 and second > _SETTLED:
+        corner_distance = math.hypot(estimated.east, estimated.north)
+        first = abs(estimated.east) if estimated.north < 0.0 else corner_distance
+        second = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
+        excursion = max(excursion, min(first, second))
+        if own.leg == 1 and second > _SETTLED_CROSS_TRACK_M:
             settled = max(0.0, along)
-        if own.leg == 1 and along > settled + _STAYS * speed:
+        if own.leg == 1 and along > settled + _SETTLED_TIME_S * speed:
             break
-    # Compiled code frees an array after its last use, and a record of it does not count as one.
+    # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     if motions.size + memories.size != 2:
         return math.nan, math.nan
-    return furthest, settled
+    return excursion, settled

@@ -1,4 +1,4 @@
-"""ArduPlane itself as an autopilot: its program, built for software in the loop, in lockstep with our physics."""
+"""ArduPlane itself as an autopilot: its SITL program, in lockstep with planfly's physics."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,7 @@ from flight.simulation.setup import FlightSetup
 
 @dataclass(frozen=True)
 class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
-    """ArduPlane itself.  Its law answers what is asked before the flight."""
+    """ArduPlane itself.  Before the flight its law answers for it."""
 
     flies_ground: ClassVar[bool] = True
     flies_both_ends: ClassVar[bool] = True
@@ -22,22 +22,22 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """With the parameters and the program that a log stores."""
+        """Return the autopilot with the parameters and the program that a log stores."""
         return cls(ArduPlane.restore(stored).parameters, stored.program)
 
     @classmethod
     def recognises(cls, program: Path) -> bool:
-        """Any program: which release it is, it says itself when it has started."""
+        """Return True for any program: it reports its release after its start."""
         return True
 
     @classmethod
     def flying(cls, law: ArduPlane, binary: Path) -> Self:
-        """The program in the place of its law."""
+        """Return the program's autopilot in place of its law."""
         return cls(law.parameters, binary=binary)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """The servo map, if it is missing."""
+        """Return the servo map, if it is missing."""
         if (aircraft.folder / SERVO_FILE).exists():
             load_servo_map(aircraft)
             return []
@@ -49,8 +49,11 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
         return ArduPlane(self.parameters)
 
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
-        """Start the program.  Raises FlightError for one that does not start, and ParameterError for a bad file."""
-        # Imported here: nobody else needs MAVLink.
+        """Start the program.
+
+        Raise FlightError if it does not start, and ParameterError for a bad file.
+        """
+        # Imported here: only this needs MAVLink.
         from flight.autopilots.arduplane_sitl.flight import AutopilotFlight
 
         return AutopilotFlight(setup, aircraft, self)

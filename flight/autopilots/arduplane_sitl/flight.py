@@ -1,4 +1,4 @@
-"""A flight that ArduPlane itself steers, as a program of its own in lockstep with our physics."""
+"""Flight of ArduPlane itself, as a program in lockstep with planfly's physics."""
 
 import contextlib
 import math
@@ -29,15 +29,15 @@ from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Progress, SimulatedFlight, Sink, fly_to_end
 
-# After its throttle a motor is given so much longer, s.
-_SPOOL = 0.5
+# Time for the motor to follow its throttle, s.
+_SPOOL_TIME_S = 0.5
 
 
 class AutopilotFlight(SitlFlight):
     """One flight of ArduPlane itself; see `SitlFlight`.
 
     autopilot: flies the setup in place of its own autopilot; has ArduPlane's parameters and the program's file.
-    own: a person's parameters, by ArduPlane's names; None takes those of the scenario's file.
+    own: the user's parameters, by ArduPlane's names; None takes the parameters of the scenario's file.
     """
 
     def __init__(
@@ -55,49 +55,49 @@ class AutopilotFlight(SitlFlight):
         servos = load_servo_map(aircraft)
         given = autopilot_parameters(setup, aircraft, servos, person_parameters(setup) if own is None else own)
         super().__init__(setup, aircraft, binary)
-        with contextlib.ExitStack() as stack, self._named():
+        with contextlib.ExitStack() as stack, self._name_program():
             port = stack.enter_context(contextlib.closing(PhysicsPort()))
             self._link = stack.enter_context(contextlib.closing(TcpLink()))
             heading = math.degrees(self._rail.yaw) % 360.0
             launch = arduplane_launch(self._mission.home, heading, given.given, port.port, self._link.port)
             self._process = stack.enter_context(AutopilotProcess(binary, launch))
             port.watch = self._process.watch
-            self._lockstep = JsonLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._look)
+            self._lockstep = JsonLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._apply_gnss_error()
-            self._converse(self._preflight.meet(given.given))
+            self._hold_during(self._preflight.meet(given.given))
             program = _program(self._link, digest, given)
             self.setup = replace(setup, autopilot=replace(autopilot, program=program))
             self._stack = stack.pop_all()
 
     @property
     def last_item(self) -> int:
-        """Items count from 1: 0 is home."""
+        """Number of the last item; items are numbered from 1, and 0 is home."""
         return self._mission.last or len(self._mission.items)
 
     @property
     def _ground_tick(self) -> Tick:
         return program_ground_tick
 
-    def _get_ready(self) -> None:
-        self._converse(self._preflight.prepare(self._mission))
-        self._converse(self._run_up())
+    def _prepare_program(self) -> None:
+        self._hold_during(self._preflight.prepare(self._mission))
+        self._hold_during(self._run_up())
         self._push()
 
     def _run_up(self) -> Talk:
-        """Wait until the motor has all that it will have, where it runs before the launch: nobody throws before."""
+        """Wait for full thrust before the launch, if the motor runs before it."""
         take_off = self._ways.take_off
         law = None if take_off is None else self._from_ground
         if take_off is None or take_off.launch.method == "runway" or not isinstance(law, ArduPlaneFromGround):
             return
         seconds = run_up(law.motor_start, law.parameters)
-        until = self._lockstep.time + (seconds + _SPOOL if seconds else 0.0)
+        until = self._lockstep.time + (seconds + _SPOOL_TIME_S if seconds else 0.0)
         while self._lockstep.time < until:
             yield
 
 
 def _program(link: AutopilotLink, digest: str, given: AutopilotParameters) -> AutopilotProgram:
-    """Which program it is, by what it has told."""
+    """Return the program that flew, from its messages."""
     news = link.news
     unknown = given.changed.keys() - news.parameters.keys()
     return AutopilotProgram(
@@ -119,11 +119,12 @@ def fly_autopilot(
     progress: Progress | None = None,
     log: Path | None = None,
 ) -> tuple[SimulatedFlight, FlightSetup]:
-    """Fly a setup with ArduPlane SITL, from its boot to its end; arguments as of `AutopilotFlight` and `simulate`.
+    """Fly a setup with ArduPlane SITL, from its boot to its end.
 
-    log: where the autopilot's own log (.BIN) is kept.
+    The arguments are as in `AutopilotFlight` and `simulate`.
+    log: file for the autopilot's own log (.BIN).
 
-    Returns the flight, and the setup with the program that flew it.
+    Return the flight, and the setup with the program that flew it.
     """
     with AutopilotFlight(setup, aircraft, autopilot, own) as flight:
         flight.prepare()

@@ -1,7 +1,7 @@
-"""One tick of a flight from the ground to the ground that ArduPlane itself steers: its phases, and how it ends.
+"""One tick of an ArduPlane SITL flight from the ground to the ground: its phases, and its end.
 
-The phases are those of `flight.autopilots.arduplane.ground_law`, and so is how a flight ends in each.  What the program
-does of them it says only of its mission's items: the rest is found by places and heights.
+The phases, and the ends of a flight in each, are the ones of `flight.autopilots.arduplane.ground_law`.  The program
+reports only the mission's items: the rest is found from positions and altitudes.
 """
 
 import math
@@ -33,18 +33,20 @@ from world.terrain import Heights
 
 Floats = NDArray[np.float64]
 
-# An aircraft on a runway has lifted off so high over where it stood, m.
-_LIFTED = 2.0
-# It may be slow in its flare, which begins no higher over the landing point than this many of the glide's flare
-# heights, or than this, m.
-_FLARES, _LOW = 2.0, 6.0
+# Height above its standing position at which an aircraft on a runway has lifted off, m.
+_LIFT_OFF_HEIGHT_M = 2.0
+# The aircraft may be slow in its flare.  The flare begins no higher over the landing point than this multiple of the
+# glide's flare height ...
+_MAX_FLARE_HEIGHT_RATIO = 2.0
+# ... or than this, m.
+_MIN_FLARE_HEIGHT_M = 6.0
 
 
 @compiled
 def program_ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
-    """Do a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
+    """Run a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
-    The commands that stand in it are the program's.
+    The commands in the block are the program's.
     """
     path_begins = WORKSPACE_NUMBERS + GROUND_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
@@ -65,13 +67,16 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:  # pragma: no c
 
 @inner
 def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:  # pragma: no cover - compiled
-    """Go on to the next phase when its time has come.
+    """Change to the next phase when it is time.
 
-    true: of `flight.guidance.navigation_error.MOTION`.  ground: of
-    `flight.autopilots.arduplane.ground_law.GROUND_STATE`.  on_last_leg: whether the program flies to its landing.
+    true: of `flight.guidance.navigation_error.MOTION`.
+    ground: of `flight.autopilots.arduplane.ground_law.GROUND_STATE`.
+    on_last_leg: True if the program flies to its landing.
     """
     if ground.stage == TAKING_OFF:
-        ground.lifted = ground.lifted or (ground.rolls and true.up > ground.low + _LIFTED and not ground.touches)
+        ground.lifted = ground.lifted or (
+            ground.rolls and true.up > ground.low + _LIFT_OFF_HEIGHT_M and not ground.touches
+        )
         if true.up > ground.top:
             ground.stage = IN_AIR
     elif ground.stage == IN_AIR:
@@ -80,5 +85,5 @@ def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:  # prag
     elif ground.stage < FLARING:
         off_e, off_n = true.east - ground.east, true.north - ground.north
         past = off_e * true.velocity_east + off_n * true.velocity_north > 0.0 and math.hypot(off_e, off_n) < 500.0
-        if past or true.up - ground.up <= max(_LOW, _FLARES * ground.flare_height):
+        if past or true.up - ground.up <= max(_MIN_FLARE_HEIGHT_M, _MAX_FLARE_HEIGHT_RATIO * ground.flare_height):
             ground.stage = FLARING

@@ -15,42 +15,44 @@ from world.errors import FlightError
 from world.running_clock import RunningClock
 
 # ----------------------------------------------------------------------
-# ArduPilot's JSON physics interface: the packets that pass between an autopilot and the physics it flies in.
+# ArduPilot's JSON physics interface: the packets between an autopilot and its physics.
 #
 # The autopilot sends the state of its servo outputs as a binary datagram, and waits for one JSON object about the
 # aircraft a step later; so both keep step.  Published by ArduPilot as "JSON interface" for software in the loop
 # (https://github.com/ArduPilot/ardupilot/tree/master/libraries/SITL/examples/JSON).
 
-# The first number of a packet, by how many outputs it carries.
+# Number of outputs by the first number of a packet.
 MAGIC = {18458: 16, 29569: 32}
-_HEAD = struct.Struct("<HHI")
-_OUTPUTS = {magic: struct.Struct(f"<HHI{count}H") for magic, count in MAGIC.items()}
+_HEADER_FORMAT = struct.Struct("<HHI")
+_PACKET_FORMATS = {magic: struct.Struct(f"<HHI{count}H") for magic, count in MAGIC.items()}
 
-# The parser looks for each key as it stands here: no blanks.
-_ANSWER = (
+# The parser looks for each key exactly as it stands here: no blanks.
+_MOTION_FORMAT = (
     b'\n{"timestamp":%.6f,"imu":{"gyro":[%.7f,%.7f,%.7f],"accel_body":[%.6f,%.6f,%.6f]},'
     b'"position":[%.4f,%.4f,%.4f],"attitude":[%.7f,%.7f,%.7f],"velocity":[%.5f,%.5f,%.5f],"airspeed":%.5f'
 )
-_BATTERY = b',"battery":{"voltage":%.3f,"current":%.4f}'
-_END = b"}\n"
+_BATTERY_FORMAT = b',"battery":{"voltage":%.3f,"current":%.4f}'
+_CLOSING_BYTES = b"}\n"
 
 
 class ServoPacket(NamedTuple):
-    """What the autopilot asks for: the number of its frame, and the pulse of each output, microseconds."""
+    """Outputs of the autopilot: the number of its frame, and the pulse of each output, microseconds."""
 
     frame: int
     pulses: tuple[int, ...]
 
 
 def parse_servo_packet(data: bytes) -> ServoPacket:
-    """The servo outputs in a datagram.  Raises FlightError for one of another version of the interface.
+    """Return the servo outputs in a datagram.
+
+    Raise FlightError for a datagram of another version of the interface.
 
     >>> packet = parse_servo_packet(struct.pack("<HHI16H", 18458, 120, 7, *range(1500, 1516)))
     >>> packet.frame, packet.pulses[:2], len(packet.pulses)
     (7, (1500, 1501), 16)
     """
     magic = int.from_bytes(data[:2], "little")
-    form = _OUTPUTS.get(magic)
+    form = _PACKET_FORMATS.get(magic)
     if form is None or len(data) != form.size:
         allowed = " or ".join(f"{known} with {count} outputs" for known, count in MAGIC.items())
         raise FlightError(
@@ -63,34 +65,35 @@ def parse_servo_packet(data: bytes) -> ServoPacket:
 
 
 def encode_motion(motion: BodyMotion | tuple[float, ...], battery: tuple[float, float] | None = None) -> bytes:
-    r"""The datagram that tells the autopilot how the aircraft moves.
+    r"""Return the datagram with the motion of the aircraft.
 
-    battery: its volts and amperes; None for an aircraft without one.
+    battery: volts and amperes; None for an aircraft without a battery.
 
     >>> encode_motion(BodyMotion(0.5, *[0.0] * 5, -9.81, *[0.0] * 9, 25.0))[:44]
     b'\n{"timestamp":0.500000,"imu":{"gyro":[0.0000'
     """
-    return _ANSWER % motion + (b"" if battery is None else _BATTERY % battery) + _END
+    return _MOTION_FORMAT % motion + (b"" if battery is None else _BATTERY_FORMAT % battery) + _CLOSING_BYTES
 
 
 # ----------------------------------------------------------------------
 # The physics' end of the exchange with an autopilot: a datagram socket on this machine, a frame at a time.
 
-# How often (s) a wait looks whether the program still runs.
-_LOOK = 0.25
-_LARGEST = 1024
-# A question that comes sooner after the answer (s, by the clock) was asked before it: ArduPilot waits for a second.
-_ON_ITS_WAY = 0.1
+# Interval at which a wait checks whether the program still runs, s.
+_CHECK_INTERVAL_S = 0.25
+_MAX_DATAGRAM_BYTES = 1024
+# A request within this time after the answer was sent before the answer arrived, s by the clock: ArduPilot repeats a
+# request only after a second.
+_CROSSING_TIME_S = 0.1
 
 
 class PhysicsPort:
-    """The socket that an autopilot sends its servo outputs to.
+    """Socket to which an autopilot sends its servo outputs.
 
     port: its number.
-    watch: called while nothing comes; raises FlightError where the program has ended.
+    watch: called while nothing arrives; raises FlightError if the program has ended.
 
-    Nothing is answered unless it was asked for: who asks for a frame again, because it has waited in vain, is told
-    again, and the aircraft does not move for it.
+    It sends nothing without a request.  A repeated request for a frame, after the program has waited in vain, gets the
+    same answer again, and the aircraft does not move.
     """
 
     def __init__(self) -> None:
@@ -98,13 +101,13 @@ class PhysicsPort:
         self._socket.bind((LOOPBACK, 0))
         self.port = int(self._socket.getsockname()[1])
         # The kernel's own timeout: one system call a frame.
-        look = struct.pack("@ll", int(_LOOK), int(_LOOK % 1.0 * 1e6))
+        look = struct.pack("@ll", int(_CHECK_INTERVAL_S), int(_CHECK_INTERVAL_S % 1.0 * 1e6))
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, look)
         self.watch: Callable[[], None] = _nothing
         self._frame = -1
         self._last = b""
         self._answered = 0.0
-        # A sleeping laptop is no silence.
+        # A sleeping laptop is not a silent program.
         self._clock = RunningClock()
         self._connected = False
 
@@ -113,9 +116,9 @@ class PhysicsPort:
         self._socket.close()
 
     def receive(self) -> ServoPacket:
-        """The next frame.
+        """Return the next frame.
 
-        Raises FlightError for a program that ends, falls silent, begins anew, or speaks another version.
+        Raise FlightError for a program that ends, falls silent, restarts, or uses another version of the interface.
         """
         waiting_since = 0.0
         while True:
@@ -128,8 +131,8 @@ class PhysicsPort:
                 if packet.frame < self._frame:
                     message = f"began anew in the air: frame {packet.frame} after frame {self._frame}"
                     raise FlightError(message, field="frame", value=packet.frame)
-                # What was asked while the answer was on its way has had it.
-                if self._clock() - self._answered > _ON_ITS_WAY:
+                # A request that was sent while the answer was on its way has its answer.
+                if self._clock() - self._answered > _CROSSING_TIME_S:
                     self._send(self._last)
             now = self._clock()
             waiting_since = waiting_since or now
@@ -144,17 +147,17 @@ class PhysicsPort:
                 raise FlightError(f"silent for {SILENCE:.0f} s; ended", field="frame", value=self._frame)
 
     def answer(self, data: bytes) -> None:
-        """Tell the autopilot of the aircraft after the frame received last."""
+        """Send the autopilot the motion of the aircraft after the last received frame."""
         self._last = data
         self._answered = self._clock()
         self._send(data)
 
     def _next_datagram(self) -> bytes:
-        """A datagram, or nothing after `_LOOK` seconds."""
+        """Return a datagram, or nothing after `_CHECK_INTERVAL_S` seconds."""
         try:
             if self._connected:
-                return self._socket.recv(_LARGEST)
-            data, sender = self._socket.recvfrom(_LARGEST)
+                return self._socket.recv(_MAX_DATAGRAM_BYTES)
+            data, sender = self._socket.recvfrom(_MAX_DATAGRAM_BYTES)
         except (BlockingIOError, ConnectionRefusedError):
             return b""
         self._socket.connect(sender)
@@ -167,18 +170,18 @@ class PhysicsPort:
         try:
             self._socket.send(data)
         except ConnectionRefusedError:
-            # Nobody is there any more: the next wait finds out why.
+            # The program is gone: the next wait finds out why.
             return
 
 
 def _nothing() -> None:
-    """Watch nothing."""
+    """Do nothing: the default of `watch`."""
 
 
 class JsonLockstep(Lockstep):
-    """The exchange over that socket; a frame is asked for by the servo outputs and answered with the motion.
+    """Exchange over that socket: a frame is requested by servo outputs and answered with the motion.
 
-    servos: which output moves what.  The others as of `Lockstep`.
+    servos: outputs of the controls.  The others as in `Lockstep`.
     """
 
     def __init__(
@@ -193,8 +196,8 @@ class JsonLockstep(Lockstep):
         super().__init__(fdm, workspace, home, look)
         self._port, self._servos = port, servos
 
-    def _take(self) -> Commands:
+    def _receive_commands(self) -> Commands:
         return self._servos.commands(self._port.receive().pulses)
 
-    def _tell(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
+    def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
         self._port.answer(encode_motion(motion, battery))

@@ -1,4 +1,4 @@
-"""ArduPlane's program: how it is started for a flight, and the parameters that it gets."""
+"""Start of ArduPlane's program for a flight, and its parameters."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,24 +15,24 @@ from flight.autopilots.sitl.servos import ServoMap
 from flight.mission.items import Home
 from flight.simulation.setup import FlightSetup
 
-_DEFAULTS = "defaults.parm"
-# How fast the program may run against the clock: as fast as the physics answers.
+_DEFAULTS_FILE = "defaults.parm"
+# Limit of the program's speed-up against the clock: it runs as fast as the physics answers.
 _SPEEDUP = 1000
 
 
 def arduplane_launch(
     home: Home, heading: float, parameters: Mapping[str, float], physics_port: int, link_port: int
 ) -> Callable[[Path], Launch]:
-    """How ArduPlane's program is started in a folder.
+    """Return a function that prepares a folder for ArduPlane's program and returns its command line.
 
-    home: where it starts.  heading: degrees, that it starts with.
+    home: its start position.  heading: at the start, degrees.
     parameters: by name, its defaults for this flight.
-    physics_port, link_port: on this machine, where it finds the physics (UDP) and us (TCP).
+    physics_port, link_port: ports on this machine of the physics (UDP) and of planfly's MAVLink connection (TCP).
     """
 
     def prepare(folder: Path) -> Launch:
         text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
-        (folder / _DEFAULTS).write_text(text, encoding="ascii")
+        (folder / _DEFAULTS_FILE).write_text(text, encoding="ascii")
         place = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt:.3f},{heading:.2f}"
         free = free_ports(3)
         arguments = (
@@ -42,19 +42,19 @@ def arduplane_launch(
             *("--base-port", str(free[0]), "-I", "0"),
             *("--sim-port-out", str(physics_port), "--sim-port-in", str(free[1]), "--rc-in-port", str(free[2])),
             *("--serial0", f"tcpclient:{LOOPBACK}:{link_port}"),
-            *("--wipe", "--defaults", str(folder / _DEFAULTS)),
+            *("--wipe", "--defaults", str(folder / _DEFAULTS_FILE)),
         )
-        # By default the program stays after a panic, and turns in a loop.
+        # By default the program stays in a loop after a panic.
         return Launch(arguments, {"SITL_PANIC_EXIT": "1"})
 
     return prepare
 
 
-# What our physics and a start in the air need, whatever the aircraft.
+# Parameters for planfly's physics and a start in the air, for any aircraft.
 SIMULATION = {
-    # As often as JSBSim steps.
+    # Rate of JSBSim's steps.
     "SIM_RATE_HZ": 120.0,
-    # No radio, no terrain data, and no other serial ports: nothing of these fails.
+    # No radio, no terrain data, and no other serial ports, so that none of these can fail.
     "FLTMODE_CH": 0.0,
     "THR_FAILSAFE": 0.0,
     "FS_SHORT_ACTN": 3.0,
@@ -62,7 +62,7 @@ SIMULATION = {
     "TERRAIN_ENABLE": 0.0,
     "SERIAL1_PROTOCOL": -1.0,
     "SERIAL2_PROTOCOL": -1.0,
-    # The simulated airspeed sensor, as it is wired and set to zero.
+    # The simulated airspeed sensor, with its wiring and calibration.
     "ARSPD_TYPE": 2.0,
     "ARSPD_USE": 1.0,
     "ARSPD_PIN": 1.0,
@@ -71,16 +71,16 @@ SIMULATION = {
     # It is armed in the air.
     "ARMING_CHECK": 0.0,
     "LOG_FILE_DSRMROT": 0.0,
-    # It tells what it is asked for, and no more.
+    # It sends only the requested messages.
     **dict.fromkeys(
         [f"SR0_{name}" for name in ("RAW_SENS", "EXT_STAT", "RC_CHAN", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3")], 0.0
     ),
 }
-# The battery's volts and amperes are measured, so that its log has them (BAT); how empty it is ends no flight: the
+# Battery voltage and current are measured, so that its log has them (BAT); no battery failsafe ends a flight: the
 # verdict judges energy.
 _MEASURED = {"BATT_MONITOR": 4.0, "BATT_FS_LOW_ACT": 0.0, "BATT_FS_CRT_ACT": 0.0, "BATT_LOW_VOLT": 0.0}
 _UNMEASURED = {"BATT_MONITOR": 0.0}
-# A person's parameters that say how an aircraft flies begin so; others belong to the hardware that they were read from.
+# Prefixes of the user's parameters for flight; others belong to the hardware of the file.
 FLYING = (
     *("NAVL1_", "WP_", "TECS_", "AIRSPEED_", "ROLL_LIMIT_DEG", "PTCH_", "RLL_", "YAW_", "YAW2SRV_", "KFF_", "THR_"),
     *("TRIM_THROTTLE", "SCALING_SPEED", "STALL_PREVENTION", "GLIDE_SLOPE_", "RTL_", "STAB_PITCH_DOWN", "LEVEL_ROLL_"),
@@ -93,9 +93,9 @@ FLYING = (
 class AutopilotParameters:
     """Parameters by name.
 
-    given: all that the autopilot gets over its own defaults.
-    changed: of those the person's, where they differ from the aircraft's or are not among them.
-    unused: the person's that belong to other hardware.
+    given: all parameters that the autopilot gets in addition to its own defaults.
+    changed: the user's among them, if they differ from the aircraft's or the aircraft has none.
+    unused: the user's parameters that belong to other hardware.
     """
 
     given: Mapping[str, float]
@@ -106,9 +106,10 @@ class AutopilotParameters:
 def autopilot_parameters(
     setup: FlightSetup, aircraft: Aircraft, servos: ServoMap, own: Mapping[str, float]
 ) -> AutopilotParameters:
-    """Put the parameters of a flight together; own: the person's.  Raises ParameterError for a bad file.
+    """Collect the parameters of a flight.
 
-    The mission's speed is the cruise speed, unless the person has one.
+    The mission's speed is the cruise speed, unless the user states one.  own: the user's parameters.
+    Raise ParameterError for a bad file.
     """
     battery = _MEASURED if aircraft.battery_voltage else _UNMEASURED
     base = SIMULATION | battery | servos.parameters() | load_aircraft_parameters(aircraft)
@@ -119,19 +120,22 @@ def autopilot_parameters(
 
 
 def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
-    """ArduPlane's parameters for an aircraft, from its folder.  Raises ParameterError, in one line."""
+    """Return ArduPlane's parameters for an aircraft, from its folder.
+
+    Raise ParameterError, in one line, for a bad file.
+    """
     return {name: entry.value for name, entry in read_parameter_file(aircraft.folder / AIRCRAFT_FILE).items()}
 
 
 def person_parameters(setup: FlightSetup) -> dict[str, float]:
-    """What the scenario's file of parameters states, by present names and in their units.
+    """Return the parameters of the scenario's file, by present names and in their units.
 
-    Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
+    Raise ParameterError, in one line, for a file that cannot be read or states a value that is not allowed.
     """
     file, parameters = setup.scenario.flight.params, setup.autopilot.parameters
     made = {} if parameters is None else parameters.by_origin("file")
     if file is None:
-        # What the scenario asks for of its returns counts as stated.
+        # Settings of a scenario's RTL are taken as stated.
         return made
     old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     stated = {

@@ -1,4 +1,4 @@
-"""Planfly's own guidance as an autopilot: it knows the fly-by path and follows it, by one of three lateral laws."""
+"""Planfly's own guidance as an autopilot: it follows the fly-by path by one of three lateral laws."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Self
@@ -12,7 +12,7 @@ from world.kernels import Record
 from world.scenario_tables import FlightTable, Guidance
 from world.wind import Turbulence
 
-_DESCRIBED = {
+_LAW_NAMES = {
     "path": "planfly's guidance on the fly-by path",
     "l1": "L1 as ArduPlane flies it, along the legs",
     "vector-field": "Beard and McLain's vector field on the fly-by path",
@@ -23,7 +23,7 @@ _DESCRIBED = {
 class PlanflyGuidance(Autopilot):
     """Planfly's guidance, which stands for what the aircraft itself can fly.
 
-    guidance: its lateral law, as `[flight] guidance` names it.
+    guidance: its lateral law, as in `[flight] guidance`.
     """
 
     name: ClassVar = "ideal"
@@ -33,21 +33,21 @@ class PlanflyGuidance(Autopilot):
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """The law that the table names; a table with parameters names another autopilot."""
+        """Return the law that the table names; a table with parameters names another autopilot."""
         return cls(table.steering.guidance)
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """The law that a log stores."""
+        """Return the law that a log stores."""
         return cls(stored.guidance)
 
     def store(self) -> StoredAutopilot:
-        """Its law."""
+        """Return its law for a log."""
         return StoredAutopilot(self.guidance)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """The gains, if they are missing: every law flies through the inner loops that they tune."""
+        """Return the gains file, if it is missing: every law flies through the inner loops that it tunes."""
         if (aircraft.folder / GAINS_FILE).exists():
             load_gains(aircraft)
             return []
@@ -55,22 +55,25 @@ class PlanflyGuidance(Autopilot):
 
     @property
     def tick(self) -> Tick:
-        """All three laws' tick."""
+        """Compiled function for one tick, of all three laws."""
         return planfly_tick
 
     def begin(self, memory: Record, own: Record) -> None:
-        """Choose the lateral law."""
+        """Select the lateral law."""
         memory.law = LAWS[self.guidance]
 
     def gust_sink(self, climb: float, turbulence: Turbulence) -> float:
-        """By the downdraft that one in a hundred exceeds. Updrafts do not lift it: it dives and flies faster."""
+        """Return the altitude loss in a one-in-a-hundred downdraft.
+
+        Updrafts do not lift it: it dives and flies faster.
+        """
         return height_in_gusts(climb, turbulence)
 
     def described(self, aircraft: str) -> str:
-        """The lateral law in words."""
-        return _DESCRIBED[self.guidance]
+        """Return the lateral law in words."""
+        return _LAW_NAMES[self.guidance]
 
     @property
     def keeps_to_arcs(self) -> bool:
-        """The reference laws pass a waypoint as closely as they like."""
+        """False for the reference laws, which pass a waypoint at any distance."""
         return self.guidance == "path"

@@ -1,10 +1,10 @@
-"""Planfly's guidance: from the state to the four commands, on records with named fields, compiled.
+"""Planfly's guidance, compiled: from the state to the four commands, on records with named fields.
 
-Three lateral laws: ours, a second-order cross-track law with curvature feed-forward, about the line beside the path
-that a rolling aircraft can follow, which answers gusts by bank, and by a skid where bank ends; L1 along the legs, as
-ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
+Three lateral laws: planfly's own, a second-order cross-track law with curvature feed-forward about the offset path that
+a rolling aircraft can follow, which answers gusts by bank, and by a skid where bank is at its limit; L1 along the legs,
+as ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
 They share bank limit, vertical channel and inner loops (`flight.guidance.inner_loops`), so that flights differ by the
-law alone. None asks for the wind: all steer by the velocity over the ground.  No clock: dt is an argument.
+law alone.  None uses the wind: all steer by the velocity over the ground.  No clock: dt is an argument.
 """
 
 import math
@@ -33,38 +33,43 @@ from world.terrain import Heights
 
 Floats = NDArray[np.float64]
 
-# The lateral laws, as `memory.law` names them.
+# Lateral laws, as in `memory.law`.
 CROSS_TRACK, L1, VECTOR_FIELD = range(3)
-# By their names in a scenario's `[flight] guidance`.
+# Lateral laws by their names in a scenario's `[flight] guidance`.
 LAWS: dict[Guidance, int] = {"path": CROSS_TRACK, "l1": L1, "vector-field": VECTOR_FIELD}
-# Time constants of the energy rate and of the airspeed without its gusts, s.
-_ENERGY_LAG = 1.0
-_AIRSPEED_LAG = 2.0
-# Multiples of the stall speed below which height gives way to speed at once: of the stall speed with level wings, and
-# of the stall speed at the present bank, which gives the higher airspeed above 33 degrees of bank. The wing can then
-# give 1.44 or 1.21 times the lift that it needs: a margin for gusts. With 1.2 in turns as well, an Aerosonde with 30 %
-# more drag strayed 0.56 m in place of 0.16 m in one of 20 winds of moderate turbulence.
+# Time constant of the energy rate, s.
+_ENERGY_LAG_S = 1.0
+# Time constant of the airspeed without its gusts, s.
+_AIRSPEED_LAG_S = 2.0
+# Multiple of the stall speed with level wings below which speed has priority over altitude at once.
 SAFE_SPEED = 1.2
+# The same multiple of the stall speed at the present bank; it gives the higher airspeed above 33 degrees of bank.  The
+# wing can then give 1.44 or 1.21 times the lift that it needs: a margin for gusts.  With 1.2 in turns as well, an
+# Aerosonde with 30 % more drag strayed 0.56 m instead of 0.16 m in one of 20 winds of moderate turbulence.
 SAFE_SPEED_BANKED = 1.1
-# Least cosine of the bank that the load factor is found with, as in `steer_elevator`, which asks for no more lift.
-_LEAST_UPRIGHT = 0.4
-# Time in which the ceiling brings an airspeed back, s.
-_SPEED_BACK = 3.0
+# Lower limit of the bank's cosine in the load factor, as in `steer_elevator`, which demands no more lift.
+_MIN_BANK_COSINE = 0.4
+# Time in which the climb limit restores a low airspeed, s.
+_SPEED_RECOVERY_TIME_S = 3.0
 # Angle between the nose and the course at which the guidance no longer banks to turn the nose further away, rad.
-_NOSE_OFF = math.radians(80.0)
-# Bank allowed for each rad that the nose is short of that angle, rad/rad; beyond it, bank back for each rad too many.
-# With a bank of at most 40 degrees all of it is allowed until 70 degrees, and all of it is asked for back from 90.
-# The nose settles there with a time constant of V / (4 g), 0.4 s for the Zagi at 15 m/s, which rolls within 0.25 s.
-_BANK_PER_NOSE = 4.0
-# Of the lateral acceleration at the greatest bank, what an arc may take before the aircraft slows down for it.
+_NOSE_LIMIT_RAD = math.radians(80.0)
+# Bank allowed for each rad that the nose is short of that angle, rad/rad; beyond it, opposite bank for each rad of
+# excess.  With a bank of at most 40 degrees all of it is allowed until 70 degrees, and all of it is demanded back from
+# 90.  The nose settles there with a time constant of V / (4 g), 0.4 s for the Zagi at 15 m/s, which rolls within 0.25
+# s.
+_BANK_PER_NOSE_ANGLE_RATIO = 4.0
+# Fraction of the lateral acceleration at maximum bank that an arc may use before the aircraft slows down for it.
 ARC_SHARE = 0.95
-# Longest tick that the whole lead of a correction is for, s.
+# Longest tick for which the whole lead of a correction is used, s.
 LEAD_TICK = 1.0 / 60.0
 
 
 @compiled
 def planfly_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
-    """One tick on the block of a `flight.simulation.tick.Workspace`: a key of its `ENDS`, or 0 to fly on."""
+    """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
+
+    Return a key of its `ENDS`, or 0 to fly on.
+    """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
     settings = work.settings
@@ -89,7 +94,7 @@ def guide(
     commands: Record,
     dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """One tick of ``dt`` seconds: fill the commands, and the memory for the next one.
+    """Fill the commands for one tick of ``dt`` seconds, and update the memory.
 
     state: a record of `flight.dynamics.state.STATE`.
     estimated: of `flight.guidance.navigation_error.MOTION`.
@@ -102,17 +107,17 @@ def guide(
     course = find_on_path(estimated, pieces, memory)
     memory.speed_command = waypoints[memory.leg].airspeed
     if memory.law == L1:
-        bank = _l1(state, estimated, waypoints, gains, memory, dt)
+        bank = _l1_bank_command(state, estimated, waypoints, gains, memory, dt)
     elif memory.law == VECTOR_FIELD:
-        bank = _field(estimated, pieces[memory.piece].curvature, gains, memory, course, dt)
+        bank = _field_bank_command(estimated, pieces[memory.piece].curvature, gains, memory, course, dt)
     else:
-        bank = _along_path(state, estimated, pieces, gains, memory, course, dt)
+        bank = _path_bank_command(state, estimated, pieces, gains, memory, course, dt)
     steer_height(state, estimated, nodes, gains, memory, commands, course, dt)
     steer_bank(state, gains, memory, commands, bank, dt)
 
 
 @inner
-def _along_path(
+def _path_bank_command(
     state: Record,
     estimated: Record,
     pieces: Records,
@@ -121,34 +126,34 @@ def _along_path(
     course: float,
     dt: float,
 ) -> float:  # pragma: no cover - compiled
-    """Bank command, rad: curvature ahead, plus a second-order law on the cross-track error."""
+    """Return the bank command, rad: curvature ahead, plus a second-order law on the cross-track error."""
     speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     off_course = wrap(ground_course - course)
-    # The lift's horizontal part is square to the heading, the acceleration wanted is square to the course.
+    # The lift's horizontal part is perpendicular to the heading, the demanded acceleration to the course.
     drift = wrap(ground_course - state.yaw)
     crab = max(0.5, math.cos(drift))
     k, s = memory.piece, memory.distance
-    # Where the wind blows aside the turn changes the ground speed: it will be this when the bank comes.
-    then = speed + gains.turn_lead * GRAVITY * math.tan(memory.bank) * math.sin(drift)
+    # In a crosswind the turn changes the ground speed: this is its value when the bank takes effect.
+    future_speed = speed + gains.turn_lead * GRAVITY * math.tan(memory.bank) * math.sin(drift)
     start = s + speed * max(0.0, gains.turn_lead - 0.5 * gains.turn_smoothing)
-    turn = then * then * mean_curvature(pieces, k, start, start + speed * gains.turn_smoothing)
-    home = _roll_into_path(pieces[k].curvature, gains, memory, turn, speed, crab, dt)
-    push = _correction(state, estimated, gains, memory, speed, off_course, crab, dt)
-    # Bank comes late: the correction is asked for ahead of its time.  A longer tick itself comes late: with the whole
-    # lead the aircraft would roll to and fro (45 degrees of bank at 30 Hz in moderate turbulence; 38 with half of it).
+    turn = future_speed * future_speed * mean_curvature(pieces, k, start, start + speed * gains.turn_smoothing)
+    home = _correct_roll_offset(pieces[k].curvature, gains, memory, turn, speed, crab, dt)
+    push = _lateral_correction(state, estimated, gains, memory, speed, off_course, crab, dt)
+    # Bank lags, so the correction leads.  A longer tick itself adds lag: with the whole lead the aircraft would
+    # oscillate in roll (45 degrees of bank at 30 Hz in moderate turbulence; 38 with half of it).
     change = (push - memory.push) / gains.push_smoothing
     memory.push += change * min(dt, gains.push_smoothing)
     push += home + gains.push_lead * min(1.0, (LEAD_TICK / dt) ** 2) * change
     lift = GRAVITY + memory.bend_acceleration
     wanted = math.atan((turn + push) / (lift * crab))
-    wanted = _within_nose_limit(wanted, wrap(state.yaw - course), memory.max_bank)
+    wanted = _limit_nose_angle(wanted, wrap(state.yaw - course), memory.max_bank)
     bank: float = min(memory.max_bank, max(-memory.max_bank, wanted))
-    sharpest = max_curvature(pieces, k, s, s + speed * gains.arc_slowing_time)
-    memory.arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, sharpest))
-    # What the bank limit leaves, within limits, a skid: its side force points where the turn goes.
-    left = lift * (math.tan(wanted) - math.tan(bank))
-    slip = left / max(1.0, gains.side_per_sideslip * _pressure(state, gains))
+    max_path_curvature = max_curvature(pieces, k, s, s + speed * gains.arc_slowing_time)
+    memory.arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, max_path_curvature))
+    # A limited skid adds what the bank limit leaves: its side force points into the turn.
+    missing_force = lift * (math.tan(wanted) - math.tan(bank))
+    slip = missing_force / max(1.0, gains.side_per_sideslip * _pressure_ratio(state, gains))
     memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, slip))
     if bank == wanted and abs(memory.cross_track) < 20.0:
         memory.cross_track_sum = min(40.0, max(-40.0, memory.cross_track_sum + memory.cross_track * dt))
@@ -156,42 +161,42 @@ def _along_path(
 
 
 @inner
-def _within_nose_limit(wanted: float, nose: float, max_bank: float) -> float:  # pragma: no cover - compiled
-    """The wanted bank, or less of it where it would turn the nose too far from the course, rad.
+def _limit_nose_angle(wanted: float, nose: float, max_bank: float) -> float:  # pragma: no cover - compiled
+    """Return the demanded bank, or less where it would turn the nose too far from the course, rad.
 
-    At `_NOSE_OFF` the nose is almost square to the course. Turning further would gain nothing against a wind from the
-    side and would take the aircraft all the way round. The result is continuous in both angles except where the nose
-    points straight back. A bank that already turns the nose back towards the course fast enough is left as it is.
+    At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  Turning further would gain nothing against a
+    crosswind and would take the aircraft all the way round.  The result is continuous in both angles except where the
+    nose points straight back.  A bank that already turns the nose back towards the course fast enough is not changed.
 
     nose: from the course to the nose, positive clockwise, within +-pi rad.  max_bank: rad.
     """
     away = math.copysign(1.0, nose)
-    limit = max(-max_bank, _BANK_PER_NOSE * (_NOSE_OFF - abs(nose)))
+    limit = max(-max_bank, _BANK_PER_NOSE_ANGLE_RATIO * (_NOSE_LIMIT_RAD - abs(nose)))
     return away * min(away * wanted, limit)
 
 
 @inner
-def _roll_into_path(
+def _correct_roll_offset(
     curvature: float, gains: Record, memory: Record, turn: float, speed: float, crab: float, dt: float
 ) -> float:  # pragma: no cover - compiled
-    """Acceleration (m/s^2 to the right) back to the path from where rolling into its arcs takes the aircraft.
+    """Return the acceleration (m/s^2 to the right) that corrects the offset from rolling into arcs.
 
-    No aircraft steps into an arc: `aside` is how far beside the path it shall be where the curvature jumps.
+    No aircraft steps into an arc: `aside` is the planned offset from the path where the curvature jumps.
 
-    curvature: of the path here, 1/m.  turn: m/s^2 to the right that the path ahead takes.
+    curvature: of the path here, 1/m.  turn: m/s^2 to the right that the path ahead needs.
     """
     memory.path_bank, memory.path_bank_rate, _ = roll_model(
         math.atan(turn / (GRAVITY * crab)), memory.path_bank, memory.path_bank_rate, gains, dt
     )
-    back = gains.aside_frequency
-    home: float = -back * (2.0 * memory.aside_rate + back * memory.aside)
+    frequency = gains.aside_frequency
+    home: float = -frequency * (2.0 * memory.aside_rate + frequency * memory.aside)
     memory.aside_rate += (GRAVITY * math.tan(memory.path_bank) * crab - speed * speed * curvature + home) * dt
     memory.aside += memory.aside_rate * dt
     return home
 
 
 @inner
-def _correction(
+def _lateral_correction(
     state: Record,
     estimated: Record,
     gains: Record,
@@ -201,38 +206,38 @@ def _correction(
     crab: float,
     dt: float,
 ) -> float:  # pragma: no cover - compiled
-    """Acceleration to the right that corrects the cross-track error and what pushes the aircraft aside, m/s^2."""
+    """Return the acceleration to the right that corrects cross-track error and disturbances, m/s^2."""
     frequency = gains.cross_track_frequency
     rate_gain = 2.0 * gains.cross_track_damping * frequency
     limit = speed * math.sin(gains.intercept)
     wanted_rate = min(limit, max(-limit, -(memory.cross_track - memory.aside) * frequency * frequency / rate_gain))
-    # Flying away from the course counts as flying square to it: the sine would fall again.
+    # Flying away from the course is treated as flying perpendicular to it: the sine would fall again.
     away = abs(off_course) > 0.5 * math.pi
     rate = math.copysign(speed, off_course) if away else speed * math.sin(off_course)
     push: float = rate_gain * (wanted_rate - (rate - memory.aside_rate))
     push -= gains.cross_track_integral * memory.cross_track_sum
-    push -= gains.side_gain * _unexplained(state, estimated, gains, memory, speed, crab, dt)
+    push -= gains.side_gain * _unexplained_acceleration(state, estimated, gains, memory, speed, crab, dt)
     return push
 
 
 @inner
-def _pressure(state: Record, gains: Record) -> float:  # pragma: no cover - compiled
-    """Dynamic pressure in that at the reference airspeed."""
+def _pressure_ratio(state: Record, gains: Record) -> float:  # pragma: no cover - compiled
+    """Return the ratio of the dynamic pressure to its value at the reference airspeed."""
     share: float = (state.airspeed / gains.reference_airspeed) ** 2
     return share
 
 
 @inner
-def _unexplained(
+def _unexplained_acceleration(
     state: Record, estimated: Record, gains: Record, memory: Record, speed: float, crab: float, dt: float
 ) -> float:  # pragma: no cover - compiled
-    """Acceleration to the right of the course that neither lift nor ailerons explain, smoothed, m/s^2."""
+    """Return the smoothed lateral acceleration that neither lift nor ailerons explain, m/s^2 to the right."""
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
         gained_east = estimated.velocity_east - memory.last_velocity_east
         gained_north = estimated.velocity_north - memory.last_velocity_north
         gained = gained_east * estimated.velocity_north - gained_north * estimated.velocity_east
         lifted = (GRAVITY + (estimated.velocity_up - memory.last_velocity_up) / dt) * math.tan(state.roll)
-        pushed = gains.side_per_aileron * _pressure(state, gains) * state.aileron
+        pushed = gains.side_per_aileron * _pressure_ratio(state, gains) * state.aileron
         side = gained / (speed * dt) - (lifted + pushed) * crab
         memory.unexplained_acceleration += (side - memory.unexplained_acceleration) * min(1.0, dt / gains.side_lag)
     memory.last_velocity_east = estimated.velocity_east
@@ -243,10 +248,10 @@ def _unexplained(
 
 
 @inner
-def _l1(
+def _l1_bank_command(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:  # pragma: no cover - compiled
-    """Bank command, rad, of L1 on the leg between two waypoints, with its own switching from leg to leg."""
+    """Return the bank command, rad, of L1 on the current leg, with its own switching between legs."""
     speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     damping = gains.l1_damping
     length = l1_length(speed, gains.l1_period, damping)
@@ -268,10 +273,10 @@ def _l1(
 
 
 @inner
-def _field(
+def _field_bank_command(
     estimated: Record, curvature: float, gains: Record, memory: Record, course: float, dt: float
 ) -> float:  # pragma: no cover - compiled
-    """Bank command, rad: an orbit's own bank, and a proportional and integral law on the field's course."""
+    """Return the bank command, rad: an orbit's own bank, and a PI law on the field's course."""
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     wanted_course = field_course(
         course, memory.cross_track, curvature, gains.field_approach, gains.field_path, gains.field_orbit
@@ -296,7 +301,7 @@ def steer_height(
     course: float,
     dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """Elevator from the height profile through the load factor; throttle from the airspeed."""
+    """Set elevator from the altitude profile through the load factor, and throttle from the airspeed."""
     airspeed = max(8.0, state.airspeed)
     along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
     height, slope, _ = profile(nodes, memory.distance)
@@ -311,7 +316,7 @@ def steer_height(
     memory.bend_acceleration = bend * along * along
     push = memory.bend_acceleration + rate_gain * (wanted_rate + correction - climb_rate)
     push -= gains.height_integral * memory.height_sum
-    ceiling = _push_ceiling(state, estimated, gains, memory, commands, airspeed, rate_gain, dt)
+    ceiling = _max_upward_acceleration(state, estimated, gains, memory, commands, airspeed, rate_gain, dt)
     held = push > ceiling
     push = min(8.0, max(-6.0, min(push, ceiling)))
     if not held and abs(error) < 5.0:
@@ -321,7 +326,7 @@ def steer_height(
 
 
 @inner
-def _push_ceiling(
+def _max_upward_acceleration(
     state: Record,
     estimated: Record,
     gains: Record,
@@ -331,13 +336,13 @@ def _push_ceiling(
     rate_gain: float,
     dt: float,
 ) -> float:  # pragma: no cover - compiled
-    """Most acceleration upwards that the energy allows, m/s^2.
+    """Return the maximum upward acceleration that the energy allows, m/s^2.
 
-    What the aircraft gains now, and would gain with the throttle that is left, is what it can climb at a steady
-    airspeed.  It may climb faster while its airspeed is above the slowest one allowed, and must climb more slowly, or
-    sink, to get back to it from below.  Near the stall the airspeed counts as it is, with its gusts: a gust takes it
-    there within a second.  In a steep turn that begins at a higher airspeed: the stall speed grows with the root of the
-    load factor.
+    The specific excess power now, plus that of the unused throttle, is the climb rate at a steady airspeed.  The
+    aircraft may climb faster while its airspeed is above the slowest one allowed, and must climb more slowly, or sink,
+    to return to it from below.  Near the stall the measured airspeed is used, with its gusts: a gust takes it there
+    within a second.  In a steep turn that begins at a higher airspeed: the stall speed grows with the root of the load
+    factor.
     """
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:
@@ -346,16 +351,16 @@ def _push_ceiling(
         memory.energy_rate = climb_rate
     energy_rate = climb_rate + airspeed * (airspeed - memory.last_airspeed) / (dt * GRAVITY)
     memory.last_airspeed = airspeed
-    memory.energy_rate += (energy_rate - memory.energy_rate) * dt / _ENERGY_LAG
-    memory.airspeed += (airspeed - memory.airspeed) * dt / _AIRSPEED_LAG
+    memory.energy_rate += (energy_rate - memory.energy_rate) * dt / _ENERGY_LAG_S
+    memory.airspeed += (airspeed - memory.airspeed) * dt / _AIRSPEED_LAG_S
     left = (1.0 - commands.throttle) / max(1e-3, gains.throttle_per_slope) * airspeed
     stall = memory.stall_speed * density_factor(estimated.up)
-    load_factor = 1.0 / max(_LEAST_UPRIGHT, math.cos(state.roll))
+    load_factor = 1.0 / max(_MIN_BANK_COSINE, math.cos(state.roll))
     multiple = max(SAFE_SPEED, SAFE_SPEED_BANKED * math.sqrt(load_factor))
     safe = min(memory.speed_command, multiple * stall)
     slowest = max(safe, memory.speed_command - gains.slow_margin)
     excess = min(memory.airspeed - slowest, airspeed - safe)
-    climb = memory.energy_rate + left + excess * airspeed / (GRAVITY * _SPEED_BACK)
+    climb = memory.energy_rate + left + excess * airspeed / (GRAVITY * _SPEED_RECOVERY_TIME_S)
     ceiling: float = rate_gain * (climb - climb_rate)
     return ceiling
 
@@ -371,16 +376,16 @@ def _set_throttle(
     along: float,
     dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """Throttle: level flight's, for the slope to the air ahead, and for the airspeed's error."""
+    """Set the throttle: for level flight, for the slope relative to the air ahead, and for the airspeed error."""
     slow = memory.speed_command - airspeed
     if memory.arc_speed > 0.0:
-        # In an arc and before it the ground speed counts too, as far as the air allows.
+        # In an arc and before it the ground speed matters too, as far as the air allows.
         over = math.hypot(estimated.velocity_east, estimated.velocity_north) - memory.arc_speed
         slow = min(slow, max(-over, slow - gains.arc_slowing_max))
     steady = memory.trim_throttle + gains.throttle_per_slope * ahead_slope * along / airspeed
     wanted = steady + gains.speed_gain * slow + gains.speed_integral * memory.speed_sum
     commands.throttle = min(1.0, max(0.0, wanted))
-    # Below the throttle that gives thrust, which grows with the airspeed, the integral would wind up on nothing.
+    # Below the throttle that gives thrust, which grows with airspeed, the integrator would wind up without effect.
     idle = gains.throttle_idle * airspeed / gains.reference_airspeed
     if (wanted < 1.0 or slow < 0.0) and (wanted > idle or slow > 0.0):
         memory.speed_sum = min(60.0, max(-60.0, memory.speed_sum + slow * dt))
@@ -390,10 +395,10 @@ def _set_throttle(
 def steer_bank(
     state: Record, gains: Record, memory: Record, commands: Record, bank: float, dt: float
 ) -> None:  # pragma: no cover - compiled
-    """Aileron from a bank command through a model of how the aircraft shall roll; rudder for coordination and damping.
+    """Set aileron from a bank command through a roll model, and rudder for coordination and damping.
 
     The model answers the command as a critically damped oscillator within the limits of roll rate and acceleration, so
-    it never overshoots; `follow_roll` makes the aircraft roll as it does.
+    it never overshoots; `follow_roll` makes the aircraft follow the model.
     """
     bank, rate, turn = roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
     follow_roll(state, gains, memory, commands, bank, rate, turn, dt)

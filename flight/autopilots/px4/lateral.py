@@ -1,9 +1,9 @@
-"""PX4's lateral guidance: NPFG, its wind triangle, and the paths that a mission has it follow.
+"""PX4's lateral guidance: NPFG with its wind triangle, and the paths of a mission.
 
-NPFG is the law of Furieri, Stastny, Marconi, Siegwart and Gilitschenski, "Gone with the wind: Nonlinear guidance for
-small fixed-wing aircraft in arbitrarily strong windfields" (ACC 2017), as Stastny's "On Flying Backwards" (2019) has it
-for any path, and as PX4 has it (`src/lib/npfg/`): a course that closes in on the track and turns along it, the heading
-that flies this course in the wind, and a side acceleration in proportion to what the heading is off.
+NPFG is by Furieri, Stastny, Marconi, Siegwart and Gilitschenski, "Gone with the wind: Nonlinear guidance for small
+fixed-wing aircraft in arbitrarily strong windfields" (ACC 2017), extended to any path in Stastny's "On Flying
+Backwards" (2019), in PX4's form (`src/lib/npfg/`): a course that closes in on the track and turns along it, the heading
+that flies this course in the wind, and a side acceleration proportional to the heading error.
 
 Tracks are flown over the ground: courses and headings are angles from the map's north, clockwise, and a signed error is
 positive to the right.
@@ -14,49 +14,55 @@ import math
 from aircraft.envelope import GRAVITY
 from world.kernels import Record, inner
 
-# A course counts as flyable in full where the airspeed exceeds the wind across it by this, m/s.
-_BUFFER = 1.5
-# 1.17 keeps the gain of a heading error that period and damping have by default, whatever they are, 1/s (the constant
-# of `AirspeedDirectionController`; freed again on PX4's main branch by commit 89af91dbdb, March 2026).
-_FIXED_GAIN = 0.8885
-# Further away guidance does not turn early, m.
+# A course is fully feasible where the airspeed exceeds the wind across it by this, m/s.
+_AIRSPEED_BUFFER_MPS = 1.5
+# Gain on a heading error, 1/s: 1.17 fixes it at the value of the default period and damping (the constant of
+# `AirspeedDirectionController`; PX4's main branch uses the parameters again since commit 89af91dbdb, March 2026).
+_HEADING_GAIN_PER_S = 0.8885
+# Upper limit of the distance at which guidance turns before a waypoint, m.
 MAX_SWITCH_DISTANCE = 500.0
-# Below this ground speed (m/s) the track error's bound is a parabola of it.
-_SLOW = 1.0
+# Below this ground speed (m/s) the track error's bound is a parabola of the ground speed.
+_MIN_GROUND_SPEED_MPS = 1.0
 
 
 @inner
 def feasibility(airspeed: float, across: float, along: float) -> float:  # pragma: no cover - compiled
-    """Share (0..1) to which a course can be flown: 1 with airspeed to spare, 0 where the wind carries away.
+    """Return the feasibility of a course (0..1): 1 with airspeed to spare, 0 where the wind prevails.
 
     across, along: of the wind to the course, m/s.
     """
-    against = abs(across) if along >= 0.0 else math.hypot(across, along)
-    share = min(1.0, max(0.0, (airspeed - against) / _BUFFER))
+    headwind = abs(across) if along >= 0.0 else math.hypot(across, along)
+    share = min(1.0, max(0.0, (airspeed - headwind) / _AIRSPEED_BUFFER_MPS))
     return math.sin(0.5 * math.pi * share) ** 2
 
 
 @inner
 def error_bound(ground_speed: float, time: float) -> float:  # pragma: no cover - compiled
-    """Track error (m) from which on the track is flown to at right angles.  time: NPFG's constant, s."""
-    if ground_speed > _SLOW:
+    """Return the track error (m) beyond which guidance approaches the track at right angles.
+
+    time: NPFG's time constant, s.
+    """
+    if ground_speed > _MIN_GROUND_SPEED_MPS:
         return ground_speed * time
     return 0.5 * time * (ground_speed * ground_speed + 1.0)
 
 
 @inner
 def straight_period(parameters: Record) -> float:  # pragma: no cover - compiled
-    """Period on a straight track, s: NPFG_PERIOD, and not so short that the lag of roll makes it unstable."""
+    """Return the period on a straight track, s: NPFG_PERIOD, or more if the roll lag requires it."""
     period: float = parameters.npfg_period
     if parameters.npfg_lower_bound > 0.0:
-        least = math.pi * parameters.npfg_roll_time / parameters.npfg_damping * parameters.npfg_period_safety
-        period = max(period, least)
+        period_min = math.pi * parameters.npfg_roll_time / parameters.npfg_damping * parameters.npfg_period_safety
+        period = max(period, period_min)
     return period
 
 
 @inner
 def switch_distance(ground_speed: float, parameters: Record) -> float:  # pragma: no cover - compiled
-    """How far before a waypoint guidance would turn to the next leg, m: NPFG_SW_DST_MLT of the error's bound."""
+    """Return the distance before a waypoint at which guidance would turn to the next leg, m.
+
+    It is NPFG_SW_DST_MLT times the bound of the track error.
+    """
     time = straight_period(parameters) * parameters.npfg_damping
     distance: float = min(MAX_SWITCH_DISTANCE, parameters.npfg_switch_share * error_bound(ground_speed, time))
     return distance
@@ -66,9 +72,9 @@ def switch_distance(ground_speed: float, parameters: Record) -> float:  # pragma
 def adapted_period(
     airspeed: float, wind_speed: float, curvature: float, feasible: float, proximity: float, parameters: Record
 ) -> float:  # pragma: no cover - compiled
-    """Period that is stable with the lag of roll, and quick enough for a curve in wind, s.
+    """Return a period that is stable with the roll lag and short enough for a curve in wind, s.
 
-    feasible: of the track.  proximity: to it, 0..1.
+    feasible: feasibility of the track, 0..1.  proximity: to the track, 0..1.
     """
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
     turn_rate = abs(curvature) * airspeed
@@ -79,11 +85,11 @@ def adapted_period(
     straight = math.pi * parameters.npfg_roll_time / damping
     if parameters.npfg_lower_bound > 0.0:
         curved = 4.0 * math.pi * parameters.npfg_roll_time * damping * feasible + (1.0 - feasible) * straight
-        least = (curved * proximity + straight * (1.0 - proximity)) * parameters.npfg_period_safety
-        period = max(period, least)
+        period_min = (curved * proximity + straight * (1.0 - proximity)) * parameters.npfg_period_safety
+        period = max(period, period_min)
         if parameters.npfg_upper_bound > 0.0:
-            most = 4.0 * math.pi * damping / (turn_rate * wind_factor * max(1e-3, feasible))
-            period += (max(least, min(period, most)) - period) * proximity
+            period_max = 4.0 * math.pi * damping / (turn_rate * wind_factor * max(1e-3, feasible))
+            period += (max(period_min, min(period, period_max)) - period) * proximity
     return period
 
 
@@ -91,9 +97,9 @@ def adapted_period(
 def heading_for(
     course_east: float, course_north: float, wind_east: float, wind_north: float, airspeed: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Air velocity (m/s, east and north) that flies a course (a unit vector) in a wind; the nearest that can be flown.
+    """Return the air velocity (m/s, east and north) that flies a course (a unit vector) in a wind.
 
-    Where no heading flies the course, the one that the ground track strays least from it with.
+    If no heading flies the course, return the velocity whose ground track deviates least from it.
     """
     across = wind_east * course_north - wind_north * course_east
     along = wind_east * course_east + wind_north * course_north
@@ -111,7 +117,10 @@ def heading_for(
 def turn_share(
     air_east: float, air_north: float, want_east: float, want_north: float
 ) -> float:  # pragma: no cover - compiled
-    """Sine of the angle from the air velocity to a wanted one, positive to the right; 1 or -1 beyond 90 degrees."""
+    """Return the sine of the angle from the air velocity to a demanded one, positive to the right.
+
+    The result is 1 or -1 beyond 90 degrees.
+    """
     size = max(1e-6, math.hypot(air_east, air_north) * math.hypot(want_east, want_north))
     turn = (air_north * want_east - air_east * want_north) / size
     if air_north * want_north + air_east * want_east < 0.0:
@@ -138,7 +147,7 @@ def follow_track(
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     near: the track's point nearest to the aircraft, m.  along: its direction there, a unit vector.
     curvature: 1/m, positive to the right.
-    wind: the way the air moves, m/s.
+    wind: velocity of the air, m/s.
     airspeed_demand: m/s; it is raised, into ``own.airspeed_for_ground``, where the ground speed would be too low.
     """
     air_east, air_north = estimated.velocity_east - wind_east, estimated.velocity_north - wind_north
@@ -152,26 +161,26 @@ def follow_track(
     on_track = feasibility(airspeed, wind_across, wind_along)
     damping = parameters.npfg_damping
     bound = error_bound(ground_speed, straight_period(parameters) * damping)
-    look = 0.5 * math.pi * (1.0 - min(1.0, abs(error) / bound)) ** 2
-    period = adapted_period(airspeed, wind_speed, curvature, on_track, math.sin(look) ** 2, parameters)
+    look_ahead_angle = 0.5 * math.pi * (1.0 - min(1.0, abs(error) / bound)) ** 2
+    period = adapted_period(airspeed, wind_speed, curvature, on_track, math.sin(look_ahead_angle) ** 2, parameters)
     bound = error_bound(ground_speed, period * damping)
-    look = 0.5 * math.pi * (1.0 - min(1.0, abs(error) / bound)) ** 2
-    proximity = math.sin(look) ** 2
-    # To the track at right angles: to the left of its direction where the aircraft is right of it.
+    look_ahead_angle = 0.5 * math.pi * (1.0 - min(1.0, abs(error) / bound)) ** 2
+    proximity = math.sin(look_ahead_angle) ** 2
+    # Towards the track at right angles: to the left of its direction if the aircraft is right of it.
     side = math.copysign(1.0, error)
-    course_east = -math.cos(look) * side * along_north + math.sin(look) * along_east
-    course_north = math.cos(look) * side * along_east + math.sin(look) * along_north
+    course_east = -math.cos(look_ahead_angle) * side * along_north + math.sin(look_ahead_angle) * along_east
+    course_north = math.cos(look_ahead_angle) * side * along_east + math.sin(look_ahead_angle) * along_north
     across = wind_east * course_north - wind_north * course_east
     along = wind_east * course_east + wind_north * course_north
     on_course = feasibility(airspeed, across, along)
     least = math.hypot(parameters.ground_speed_min - along, across)
     over_ground = along + math.sqrt(max(0.0, airspeed_demand * airspeed_demand - across * across))
     own.airspeed_for_ground = least if over_ground < parameters.ground_speed_min else 0.0
-    asked = max(airspeed_demand, own.airspeed_for_ground)
-    want_east, want_north = heading_for(course_east, course_north, wind_east, wind_north, asked)
+    airspeed_setpoint = max(airspeed_demand, own.airspeed_for_ground)
+    want_east, want_north = heading_for(course_east, course_north, wind_east, wind_north, airspeed_setpoint)
     turn = turn_share(air_east, air_north, want_east, want_north)
-    gain = 4.0 * math.pi * damping / period if parameters.anticipates else _FIXED_GAIN
-    # What the curve itself takes.
+    gain = 4.0 * math.pi * damping / period if parameters.anticipates else _HEADING_GAIN_PER_S
+    # Feed-forward for the curvature of the track.
     tangent = max(0.0, estimated.velocity_east * along_east + estimated.velocity_north * along_north)
     parallel = curvature / max(1.0 - curvature * error, max(1e-6, 0.5 * abs(curvature)))
     ratio = 1.0 + wind_along / math.sqrt(max(1e-6, airspeed * airspeed - wind_across * wind_across))
@@ -190,10 +199,10 @@ def follow_leg(
     parameters: Record,
     own: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Follow the line from where the leg began to its end b (m): straight at an end where it is beyond that end.
+    """Follow the line from the leg's start to its end b (m), or steer straight to one of them.
 
-    Before its begin, further away from it than the switch distance, the aircraft flies at the begin; past its end, back
-    at the end (`navigateWaypoints`).  The others are as `follow_track` takes them.
+    Before the start, further away than the switch distance, the aircraft steers to the start; past the end, back to the
+    end (`navigateWaypoints`).  The others are as `follow_track` takes them.
     """
     leg_east, leg_north = b_east - own.from_east, b_north - own.from_north
     length = math.hypot(leg_east, leg_north)
@@ -233,7 +242,10 @@ def follow_circle(
     parameters: Record,
     own: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Follow a circle about a middle (m).  radius: m, positive to the right.  The others are as `follow_track`'s."""
+    """Follow a loiter about a center (m).
+
+    radius: m, positive to the right.  The others are as `follow_track` takes them.
+    """
     out_east, out_north = estimated.east - middle_east, estimated.north - middle_north
     distance = math.hypot(out_east, out_north)
     if distance < 0.1:
@@ -250,7 +262,7 @@ def follow_circle(
 
 @inner
 def wanted_bank(side_acceleration: float, parameters: Record) -> float:  # pragma: no cover - compiled
-    """Bank for a side acceleration (m/s^2), within FW_R_LIM, rad."""
+    """Return the bank for a side acceleration (m/s^2), within FW_R_LIM, rad."""
     wanted = math.atan(side_acceleration / GRAVITY)
-    within: float = min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
-    return within
+    limited: float = min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
+    return limited

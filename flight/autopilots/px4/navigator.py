@@ -1,19 +1,19 @@
-"""PX4's navigator: which waypoint is flown to, when the next one is, and the height that is asked for on the way.
+"""PX4's navigator: the waypoint that is flown to, its acceptance, and the altitude setpoint on a leg.
 
-Facts of PX4's `src/modules/navigator/mission_block.cpp` (`is_mission_item_reached_or_completed`) and of
-`src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`): a waypoint is reached within a radius of it or past the plane
-across the leg at it, and only within NAV_FW_ALT_RAD of its height; an aircraft that came there too high or too low
-circles at the waypoint until it is.  The radius is NAV_ACC_RAD, and up to 1.16 guidance's own switch distance where
-that is more; an item's own radius (its second parameter) is not read for fixed wing.
+Follows PX4's `src/modules/navigator/mission_block.cpp` (`is_mission_item_reached_or_completed`) and
+`src/modules/fw_mode_manager` (to 1.16 `fw_pos_control`).  A waypoint is reached within a radius of it or past the plane
+across the leg at it, and only within NAV_FW_ALT_RAD of its altitude; an aircraft that arrives too high or too low
+circles at the waypoint until it is within that tolerance.  The radius is NAV_ACC_RAD, and up to 1.16 guidance's own
+switch distance if that is more; an item's own radius (its second parameter) is not read for fixed wing.
 
-A loiter is flown around its middle from the beginning of its leg (`control_auto_loiter`), which from afar is straight
-at the middle.  It is reached, once, within that radius of its rim and near its height; then its time counts, and it is
-left at once for the line from its middle to the next waypoint: on the course there, or for a line that begins at the
-tangent's place on the rim, only where its item asks for that.  LOITER_TIME asks for its height all along; LOITER_TO_ALT
-for the height at which its leg began until its rim is reached, and for its own from then on.
+A loiter is flown around its center from the start of its leg (`control_auto_loiter`), which from a distance is straight
+to the center.  It is reached, once, within that radius of its rim and near its altitude; then its time runs, and it is
+left at once for the line from its center to the next waypoint.  Only if its item says so, it is left on the course to
+the next waypoint, or for a line that begins at the tangent point on the rim.  LOITER_TIME demands its altitude from the
+start; LOITER_TO_ALT demands the altitude at the start of its leg until the rim is reached, and its own from then on.
 
-At a gate (CONDITION_GATE) the aircraft flies to the waypoint after it, and what the mission orders between them, a
-change of speed, counts from when it crosses the plane through the gate.  From when the last waypoint is reached, PX4
+At a gate (CONDITION_GATE) the aircraft flies to the waypoint after it.  A change of speed that the mission orders
+between them applies from where the aircraft crosses the plane through the gate.  Once the last waypoint is reached, PX4
 circles about it with NAV_LOITER_RAD.
 """
 
@@ -23,19 +23,20 @@ from flight.autopilots.px4.lateral import follow_circle, follow_leg, switch_dist
 from world.geometry import wrap
 from world.kernels import Record, Records, inner
 
-# From a waypoint reached to the turn, s: the navigator's loop, its message to the position controller and that one's
-# turn.  In 33 waypoints of the kept flights it was 0.13 s on average, 0.02 to 0.26: PX4's own, for 1.17 and 1.18, which
-# turn by the same rule, did so up to 5.9 m apart at the same waypoints.  No law without that is nearer than 3 m at all.
+# Delay from reaching a waypoint to the turn, s: the navigator's loop, its message to the position controller and the
+# controller's turn.  At 33 waypoints of the stored flights it was 0.13 s on average, 0.02 to 0.26.  PX4 1.17 and 1.18,
+# which turn by the same rule, differ from each other by up to 5.9 m at the same waypoints; a law without that delay is
+# never closer than 3 m.
 SWITCH_DELAY = 0.13
-# A loiter that is left on the course to what follows is left within this of it, rad (MIS_YAW_ERR), but not where that
-# lies within so many radii of its middle.
+# Course tolerance for leaving a loiter on the course to what follows, rad (MIS_YAW_ERR).
 COURSE_ACCEPTANCE = math.radians(12.0)
-_TOO_NEAR_FOR_COURSE = 1.05
+# A place closer to the center than this, in radii, cannot be headed for from the loiter: no course is awaited.
+_MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
 @inner
 def reach_radius(ground_speed: float, parameters: Record) -> float:  # pragma: no cover - compiled
-    """How near (m) to a waypoint it counts as reached."""
+    """Return the distance to a waypoint within which it is reached, m."""
     radius: float = parameters.acceptance
     if parameters.anticipates:
         radius = max(radius, switch_distance(ground_speed, parameters))
@@ -44,7 +45,7 @@ def reach_radius(ground_speed: float, parameters: Record) -> float:  # pragma: n
 
 @inner
 def past_waypoint(estimated: Record, b: Record, own: Record) -> bool:  # pragma: no cover - compiled
-    """Whether the plane across the leg at its end b is passed; there is none for a leg without length."""
+    """Return True past the plane across the leg at its end b; False for a leg without length."""
     leg_east, leg_north = b.east - own.from_east, b.north - own.from_north
     ahead = (estimated.east - b.east) * leg_east + (estimated.north - b.north) * leg_north
     past: bool = leg_east * leg_east + leg_north * leg_north > 1e-6 and ahead > 0.0
@@ -62,11 +63,11 @@ def navigate(
     own: Record,
     dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """Follow the present leg, demand its height, and turn to the next one if its time has come.
+    """Follow the current leg, demand its altitude, and change to the next leg when it is time.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    wind: the way the air moves, m/s.  airspeed_demand: m/s.
+    wind: velocity of the air, m/s.  airspeed_demand: m/s.
     parameters: of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
     own: of `flight.autopilots.px4.law.PX4_MEMORY`.  dt: s.
     """
@@ -75,8 +76,8 @@ def navigate(
     if target > own.leg + 1 and _past_gate(estimated, waypoints[own.leg + 1], b):
         own.leg += 1
     if b.returns:
-        # A return goes on until the flight ends, in one leg.
-        _return(estimated, b, wind_east, wind_north, airspeed_demand, parameters, own)
+        # An RTL is one leg, which lasts until the flight ends.
+        _navigate_rtl(estimated, b, wind_east, wind_north, airspeed_demand, parameters, own)
         return
     if b.circle != 0.0:
         _loiter(estimated, waypoints, b, wind_east, wind_north, airspeed_demand, parameters, own, dt)
@@ -86,7 +87,7 @@ def navigate(
 
 @inner
 def flown_to(waypoints: Records, own: Record) -> int:  # pragma: no cover - compiled
-    """Number of the waypoint that is flown to: gates are passed on the way there, and are nothing to fly to."""
+    """Return the index of the waypoint that is flown to; gates are passed on the leg to it."""
     target: int = own.leg + 1
     while waypoints[target].gate:
         target += 1
@@ -95,7 +96,7 @@ def flown_to(waypoints: Records, own: Record) -> int:  # pragma: no cover - comp
 
 @inner
 def _past_gate(estimated: Record, gate: Record, b: Record) -> bool:  # pragma: no cover - compiled
-    """Whether the plane through a gate is crossed, at right angles to the way from it to the waypoint b after it."""
+    """Return True past the plane through a gate, at right angles to the line from it to the waypoint b."""
     onward_east, onward_north = b.east - gate.east, b.north - gate.north
     ahead = (estimated.east - gate.east) * onward_east + (estimated.north - gate.north) * onward_north
     past: bool = ahead >= 0.0
@@ -107,9 +108,9 @@ def _follow_plain_leg(
     estimated: Record, waypoints: Records, target: int, wind_east: float, wind_north: float, airspeed_demand: float,
     parameters: Record, own: Record, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Follow the leg to a waypoint, and circle at it where the aircraft came there too high or too low.
+    """Follow the leg to a waypoint, and circle at it while the aircraft is too high or too low.
 
-    A mission's last one is circled about from when it is reached.
+    At the last waypoint of a mission the aircraft circles once it is reached.
     """
     b = waypoints[target]
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -117,7 +118,7 @@ def _follow_plain_leg(
     distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
     own.nearest = min(own.nearest, distance)
     high_or_low = abs(estimated.up - b.up) > parameters.height_acceptance
-    # Once begun, the circle is not left for being wide.
+    # A circle is kept once begun, even if the aircraft is wide of it.
     own.circling = own.finished or (high_or_low and (own.circling or distance < early))
     if own.circling:
         follow_circle(estimated, b.east, b.north, radius, wind_east, wind_north, airspeed_demand, parameters, own)
@@ -128,8 +129,8 @@ def _follow_plain_leg(
     is_end = target + 1 >= waypoints.shape[0]
     if is_end and not b.ends:
         return
-    near = distance <= reach_radius(speed, parameters) or past_waypoint(estimated, b, own)
-    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (near and not high_or_low) else 0.0
+    is_reached = distance <= reach_radius(speed, parameters) or past_waypoint(estimated, b, own)
+    own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (is_reached and not high_or_low) else 0.0
     if own.reached_for <= SWITCH_DELAY:
         return
     if is_end:
@@ -143,7 +144,10 @@ def _loiter(
     estimated: Record, waypoints: Records, b: Record, wind_east: float, wind_north: float, airspeed_demand: float,
     parameters: Record, own: Record, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Fly to a loiter's circle and around it until it is over.  b: a corner of the route that stands for it."""
+    """Fly to a loiter and around it until it is over.
+
+    b: the corner of the route that stands for the loiter.
+    """
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
     own.circling = True
@@ -160,7 +164,7 @@ def _loiter(
     own.reached_for = own.reached_for + dt if own.reached_for > 0.0 or (on_rim and at_height) else 0.0
     after = own.leg + 2
     if math.isnan(b.stays):
-        # So many turns, which PX4 does not fly: as far around as the route is drawn.
+        # A loiter by turns, which PX4 does not fly: it is left where the drawn route leaves it.
         if after < waypoints.shape[0] and on_rim and past_corner(estimated, b):
             begin_leg(estimated, waypoints, own.leg + 1, own)
         return
@@ -168,13 +172,13 @@ def _loiter(
         after += 1
     if after >= waypoints.shape[0] or own.reached_for <= b.stays + SWITCH_DELAY:
         return
-    if not b.leaves_on_course or _heads_for(estimated, waypoints[after], b):
+    if not b.leaves_on_course or _is_on_exit_course(estimated, waypoints[after], b):
         begin_leg(estimated, waypoints, after - 1, own)
 
 
 @inner
 def is_last(waypoints: Records, own: Record) -> bool:  # pragma: no cover - compiled
-    """Whether nothing comes after what is flown to now, a loiter's own corners left aside."""
+    """Return True if nothing follows the current target, other corners of the same loiter excluded."""
     target = flown_to(waypoints, own)
     b = waypoints[target]
     last: bool = target + 1 >= waypoints.shape[0] or (b.circle != 0.0 and waypoints[-1].stop == b.stop)
@@ -183,42 +187,42 @@ def is_last(waypoints: Records, own: Record) -> bool:  # pragma: no cover - comp
 
 @inner
 def _target(b: Record) -> tuple[float, float]:  # pragma: no cover - compiled
-    """East and north (m) of the setpoint that a waypoint of the route belongs to: a loiter's is its middle."""
+    """Return east and north (m) of a waypoint's setpoint, which for a loiter is its center."""
     return (b.centre_east, b.centre_north) if b.circle != 0.0 else (b.east, b.north)
 
 
 @inner
-def _heads_for(estimated: Record, onward: Record, b: Record) -> bool:  # pragma: no cover - compiled
-    """Whether the course leads to the setpoint after a loiter b; so close to its middle none does, and none is asked.
+def _is_on_exit_course(estimated: Record, onward: Record, b: Record) -> bool:  # pragma: no cover - compiled
+    """Return True if the course leads to the setpoint after loiter b, or if none can.
 
-    onward: the waypoint after it.
+    No course is required to a setpoint too close to the loiter's center.  onward: the waypoint after the loiter.
     """
     east, north = _target(onward)
-    if math.hypot(east - b.centre_east, north - b.centre_north) <= _TOO_NEAR_FOR_COURSE * abs(b.circle):
+    if math.hypot(east - b.centre_east, north - b.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(b.circle):
         return True
     bearing = math.atan2(east - estimated.east, north - estimated.north)
     return abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north))) < COURSE_ACCEPTANCE
 
 
 @inner
-def _return(
+def _navigate_rtl(
     estimated: Record, b: Record, wind_east: float, wind_north: float, airspeed_demand: float, parameters: Record,
     own: Record,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Return: climb in a circle on the spot if need be, fly straight to the target at that height, come down there.
+    """Fly an RTL: climb in a circle if need be, go straight to the target at that altitude, descend there.
 
-    Facts of PX4's `src/modules/navigator/rtl_direct.cpp`; it never sinks before it is over its target.
+    Follows PX4's `src/modules/navigator/rtl_direct.cpp`; the aircraft never descends before it is over its target.
     """
     if not own.returning:
         own.returning, own.circling = True, False
         own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
-    height = max(own.from_up, b.up)
+    return_altitude = max(own.from_up, b.up)
     if not own.climbed:
-        own.climbed = estimated.up >= height - parameters.height_acceptance
+        own.climbed = estimated.up >= return_altitude - parameters.height_acceptance
         if own.climbed:
             own.from_east, own.from_north = estimated.east, estimated.north
     if not own.climbed:
-        own.height_asked = height
+        own.height_asked = return_altitude
         follow_circle(
             estimated, own.from_east, own.from_north, parameters.loiter_radius, wind_east, wind_north,
             airspeed_demand, parameters, own,
@@ -227,7 +231,7 @@ def _return(
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(b.centre_east - estimated.east, b.centre_north - estimated.north)
     own.circling = own.circling or distance < abs(b.circle) + switch_distance(speed, parameters)
-    own.height_asked = b.up if own.circling else height
+    own.height_asked = b.up if own.circling else return_altitude
     if own.circling:
         follow_circle(
             estimated, b.centre_east, b.centre_north, b.circle, wind_east, wind_north, airspeed_demand, parameters, own
@@ -238,9 +242,9 @@ def _return(
 
 @inner
 def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> None:  # pragma: no cover - compiled
-    """Turn to a leg: its line goes through both waypoints, and after a loiter it begins in the loiter's middle.
+    """Begin a leg: its line joins both waypoints, and after a loiter starts from the loiter's center.
 
-    After one of so many turns, which PX4 does not fly, it begins where that is left.
+    After a loiter by turns, which PX4 does not fly, it starts where the loiter is left.
     """
     a, b = waypoints[leg], waypoints[leg + 1]
     own.leg = leg
@@ -252,9 +256,9 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
         east, north = _target(b)
         bearing = math.atan2(east - a.centre_east, north - a.centre_north)
         share = abs(a.circle) / max(1e-3, math.hypot(east - a.centre_east, north - a.centre_north))
-        out = bearing - math.copysign(math.acos(min(1.0, share)), a.circle)
-        own.from_east += abs(a.circle) * math.sin(out)
-        own.from_north += abs(a.circle) * math.cos(out)
+        exit_bearing = bearing - math.copysign(math.acos(min(1.0, share)), a.circle)
+        own.from_east += abs(a.circle) * math.sin(exit_bearing)
+        own.from_north += abs(a.circle) * math.cos(exit_bearing)
     if not (a.circle != 0.0 and a.stop == b.stop):
         own.circling, own.at_rim, own.begun_up = False, False, estimated.up
         own.reached_for = 0.0
@@ -263,7 +267,7 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, own: Record) -> N
 
 @inner
 def past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - compiled
-    """Whether the aircraft on a circle has passed the corner of the route that stands for this part of it."""
+    """Return True if an aircraft on a loiter has passed the corner of the route for this part of it."""
     corner = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
     here = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
     turned = wrap(here - corner) * math.copysign(1.0, b.circle)
@@ -274,10 +278,10 @@ def past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - com
 def leg_height(
     end_east: float, end_north: float, end_up: float, early: float, own: Record
 ) -> float:  # pragma: no cover - compiled
-    """Height that a leg asks for where the aircraft is, m: a first-order hold that is done ``early`` m before its end.
+    """Return a leg's altitude setpoint at the aircraft, m: a slope that ends ``early`` m before its end.
 
-    The slope goes by the smallest distance to the end that was reached on this leg, across the ground; a leg no longer
-    than ``early`` is a step.
+    PX4 calls it a first-order hold.  The slope uses the smallest horizontal distance to the end that was reached on
+    this leg; a leg no longer than ``early`` is a step.
     """
     length = math.hypot(end_east - own.from_east, end_north - own.from_north)
     nearest = min(own.nearest, length)

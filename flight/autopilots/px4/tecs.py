@@ -1,7 +1,7 @@
-"""PX4's TECS: throttle for what total energy is missing, pitch for what is amiss between height and speed.
+"""PX4's TECS: throttle from the STE rate, pitch from the balance of altitude and speed (SEB rate).
 
-Facts of PX4's `src/lib/tecs/TECS.cpp` and its parameter reference (FW_T_*).  The total energy control system is
-Lambregts' (AIAA 83-2239).  Energies are of a kilogram: rates of them m^2/s^3.  Speeds are true airspeeds.
+Follows PX4's `src/lib/tecs/TECS.cpp` and its parameter reference (FW_T_*).  The Total Energy Control System is by
+Lambregts (AIAA 83-2239).  Energies are per kilogram, their rates m^2/s^3.  Speeds are true airspeeds.
 """
 
 import math
@@ -9,25 +9,25 @@ import math
 from aircraft.envelope import GRAVITY
 from world.kernels import Record, inner
 
-# Of the greatest rates of energy, what a change of speed may ask for.
-_SPEED_CHANGE_SHARE = 0.5
-# An airspeed is changed by so much a second at most, m/s^2.
-_SPEED_SLEW = 1.0
-# So far (of FW_AIRSPD_TRIM) below FW_AIRSPD_MIN speed begins to come before height, and does wholly by as much more.
-_UNDERSPEED = 0.15
+# Fraction of the maximum energy rates that a change of speed may use.
+_SPEED_RATE_FRACTION = 0.5
+# Limit of the rate of the airspeed demand, m/s^2.
+_AIRSPEED_SLEW_MPS2 = 1.0
+# Underspeed begins this fraction of FW_AIRSPD_TRIM below FW_AIRSPD_MIN, and is complete as far again below that.
+_UNDERSPEED_FRACTION = 0.15
 
 
 @inner
 def lead_height(parameters: Record, own: Record, dt: float) -> None:  # pragma: no cover - compiled
-    """Lead the reference height to the height that is asked for, within its rates and acceleration.
+    """Move the altitude reference towards the setpoint, within its limits (`TECSAltitudeReferenceModel`).
 
-    It climbs by FW_T_CLMB_R_SP and sinks by FW_T_SINK_R_SP at most, and brakes in time, with FW_T_VERT_ACC.
+    It climbs by FW_T_CLMB_R_SP and sinks by FW_T_SINK_R_SP at most, and decelerates in time, with FW_T_VERT_ACC.
     """
-    missing = own.height_asked - own.height_reference
-    rate = min(math.sqrt(2.0 * parameters.vertical_acceleration * abs(missing)), abs(missing) / dt)
+    altitude_error = own.height_asked - own.height_reference
+    rate = min(math.sqrt(2.0 * parameters.vertical_acceleration * abs(altitude_error)), abs(altitude_error) / dt)
     climb = min(parameters.climb_reference, parameters.climb_max)
     sink = min(parameters.sink_reference, parameters.sink_max)
-    wanted = min(climb, max(-sink, math.copysign(rate, missing)))
+    wanted = min(climb, max(-sink, math.copysign(rate, altitude_error)))
     change = parameters.vertical_acceleration * dt
     own.height_rate = min(own.height_rate + change, max(own.height_rate - change, wanted))
     own.height_reference += own.height_rate * dt
@@ -37,101 +37,122 @@ def lead_height(parameters: Record, own: Record, dt: float) -> None:  # pragma: 
 def estimate_airspeed(
     measured: float, parameters: Record, own: Record, dt: float
 ) -> None:  # pragma: no cover - compiled
-    """Smooth the measured airspeed (m/s): its measured rate counts as 0, as PX4 has it."""
-    off, rate_off = measured - own.airspeed, -own.airspeed_rate
-    own.airspeed += (own.airspeed_rate + parameters.speed_by_speed * off + parameters.speed_by_rate * rate_off) * dt
+    """Update the airspeed filter with a measured airspeed (m/s) (`TECSAirspeedFilter`).
+
+    The measured rate is taken as 0, as in PX4.
+    """
+    airspeed_error, airspeed_rate_error = measured - own.airspeed, -own.airspeed_rate
+    own.airspeed += (
+        own.airspeed_rate + parameters.speed_by_speed * airspeed_error + parameters.speed_by_rate * airspeed_rate_error
+    ) * dt
     own.airspeed = max(1.0, own.airspeed)
-    own.airspeed_rate += (parameters.rate_by_speed * off + parameters.rate_by_rate * rate_off) * dt
+    own.airspeed_rate += (
+        parameters.rate_by_speed * airspeed_error + parameters.rate_by_rate * airspeed_rate_error
+    ) * dt
 
 
 @inner
 def update_tecs(
     state: Record, estimated: Record, parameters: Record, own: Record, wanted: float, factor: float, dt: float
 ) -> None:  # pragma: no cover - compiled
-    """Throttle and pitch demands for the height that is asked for and an airspeed, into ``own``.
+    """Update the throttle and pitch demands for the altitude setpoint and an airspeed, into ``own``.
 
     state: a record of `flight.dynamics.state.STATE`.  estimated: of `flight.guidance.navigation_error.MOTION`.
-    wanted: equivalent airspeed, m/s.  factor: true by equivalent airspeed.
+    wanted: equivalent airspeed, m/s.  factor: ratio of true to equivalent airspeed.
     """
     lead_height(parameters, own, dt)
     estimate_airspeed(state.airspeed, parameters, own, dt)
     speed = own.airspeed
-    # In a bank the least airspeed grows with the root of the load.
+    # In a bank the minimum airspeed grows as the root of the load factor.
     slowest = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(own.roll_demand)))
-    asked = min(parameters.airspeed_max, max(slowest, wanted)) * factor
-    step = _SPEED_SLEW * dt
-    own.airspeed_demand = min(own.airspeed_demand + step, max(own.airspeed_demand - step, asked))
+    setpoint = min(parameters.airspeed_max, max(slowest, wanted)) * factor
+    step = _AIRSPEED_SLEW_MPS2 * dt
+    own.airspeed_demand = min(own.airspeed_demand + step, max(own.airspeed_demand - step, setpoint))
     max_rate, min_rate = GRAVITY * parameters.climb_max, -GRAVITY * parameters.sink_min
-    climb = (own.height_reference - estimated.up) / parameters.height_time
-    climb += parameters.height_rate_share * own.height_rate
-    climb = min(parameters.climb_max, max(-parameters.sink_max, climb))
-    gain = (own.airspeed_demand - speed) / parameters.speed_time
-    share = _SPEED_CHANGE_SHARE / speed
-    gain = min(share * max_rate, max(share * min_rate, gain))
-    under = underspeed(speed / factor, parameters)
-    _set_pitch(estimated, parameters, own, climb, gain, under, dt)
-    _set_throttle(state, estimated, parameters, own, climb, gain, under, factor, dt)
+    climb_rate = (own.height_reference - estimated.up) / parameters.height_time
+    climb_rate += parameters.height_rate_share * own.height_rate
+    climb_rate = min(parameters.climb_max, max(-parameters.sink_max, climb_rate))
+    acceleration = (own.airspeed_demand - speed) / parameters.speed_time
+    share = _SPEED_RATE_FRACTION / speed
+    acceleration = min(share * max_rate, max(share * min_rate, acceleration))
+    underspeed_ratio = underspeed(speed / factor, parameters)
+    _set_pitch(estimated, parameters, own, climb_rate, acceleration, underspeed_ratio, dt)
+    _set_throttle(state, estimated, parameters, own, climb_rate, acceleration, underspeed_ratio, factor, dt)
 
 
 @inner
 def underspeed(airspeed: float, parameters: Record) -> float:  # pragma: no cover - compiled
-    """Share (0..1) to which speed comes before height.  airspeed: equivalent, m/s."""
-    ramp = _UNDERSPEED * parameters.airspeed_trim
-    begins = max(0.0, parameters.airspeed_min - ramp)
-    whole = max(0.0, begins - ramp)
-    share: float = 1.0 - min(1.0, max(0.0, (airspeed - whole) / max(1e-3, begins - whole)))
+    """Return the underspeed ratio (0..1): the priority of speed over altitude (`_detectUnderspeed`).
+
+    airspeed: equivalent, m/s.
+    """
+    ramp = _UNDERSPEED_FRACTION * parameters.airspeed_trim
+    start = max(0.0, parameters.airspeed_min - ramp)
+    full = max(0.0, start - ramp)
+    share: float = 1.0 - min(1.0, max(0.0, (airspeed - full) / max(1e-3, start - full)))
     return share
 
 
 @inner
 def _set_pitch(
-    estimated: Record, parameters: Record, own: Record, climb: float, gain: float, under: float, dt: float
+    estimated: Record,
+    parameters: Record,
+    own: Record,
+    climb_rate: float,
+    acceleration: float,
+    underspeed_ratio: float,
+    dt: float,
 ) -> None:  # pragma: no cover - compiled
-    """Pitch angle for the balance of a climb rate (m/s) and an acceleration (m/s^2) that are demanded."""
+    """Set the pitch demand from the SEB rate of a climb rate (m/s) and an acceleration (m/s^2)."""
     speed = own.airspeed
-    weight = parameters.speed_weight * (1.0 - under) + 2.0 * under
-    # Beyond the middle, 1, one of the two counts for less, and the other for no more.
-    speed_weight, height_weight = min(1.0, max(0.0, weight)), min(1.0, max(0.0, 2.0 - weight))
-    wanted = GRAVITY * climb * height_weight - speed * gain * speed_weight
-    amiss = wanted - (GRAVITY * estimated.velocity_up * height_weight - speed * own.airspeed_rate * speed_weight)
-    per_angle = speed * GRAVITY
-    top, bottom = parameters.pitch_limit_max - parameters.pitch_trim, parameters.pitch_limit_min - parameters.pitch_trim
-    grows = amiss * parameters.pitch_integral * dt
-    angle = (amiss * parameters.pitch_damping + parameters.balance_share * wanted + own.balance_sum) / per_angle
-    # At a limit the integral only leaves it.
-    if not ((angle >= top and grows > 0.0) or (angle <= bottom and grows < 0.0)):
-        own.balance_sum += grows
-        angle += grows / per_angle
-    angle = min(top, max(bottom, angle))
+    weight = parameters.speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
+    # Clip both weights at 1, so that a weight above 1 lowers the other instead of raising the loop gain.
+    ske_weight, spe_weight = min(1.0, max(0.0, weight)), min(1.0, max(0.0, 2.0 - weight))
+    rate_demand = GRAVITY * climb_rate * spe_weight - speed * acceleration * ske_weight
+    rate_error = rate_demand - (GRAVITY * estimated.velocity_up * spe_weight - speed * own.airspeed_rate * ske_weight)
+    rate_per_pitch = speed * GRAVITY
+    pitch_max, pitch_min = (
+        parameters.pitch_limit_max - parameters.pitch_trim,
+        parameters.pitch_limit_min - parameters.pitch_trim,
+    )
+    increment = rate_error * parameters.pitch_integral * dt
+    angle = (
+        rate_error * parameters.pitch_damping + parameters.balance_share * rate_demand + own.balance_sum
+    ) / rate_per_pitch
+    # In saturation the integrator may only move away from the limit.
+    if not ((angle >= pitch_max and increment > 0.0) or (angle <= pitch_min and increment < 0.0)):
+        own.balance_sum += increment
+        angle += increment / rate_per_pitch
+    angle = min(pitch_max, max(pitch_min, angle))
     step = parameters.vertical_acceleration / speed * dt
     own.pitch_demand = min(own.pitch_demand + step, max(own.pitch_demand - step, angle))
 
 
 @inner
 def _set_throttle(
-    state: Record, estimated: Record, parameters: Record, own: Record, climb: float, gain: float, under: float,
-    factor: float, dt: float,
+    state: Record, estimated: Record, parameters: Record, own: Record, climb_rate: float, acceleration: float,
+    underspeed_ratio: float, factor: float, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Throttle for the rate of total energy that a climb rate (m/s) and an acceleration (m/s^2) take."""
+    """Set the throttle demand from the STE rate of a climb rate (m/s) and an acceleration (m/s^2)."""
     max_rate, min_rate = GRAVITY * parameters.climb_max, -GRAVITY * parameters.sink_min
-    drag = parameters.roll_to_throttle * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)
-    wanted = min(max_rate, max(min_rate, GRAVITY * climb + own.airspeed * gain + drag))
-    rate = GRAVITY * estimated.velocity_up + own.airspeed * own.airspeed_rate
-    own.energy_rate += (rate - own.energy_rate) * dt / (dt + parameters.energy_rate_time)
-    amiss, span = wanted - own.energy_rate, max_rate - min_rate
-    # In thin air level flight takes more of the throttle.
+    roll_drag = parameters.roll_to_throttle * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)
+    rate_demand = min(max_rate, max(min_rate, GRAVITY * climb_rate + own.airspeed * acceleration + roll_drag))
+    ste_rate = GRAVITY * estimated.velocity_up + own.airspeed * own.airspeed_rate
+    own.energy_rate += (ste_rate - own.energy_rate) * dt / (dt + parameters.energy_rate_time)
+    rate_error, span = rate_demand - own.energy_rate, max_rate - min_rate
+    # In thin air level flight needs more throttle.
     trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * factor))
-    if wanted >= 0.0:
-        throttle = trim + wanted * (parameters.throttle_max - trim) / max_rate
+    if rate_demand >= 0.0:
+        throttle = trim + rate_demand * (parameters.throttle_max - trim) / max_rate
     else:
-        throttle = trim + wanted * (trim - parameters.throttle_min) / -min_rate
-    throttle += amiss * parameters.throttle_damping / span + own.throttle_sum
-    grows = amiss * parameters.throttle_integral / span * dt
+        throttle = trim + rate_demand * (trim - parameters.throttle_min) / -min_rate
+    throttle += rate_error * parameters.throttle_damping / span + own.throttle_sum
+    increment = rate_error * parameters.throttle_integral / span * dt
     full, idle = throttle >= parameters.throttle_max, throttle <= parameters.throttle_min
-    if not ((full and grows > 0.0) or (idle and grows < 0.0)):
-        own.throttle_sum += grows
-        throttle += grows
-    throttle += under * (parameters.throttle_max - throttle)
+    if not ((full and increment > 0.0) or (idle and increment < 0.0)):
+        own.throttle_sum += increment
+        throttle += increment
+    throttle += underspeed_ratio * (parameters.throttle_max - throttle)
     throttle = min(parameters.throttle_max, max(parameters.throttle_min, throttle))
     if parameters.throttle_slew > 0.0:
         step = parameters.throttle_slew * (parameters.throttle_max - parameters.throttle_min) * dt

@@ -1,7 +1,7 @@
-"""How far PX4 strays from the legs of a plan with its parameters: corners flown by its own law on the plane.
+"""Deviation of PX4 from the legs of a plan: corners flown in the plane by its own guidance.
 
 Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.px4.navigator` and the lag of the
-bank.  In wind, the still air's excursion at the highest ground speed on the way is the measure, and `WIND_SPREAD` more.
+bank.  For wind, the excursion in still air at the highest ground speed on the leg is taken, increased by `WIND_SPREAD`.
 """
 
 import math
@@ -24,34 +24,41 @@ from world.wind import W20, Turbulence
 
 Floats = NDArray[np.float64]
 
-# A corner counts as left where the aircraft stays this near to the next leg (m) for so long (s).
-_SETTLED, _STAYS = 2.0, 8.0
-# From a corner the legs reach this far, m; flights end there at the latest, and begin so far before they may turn.
-_LEG, _BEFORE = 4000.0, 200.0
+# A corner is over where the aircraft stays this close to the next leg, m ...
+_SETTLED_CROSS_TRACK_M = 2.0
+# ... for this time, s.
+_SETTLED_TIME_S = 8.0
+# Length of the legs on both sides of a corner, m; the flights end there at the latest.
+_LEG_LENGTH_M = 4000.0
+# Distance before the earliest turn at which the flights begin, m.
+_RUN_IN_M = 200.0
 # Time step of these flights, s.
-_STEP = 0.05
-# What is left for the wind, as a share of still air's excursion, and more of it at a right angle: what it made of
-# ArduPlane's corners (`flight.autopilots.arduplane.tracking_error`), which knows no wind as PX4's guidance does.
+_TIME_STEP_S = 0.05
+# Margin for wind, as a factor on the excursion in still air, and what is added to it at a right angle.  It is what wind
+# made of ArduPlane's corners (`flight.autopilots.arduplane.tracking_error`), whose guidance does not use the wind as
+# PX4's does.
 WIND_SPREAD = 1.1, 0.5
-# Of navigation's standard deviation, what is left room for.
-_SIGMAS = 3.0
-# Beside straight legs and from its lagged height in light turbulence, navigation left out, m.
-_ACROSS, _UP = 2.0, 3.0
-# Of FW_T_CLMB_R_SP and FW_T_SINK_R_SP, the share that a plan asks for, by turbulence: slopes are flown steeper than
-# they are drawn, for they are done a loiter's radius early, and what is missing at a waypoint is circled for.
-_SHARE = {"none": 0.8, "light": 0.7, "moderate": 0.6}
-# The same of what the aircraft itself can climb and sink: a gust that lasts as long as a leg leaves less of it, and
-# where PX4 comes to a waypoint more than NAV_FW_ALT_RAD off its height, it circles. In light turbulence the Zagi's
-# slopes over 4 km at 0.9 of it ended in circles in 2 (up) and 6 (down) of 6 streams, at 0.6 (0.7 less the margin of
-# plans) in none and 1. In still air it flew 0.98 of it within 6 m: nothing is left there.
-_SLOPE_SHARE = _SHARE | {"none": 1.0}
+# Number of standard deviations of navigation for which room is left.
+_NAVIGATION_SIGMAS = 3.0
+# Deviation across straight legs in light turbulence, without navigation, m.
+_CROSS_TRACK_M = 2.0
+# Deviation from the lagged altitude in light turbulence, without navigation, m.
+_ALTITUDE_ERROR_M = 3.0
+# Fraction of FW_T_CLMB_R_SP and FW_T_SINK_R_SP that a plan uses, by turbulence.  Slopes are flown steeper than they are
+# drawn, as they end a loiter radius early, and the altitude that is missing at a waypoint costs circles.
+_RATE_FRACTIONS = {"none": 0.8, "light": 0.7, "moderate": 0.6}
+# The same fraction of the aircraft's own climb and sink rates: a gust that lasts as long as a leg leaves less, and PX4
+# circles if it reaches a waypoint more than NAV_FW_ALT_RAD off its altitude.  In light turbulence the Zagi's slopes
+# over 4 km at 0.9 of its rates ended in circles in 2 (up) and 6 (down) of 6 streams, at 0.6 (0.7 less the margin of
+# plans) in none and 1.  In still air it flew 0.98 of them within 6 m: no margin is left there.
+_OWN_RATE_FRACTIONS = _RATE_FRACTIONS | {"none": 1.0}
 
-# Standard deviation of the height in moderate turbulence where the aircraft has enough in hand, m: 3.7 of PX4's law
-# and Dryden's gusts worked out at 15 to 27 m/s, 3.7 (Aerosonde) and 4.2 (Ultra Stick) in 84 flights.
-_THROWN = 4.0
-# What a gust beyond what the aircraft has in hand is taken to last, s: with it 74 of 1,860 waypoints in 186 flights of
-# four aircraft are expected to be passed more than 10 m off their heights, and 58 were.
-_GUST_LASTS = 6.0
+# Standard deviation of the altitude in moderate turbulence if the aircraft has rate to spare, m: 3.7 computed from
+# PX4's law and Dryden's gusts at 15 to 27 m/s; 3.7 (Aerosonde) and 4.2 (Ultra Stick) in 84 flights.
+_ALTITUDE_SIGMA_MODERATE_M = 4.0
+# Assumed duration of a gust that exceeds the aircraft's spare rate, s: with it 74 of 1,860 waypoints in 186 flights of
+# four aircraft are expected to be passed more than 10 m off their altitudes, and 58 were.
+_GUST_DURATION_S = 6.0
 
 
 def tracking_error(
@@ -61,9 +68,9 @@ def tracking_error(
     *,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """What a plan leaves free for PX4 with these parameters, at an equivalent airspeed (m/s).
+    """Return the room that a plan leaves for PX4's deviations at an equivalent airspeed (m/s).
 
-    nav: how well it knows where it is.  turbulence: of the wind.
+    nav: accuracy of navigation.  turbulence: of the wind.
 
     >>> from flight.autopilots.px4.parameters import Px4Parameters
     >>> error = tracking_error(Px4Parameters.defaults("1.16"), 25.0, "gnss")
@@ -71,7 +78,7 @@ def tracking_error(
     (3.5, 56.0)
     """
     acceptance, excursion, before, after = _corners(parameters, airspeed)
-    known = _SIGMAS * ERRORS[nav][0]
+    navigation_error = _NAVIGATION_SIGMAS * ERRORS[nav][0]
     made = parameters
     return TrackingError(
         airspeed=airspeed,
@@ -79,38 +86,42 @@ def tracking_error(
         excursion=excursion,
         before=before,
         after=after,
-        across=math.hypot(_ACROSS, known),
-        up=math.hypot(_UP, known),
+        across=math.hypot(_CROSS_TRACK_M, navigation_error),
+        up=math.hypot(_ALTITUDE_ERROR_M, navigation_error),
         lag=(1.0 - made["FW_T_HRATE_FF"]) * made["FW_T_ALT_TC"],
         step=0.0,
-        climb_rate=_SHARE[turbulence] * min(made["FW_T_CLMB_R_SP"], made["FW_T_CLMB_MAX"]),
-        sink_rate=_SHARE[turbulence] * min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
-        own_climb_share=_SLOPE_SHARE[turbulence],
-        own_sink_share=_SLOPE_SHARE[turbulence],
+        climb_rate=_RATE_FRACTIONS[turbulence] * min(made["FW_T_CLMB_R_SP"], made["FW_T_CLMB_MAX"]),
+        sink_rate=_RATE_FRACTIONS[turbulence] * min(made["FW_T_SINK_R_SP"], made["FW_T_SINK_MAX"]),
+        own_climb_share=_OWN_RATE_FRACTIONS[turbulence],
+        own_sink_share=_OWN_RATE_FRACTIONS[turbulence],
     )
 
 
 def off_height_chance(acceptance: float, climb: float, sink: float, turbulence: Turbulence) -> float:
-    """Chance (0..1) that gusts have an aircraft further from a waypoint's height than it may be where it arrives there.
+    """Return the probability that gusts carry the aircraft beyond the altitude tolerance at a waypoint.
 
-    acceptance: NAV_FW_ALT_RAD, m.  climb, sink: what the aircraft has in hand, m/s: an up- or downdraft that exceeds it
-    carries the aircraft off until it ends.  Looked at in moderate turbulence alone, 0 in any other.
+    acceptance: NAV_FW_ALT_RAD, m.  climb, sink: spare rates of the aircraft, m/s: an up- or downdraft that exceeds them
+    carries the aircraft off until it ends.  Computed for moderate turbulence only, 0 for any other.
 
     >>> round(off_height_chance(10.0, 4.0, 4.0, "moderate"), 3), off_height_chance(10.0, 4.0, 4.0, "light")
     (0.013, 0.0)
     """
     if turbulence != "moderate":
         return 0.0
-    gust, more = 0.1 * W20[turbulence], acceptance / _GUST_LASTS
-    return 2.0 * _beyond(acceptance / _THROWN) + _beyond((climb + more) / gust) + _beyond((sink + more) / gust)
+    gust, extra_rate = 0.1 * W20[turbulence], acceptance / _GUST_DURATION_S
+    return (
+        2.0 * _exceedance(acceptance / _ALTITUDE_SIGMA_MODERATE_M)
+        + _exceedance((climb + extra_rate) / gust)
+        + _exceedance((sink + extra_rate) / gust)
+    )
 
 
-def _beyond(deviations: float) -> float:
-    """Chance of a normal variable beyond this many standard deviations, to one side."""
+def _exceedance(deviations: float) -> float:
+    """Return the probability that a normal variable exceeds this many standard deviations, on one side."""
     return 0.5 * math.erfc(deviations / math.sqrt(2.0))
 
 
-# How a corner is tracked, m: turned at which distance, how far from its legs, along how much of each.
+# Tracking of a corner, m: turn distance, greatest distance from the legs, affected length of each leg.
 CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 
@@ -118,10 +129,10 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
-    _fill(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
+    _fill_corners(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
     share, more = WIND_SPREAD
     corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
-    # Plans are the same on every machine, and a library's sines are not.
+    # Rounded because plans must be the same on every machine, and sines differ between libraries.
     acceptance, excursion, before, after = (corners[name].round(2) for name in field_names(CORNER_TRACKING))
     for table in (acceptance, excursion, before, after):
         table.setflags(write=False)
@@ -129,7 +140,7 @@ def _corners(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats
 
 
 @compiled
-def _fill(
+def _fill_corners(
     parameters: Record, airspeed: float, turns: Floats, speeds: Floats, corners: Records, waypoints: Records
 ) -> None:  # pragma: no cover - compiled
     """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
@@ -146,42 +157,42 @@ def _fill(
 def _fly_corner(
     parameters: Record, airspeed: float, turn: float, speed: float, waypoints: Records
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Furthest from the two legs, and how far along the second one until it stays near to it, m.
+    """Return the greatest distance from the two legs, and the length of the second until it is settled, m.
 
     The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, PX4_MEMORY)
     estimated, own = motions[0], memories[0]
     east, north = math.sin(turn), math.cos(turn)
-    waypoints[0].north = -_LEG
-    waypoints[2].east, waypoints[2].north = _LEG * east, _LEG * north
-    own.from_north, own.nearest = -_LEG, math.inf
-    way = speed * _STEP
-    estimated.north = -reach_radius(speed, parameters) - _BEFORE
+    waypoints[0].north = -_LEG_LENGTH_M
+    waypoints[2].east, waypoints[2].north = _LEG_LENGTH_M * east, _LEG_LENGTH_M * north
+    own.from_north, own.nearest = -_LEG_LENGTH_M, math.inf
+    step_length = speed * _TIME_STEP_S
+    estimated.north = -reach_radius(speed, parameters) - _RUN_IN_M
     lag = ROLL_LAG * parameters.roll_time
-    left = math.exp(-_STEP / lag)
-    course, side, clock, furthest, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while along < 0.75 * _LEG and clock < 120.0:
+    decay = math.exp(-_TIME_STEP_S / lag)
+    course, lateral_acceleration, clock, excursion, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while along < 0.75 * _LEG_LENGTH_M and clock < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
-        navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, own, _STEP)
+        navigate(estimated, waypoints, 0.0, 0.0, airspeed, parameters, own, _TIME_STEP_S)
         wanted = GRAVITY * math.tan(wanted_bank(own.side_acceleration, parameters))
-        # The lag to the letter, and the way on the mean course.
-        turned = (wanted * _STEP + (side - wanted) * lag * (1.0 - left)) / speed
-        side = wanted + (side - wanted) * left
-        estimated.east += way * math.sin(course + 0.5 * turned)
-        estimated.north += way * math.cos(course + 0.5 * turned)
+        # The exact solution of the lag, and the displacement on the mean course.
+        turned = (wanted * _TIME_STEP_S + (lateral_acceleration - wanted) * lag * (1.0 - decay)) / speed
+        lateral_acceleration = wanted + (lateral_acceleration - wanted) * decay
+        estimated.east += step_length * math.sin(course + 0.5 * turned)
+        estimated.north += step_length * math.cos(course + 0.5 * turned)
         course += turned
-        clock += _STEP
+        clock += _TIME_STEP_S
         along = estimated.east * east + estimated.north * north
-        away = math.hypot(estimated.east, estimated.north)
-        first = abs(estimated.east) if estimated.north < 0.0 else away
-        second = abs(estimated.east * north - estimated.north * east) if along > 0.0 else away
-        furthest = max(furthest, min(first, second))
-        if own.leg == 1 and second > _SETTLED:
+        corner_distance = math.hypot(estimated.east, estimated.north)
+        first = abs(estimated.east) if estimated.north < 0.0 else corner_distance
+        second = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
+        excursion = max(excursion, min(first, second))
+        if own.leg == 1 and second > _SETTLED_CROSS_TRACK_M:
             settled = max(0.0, along)
-        if own.leg == 1 and along > settled + _STAYS * speed:
+        if own.leg == 1 and along > settled + _SETTLED_TIME_S * speed:
             break
-    # Compiled code frees an array after its last use, and a record of it does not count as one.
+    # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     if motions.size + memories.size != 2:
         return math.nan, math.nan
-    return furthest, settled
+    return excursion, settled

@@ -1,4 +1,4 @@
-"""PX4 itself as an autopilot: its program, built for software in the loop, in lockstep with our physics."""
+"""PX4 itself as an autopilot: its SITL program, in lockstep with planfly's physics."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,28 +14,28 @@ from flight.simulation.setup import FlightSetup
 
 @dataclass(frozen=True)
 class Px4Sitl(ProgramAutopilot, Px4):
-    """PX4 itself.  Its law answers what is asked before the flight."""
+    """PX4 itself.  Before the flight its law answers for it."""
 
     log_suffix: ClassVar = ".ulg"
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
-        """With the parameters and the program that a log stores."""
+        """Return the autopilot with the parameters and the program that a log stores."""
         return cls(Px4.restore(stored).parameters, stored.program)
 
     @classmethod
     def recognises(cls, program: Path) -> bool:
-        """By its name, or the start-up files beside it."""
+        """Return True if its name, or start-up files next to it, show that a program is PX4."""
         return program.name.lower().startswith("px4") or startup_files(program) is not None
 
     @classmethod
     def flying(cls, law: Px4, binary: Path) -> Self:
-        """The program in the place of its law."""
+        """Return the program's autopilot in place of its law."""
         return cls(law.parameters, binary=binary)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """None of its own: the servo map is the one that ArduPlane's program needs, and names."""
+        """Return an empty list: it needs only the servo map, which ArduPlane's program reports if missing."""
         return []
 
     @property
@@ -44,12 +44,15 @@ class Px4Sitl(ProgramAutopilot, Px4):
         return Px4(self.parameters)
 
     def store(self) -> StoredAutopilot:
-        """As its law, and the program."""
+        """Return the settings of its law, and the program."""
         return super().store()._replace(program=self.program)
 
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
-        """Start the program.  Raises FlightError for one that does not start, and ParameterError for a bad file."""
-        # Imported here: nobody else needs MAVLink.
+        """Start the program.
+
+        Raise FlightError if it does not start, and ParameterError for a bad file.
+        """
+        # Imported here: only this needs MAVLink.
         from flight.autopilots.px4_sitl.flight import Px4Flight
 
         return Px4Flight(setup, aircraft, self)

@@ -1,4 +1,4 @@
-"""A flight that PX4 itself steers, as a program of its own in lockstep with our physics."""
+"""Flight of PX4 itself, as a program in lockstep with planfly's physics."""
 
 import contextlib
 from collections.abc import Iterator
@@ -22,16 +22,18 @@ from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
 from world.scenario_tables import NEWEST_PX4, Px4Version
 
-# s by the clock: to connect to the simulator, and to run its start-up script.
-_CONNECTS, _STARTS = 30.0, 60.0
-# s by the clock.  A PX4 that has not gone on for so long waits for a step.
-_PATIENCE = 0.2
-# Share of the push along the rail after which it is set on its way.
-_SETS_OUT = 0.9
-# s of its time that it has to close its log.
-_CLOSING = 2.0
+# Timeout to connect to the simulator, s by the clock.
+_CONNECT_TIMEOUT_S = 30.0
+# Timeout of its start-up script, s by the clock.
+_STARTUP_TIMEOUT_S = 60.0
+# A PX4 that has sent no answer for this time waits for a step, s by the clock.
+_STALL_TIME_S = 0.2
+# Fraction of the push along the rail after which mission mode is started.
+_MODE_START_FRACTION = 0.9
+# Time for PX4 to close its log, s of its own time.
+_LOG_CLOSING_TIME_S = 2.0
 # flight_sw_version of the first release that turns by NAV_ACC_RAD alone.
-_WITHOUT_ANTICIPATION = 0x01110000
+_FIRST_WITHOUT_ANTICIPATION = 0x01110000
 
 
 class Px4Flight(SitlFlight):
@@ -53,22 +55,24 @@ class Px4Flight(SitlFlight):
         given = given_parameters(setup, aircraft, parameters)
         super().__init__(setup, aircraft, binary)
         self._setting_out: Iterator[None] = iter(())
-        with contextlib.ExitStack() as stack, self._named():
+        with contextlib.ExitStack() as stack, self._name_program():
             port = stack.enter_context(contextlib.closing(SimulatorPort()))
             link = stack.enter_context(contextlib.closing(UdpLink()))
             self._link = link
             launch = px4_launch(binary, given.given, port.port, link.theirs, link.port)
             process = stack.enter_context(AutopilotProcess(binary, launch))
             self._process, port.watch = process, process.watch
-            lockstep = HilLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._look)
+            lockstep = HilLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
             self._lockstep = lockstep
             self._preflight = Px4Preflight(link, lambda: lockstep.time)
             self._apply_gnss_error()
-            port.connect(_CONNECTS)
-            lockstep.boot(self._rail, partial(_has_started, process), _PATIENCE, _STARTS)
-            self._converse(self._preflight.meet(given.given))
+            port.connect(_CONNECT_TIMEOUT_S)
+            lockstep.boot(self._rail, partial(_has_started, process), _STALL_TIME_S, _STARTUP_TIMEOUT_S)
+            self._hold_during(self._preflight.meet(given.given))
             version: Px4Version = (
-                "1.16" if (link.news.version or _WITHOUT_ANTICIPATION) < _WITHOUT_ANTICIPATION else NEWEST_PX4
+                "1.16"
+                if (link.news.version or _FIRST_WITHOUT_ANTICIPATION) < _FIRST_WITHOUT_ANTICIPATION
+                else NEWEST_PX4
             )
             flown = replace(autopilot.of_release(version), program=_program(link, digest, given))
             self.setup = replace(setup, autopilot=flown)
@@ -76,32 +80,32 @@ class Px4Flight(SitlFlight):
 
     @property
     def last_item(self) -> int:
-        """Items count from 0."""
+        """Number of the last item; items are numbered from 0."""
         return len(self._mission.items) - 1
 
     @property
     def _is_ending(self) -> bool:
-        """Where it circles about its last waypoint: from when it has reached that."""
+        """True once it has reached its last waypoint, if it circles about that, or as in the base class."""
         circles = self._workspace.path["waypoint"]["ends"][self.setup.route.legs]
         return self._link.news.reached >= self.last_item if circles else super()._is_ending
 
     def keep_log(self, target: Path) -> bool:
-        """Have PX4 close its log (.ulg), end it, and move the log to a file; whether there was one."""
+        """Make PX4 close its log (.ulg), end it, and move the log to a file; return True if there was a log."""
         self._preflight.disarm()
-        for _ in range(round(_CLOSING * FRAME_HZ)):
-            if not self._serve():
+        for _ in range(round(_LOG_CLOSING_TIME_S * FRAME_HZ)):
+            if not self._answer_frame():
                 break
         return super().keep_log(target)
 
-    def _get_ready(self) -> None:
-        self._converse(self._preflight.prepare(self._mission))
-        self._push(last=_SETS_OUT)
+    def _prepare_program(self) -> None:
+        self._hold_during(self._preflight.prepare(self._mission))
+        self._push(last=_MODE_START_FRACTION)
         # It answers while it flies on.
         self._setting_out = self._preflight.set_out()
-        self._push(first=_SETS_OUT)
+        self._push(first=_MODE_START_FRACTION)
 
-    def _look(self) -> None:
-        super()._look()
+    def _poll_link(self) -> None:
+        super()._poll_link()
         self._preflight.accompany()
         next(self._setting_out, None)
 
@@ -111,7 +115,7 @@ def _has_started(process: AutopilotProcess) -> bool:
 
 
 def _program(link: AutopilotLink, digest: str, given: GivenParameters) -> AutopilotProgram:
-    """Which program it is, by what it has told."""
+    """Return the program that flew, from its messages."""
     news = link.news
     unknown = given.changed.keys() - news.parameters.keys()
     return AutopilotProgram(

@@ -1,4 +1,4 @@
-"""The parameters that PX4 gets for a flight: the simulation's, the aircraft's, and a person's on top."""
+"""Parameters of PX4 for a flight: from the simulation, the aircraft, and the user on top."""
 
 import math
 from collections.abc import Mapping
@@ -12,11 +12,14 @@ from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.px4_sitl.physics import AILERON, ELEVATOR, RUDDER, THROTTLE
 from flight.simulation.setup import FlightSetup
 
-# CA_SV_CSn_TYPE of what moves about each axis, and PWM_MAIN_FUNCn of the first motor and the first surface.
+# CA_SV_CSn_TYPE of the surface about each axis.
 _SURFACES = {AILERON: 15.0, ELEVATOR: 3.0, RUDDER: 4.0}
-_MOTOR, _SERVO = 101.0, 201.0
+# PWM_MAIN_FUNCn of the first motor.
+_MOTOR_FUNCTION = 101.0
+# PWM_MAIN_FUNCn of the first surface.
+_SERVO_FUNCTION = 201.0
 
-# What our physics and a start in the air need, whatever the aircraft.
+# Parameters for planfly's physics and a start in the air, for any aircraft.
 SIMULATION = {
     # One motor and three surfaces, in the order of the outputs.
     "CA_AIRFRAME": 1.0,
@@ -26,8 +29,8 @@ SIMULATION = {
     "CA_SV_CS0_TRQ_R": 1.0,
     "CA_SV_CS1_TRQ_P": 1.0,
     "CA_SV_CS2_TRQ_Y": 1.0,
-    **{f"PWM_MAIN_FUNC{output + 1}": _SERVO + output for output in _SURFACES},
-    f"PWM_MAIN_FUNC{THROTTLE + 1}": _MOTOR,
+    **{f"PWM_MAIN_FUNC{output + 1}": _SERVO_FUNCTION + output for output in _SURFACES},
+    f"PWM_MAIN_FUNC{THROTTLE + 1}": _MOTOR_FUNCTION,
     # One of each sensor, without delay.
     "EKF2_MULTI_IMU": 0.0,
     "EKF2_MULTI_MAG": 0.0,
@@ -35,12 +38,12 @@ SIMULATION = {
     "SENS_MAG_MODE": 1.0,
     "EKF2_GPS_DELAY": 0.0,
     "SENS_GPS0_DELAY": 0.0,
-    # It is held in MANUAL on the rail, by us as a joystick; no link that falls silent ends a flight.
+    # It is held in MANUAL on the rail, with planfly as its joystick; no lost link ends a flight.
     "COM_RC_IN_MODE": 1.0,
     "COM_RC_OVERRIDE": 0.0,
     "NAV_RCL_ACT": 0.0,
     "NAV_DLL_ACT": 0.0,
-    # How empty a battery is ends none either: the verdict judges energy.
+    # No battery failsafe ends a flight: the verdict judges energy.
     "CBRK_SUPPLY_CHK": 894281.0,
     "COM_LOW_BAT_ACT": 0.0,
     "COM_FLTT_LOW_ACT": 0.0,
@@ -49,17 +52,17 @@ SIMULATION = {
     # It starts and ends in the air.
     "MIS_TKO_LAND_REQ": 0.0,
     "MIS_DIST_1WP": 100_000.0,
-    # Its log is from arming to disarming.
+    # Its log lasts from arming to disarming.
     "SDLOG_MODE": 0.0,
     "SDLOG_PROFILE": 1.0,
-    # The rudder turns in with the wing, and little more.
+    # The rudder coordinates turns, and does little more.
     "FW_YR_FF": 0.1,
     "FW_YR_P": 0.05,
     "FW_YR_I": 0.05,
 }
-# ArduPlane's gains of an aircraft that are PX4's by another name.  ArduPlane's give degrees of 45 by degrees a second,
-# PX4's shares of the throw by radians a second; both count at cruise speed.
-_GAINS = {
+# ArduPlane's gains of an aircraft that PX4 has under another name.  ArduPlane's give degrees, of 45, per degree a
+# second, PX4's fractions of the throw per radian a second; both apply at cruise speed.
+_GAIN_NAMES = {
     "RLL_RATE_FF": "FW_RR_FF",
     "RLL_RATE_P": "FW_RR_P",
     "RLL_RATE_I": "FW_RR_I",
@@ -67,8 +70,8 @@ _GAINS = {
     "PTCH_RATE_P": "FW_PR_P",
     "PTCH_RATE_I": "FW_PR_I",
 }
-_BY_RADIANS = math.degrees(1.0) / 45.0
-# A person's parameters that say how an aircraft flies begin so; others belong to the hardware that they were read from.
+_GAIN_FACTOR = math.degrees(1.0) / 45.0
+# Prefixes of the user's parameters for flight; others belong to the hardware of the file.
 FLYING = ("FW_", "NPFG_", "NAV_ACC_RAD", "NAV_FW_", "NAV_LOITER_RAD", "NAV_MIN_", "RTL_", "MIS_", "WEIGHT_", "CS_")
 
 
@@ -76,9 +79,9 @@ FLYING = ("FW_", "NPFG_", "NAV_ACC_RAD", "NAV_FW_", "NAV_LOITER_RAD", "NAV_MIN_"
 class GivenParameters:
     """Parameters by name.
 
-    given: all that PX4 gets over its own defaults.
-    changed: of those the person's, where they differ from the aircraft's or are not among them.
-    unused: the person's that belong to other hardware.
+    given: all parameters that PX4 gets in addition to its own defaults.
+    changed: the user's among them, if they differ from the aircraft's or the aircraft has none.
+    unused: the user's parameters that belong to other hardware.
     """
 
     given: Mapping[str, float]
@@ -87,9 +90,9 @@ class GivenParameters:
 
 
 def given_parameters(setup: FlightSetup, aircraft: Aircraft, made: Px4Parameters) -> GivenParameters:
-    """Put the parameters of a flight together.  Raises ParameterError for a bad file.
+    """Collect the parameters of a flight.
 
-    The mission's speed is the cruise speed, unless the person has one.
+    The mission's speed is the cruise speed, unless the user states one.  Raise ParameterError for a bad file.
     """
     file = setup.scenario.flight.params
     own = {} if file is None else {name: entry.value for name, entry in read_parameter_file(Path(file)).items()}
@@ -106,11 +109,13 @@ def given_parameters(setup: FlightSetup, aircraft: Aircraft, made: Px4Parameters
 
 
 def rate_gains(aircraft: Aircraft) -> dict[str, float]:
-    """Gains of the rate controllers, from those that the aircraft's folder has for ArduPlane.  Raises ParameterError.
+    """Return the gains of the rate controllers, from the aircraft's gains for ArduPlane.
+
+    Raise ParameterError for a bad file.
 
     >>> from aircraft.catalog import load_aircraft
     >>> round(rate_gains(load_aircraft("aerosonde"))["FW_RR_FF"], 2)
     0.33
     """
     stated = read_parameter_file(aircraft.folder / AIRCRAFT_FILE)
-    return {name: stated[old].value * _BY_RADIANS for old, name in _GAINS.items() if old in stated}
+    return {name: stated[old].value * _GAIN_FACTOR for old, name in _GAIN_NAMES.items() if old in stated}

@@ -1,8 +1,8 @@
-"""PX4's simulator link in lockstep: the sensors that it is sent, the socket, and the exchange.
+"""PX4's simulator link in lockstep: sensor messages, the socket, and the exchange.
 
-PX4 connects to the simulator by TCP and speaks MAVLink.  Each HIL_SENSOR sets its clock and has it step; once its
-outputs run, it answers each with one HIL_ACTUATOR_CONTROLS.  Facts of PX4's
-`src/modules/simulation/simulator_mavlink/SimulatorMavlink.cpp` and of docs.px4.io, "Simulator MAVLink API".
+PX4 connects to the simulator by TCP with MAVLink.  Each HIL_SENSOR sets its clock and triggers a step; once its outputs
+run, it answers each with one HIL_ACTUATOR_CONTROLS.  Follows PX4's
+`src/modules/simulation/simulator_mavlink/SimulatorMavlink.cpp` and docs.px4.io, "Simulator MAVLink API".
 """
 
 import math
@@ -34,20 +34,29 @@ from world.errors import FlightError
 from world.running_clock import RunningClock
 
 # ----------------------------------------------------------------------
-# What its sensors measure.
+# Sensor messages.
 
-# Of every sensor, in HIL_SENSOR.fields_updated.
-_ALL = 0x1FFF
-_FIX_3D, _SATELLITES = 3, 12
-# m.  Of a receiver's place, which is exact but for what the flight's navigation mistakes.
-_ACCURACY = 0.9
-# PX4 takes a value that never changes for a broken sensor, and one on the rail would not: a little more than PX4's
-# quantum is added, of numbers that are the same in each flight.  Gauss, m/s^2, rad/s, hPa.
-_DITHER_FIELD, _DITHER_FORCE, _DITHER_RATE, _DITHER_PRESSURE = 2e-4, 6e-3, 1.5e-3, 5e-3
+# HIL_SENSOR.fields_updated for every sensor.
+_ALL_FIELDS = 0x1FFF
+# GNSS fix type: three-dimensional.
+_FIX_3D = 3
+# Number of satellites.
+_SATELLITE_COUNT = 12
+# Stated accuracy of the GNSS position, m; the position is exact except for the error of the flight's navigation.
+_GNSS_ACCURACY_M = 0.9
+# PX4 treats a sensor whose value never changes as broken, and on the rail no value changes.  So noise of a little more
+# than PX4's quantum is added, the same in each flight: to the magnetic field ...
+_FIELD_NOISE_GAUSS = 2e-4
+# ... the specific force ...
+_FORCE_NOISE_MPS2 = 6e-3
+# ... the angular rate ...
+_RATE_NOISE_RADPS = 1.5e-3
+# ... and the pressure.
+_PRESSURE_NOISE_HPA = 5e-3
 
 
 def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
-    """The Earth's magnetic field north, east and down, gauss, of the tables that pymavlink brings along.
+    """Return the Earth's magnetic field north, east and down, gauss, from pymavlink's tables.
 
     >>> north, east, down = earth_field(47.4, 8.5)
     >>> round(north, 2), abs(east) < 0.03, round(down, 2)
@@ -60,7 +69,9 @@ def earth_field(lat_deg: float, lon_deg: float) -> tuple[float, float, float]:
 
 
 def atmosphere(amsl: float) -> tuple[float, float, float]:
-    """Pressure (Pa), temperature (K) and density (kg/m^3) of the international standard atmosphere (ISO 2533), m AMSL.
+    """Return pressure (Pa), temperature (K) and density (kg/m^3) of the standard atmosphere (ISO 2533).
+
+    amsl: m.
 
     >>> [round(value, 3) for value in atmosphere(1000.0)]
     [89874.563, 281.65, 1.112]
@@ -71,9 +82,9 @@ def atmosphere(amsl: float) -> tuple[float, float, float]:
 
 
 class Sensors:
-    """The messages about an aircraft's motion.
+    """Sensor messages for an aircraft's motion.
 
-    home: what the motion's positions count from.
+    home: origin of the motion's positions.
     """
 
     def __init__(self, home: Home) -> None:
@@ -82,31 +93,31 @@ class Sensors:
         self._random = random.Random(1)
 
     def measured(self, motion: BodyMotion) -> Any:
-        """HIL_SENSOR: inertial sensors, magnetometer, barometer and Pitot tube."""
+        """Return HIL_SENSOR: inertial sensors, magnetometer, barometer and Pitot tube."""
         dither = self._random.uniform
         field = to_body((motion.roll, motion.pitch, motion.yaw), self._field)
         pressure, temperature, density = atmosphere(self._home[2] - motion.down)
         return mavlink.MAVLink_hil_sensor_message(
             round(motion.time * 1e6),
-            motion.force_x + dither(-_DITHER_FORCE, _DITHER_FORCE),
-            motion.force_y + dither(-_DITHER_FORCE, _DITHER_FORCE),
-            motion.force_z + dither(-_DITHER_FORCE, _DITHER_FORCE),
-            motion.roll_rate + dither(-_DITHER_RATE, _DITHER_RATE),
-            motion.pitch_rate + dither(-_DITHER_RATE, _DITHER_RATE),
-            motion.yaw_rate + dither(-_DITHER_RATE, _DITHER_RATE),
-            field[0] + dither(-_DITHER_FIELD, _DITHER_FIELD),
-            field[1] + dither(-_DITHER_FIELD, _DITHER_FIELD),
-            field[2] + dither(-_DITHER_FIELD, _DITHER_FIELD),
-            pressure / 100.0 + dither(-_DITHER_PRESSURE, _DITHER_PRESSURE),
+            motion.force_x + dither(-_FORCE_NOISE_MPS2, _FORCE_NOISE_MPS2),
+            motion.force_y + dither(-_FORCE_NOISE_MPS2, _FORCE_NOISE_MPS2),
+            motion.force_z + dither(-_FORCE_NOISE_MPS2, _FORCE_NOISE_MPS2),
+            motion.roll_rate + dither(-_RATE_NOISE_RADPS, _RATE_NOISE_RADPS),
+            motion.pitch_rate + dither(-_RATE_NOISE_RADPS, _RATE_NOISE_RADPS),
+            motion.yaw_rate + dither(-_RATE_NOISE_RADPS, _RATE_NOISE_RADPS),
+            field[0] + dither(-_FIELD_NOISE_GAUSS, _FIELD_NOISE_GAUSS),
+            field[1] + dither(-_FIELD_NOISE_GAUSS, _FIELD_NOISE_GAUSS),
+            field[2] + dither(-_FIELD_NOISE_GAUSS, _FIELD_NOISE_GAUSS),
+            pressure / 100.0 + dither(-_PRESSURE_NOISE_HPA, _PRESSURE_NOISE_HPA),
             0.5 * density * motion.airspeed**2 / 100.0,
             self._home[2] - motion.down,
             temperature - 273.15,
-            _ALL,
+            _ALL_FIELDS,
             0,
         )
 
     def fix(self, motion: BodyMotion) -> Any:
-        """HIL_GPS."""
+        """Return HIL_GPS."""
         lat, lon = place_on_sphere(motion.north, motion.east, self._home[0], self._home[1])
         north, east, down = motion.velocity_north, motion.velocity_east, motion.velocity_down
         return mavlink.MAVLink_hil_gps_message(
@@ -115,19 +126,19 @@ class Sensors:
             round(math.degrees(lat) * 1e7),
             round(math.degrees(lon) * 1e7),
             round((self._home[2] - motion.down) * 1e3),
-            round(_ACCURACY * 100.0),
-            round(_ACCURACY * 100.0),
+            round(_GNSS_ACCURACY_M * 100.0),
+            round(_GNSS_ACCURACY_M * 100.0),
             round(math.hypot(north, east) * 100.0),
             round(north * 100.0),
             round(east * 100.0),
             round(down * 100.0),
             round(math.degrees(math.atan2(east, north)) % 360.0 * 100.0) % 36000,
-            _SATELLITES,
+            _SATELLITE_COUNT,
         )
 
 
 def between(before: BodyMotion, after: BodyMotion) -> BodyMotion:
-    """The motion half way from one to another; the courses of both differ by less than half a turn."""
+    """Return the motion half way between two; their courses must differ by less than half a turn."""
     middle = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
     made = BodyMotion(*middle)
     return made._replace(yaw=before.yaw + 0.5 * math.remainder(after.yaw - before.yaw, 2.0 * math.pi))
@@ -136,16 +147,17 @@ def between(before: BodyMotion, after: BodyMotion) -> BodyMotion:
 # ----------------------------------------------------------------------
 # The socket.
 
-_LARGEST = 65536
-# How often (s) a wait looks whether the program still runs.
-_LOOK = 0.25
+# Size of the receive buffer.
+_MAX_RECEIVE_BYTES = 65536
+# Interval at which a wait checks whether the program still runs, s.
+_CHECK_INTERVAL_S = 0.25
 
 
 class SimulatorPort:
-    """The socket that PX4 connects to.
+    """Socket to which PX4 connects.
 
     port: its number.
-    watch: called while nothing comes; raises FlightError where the program has ended.
+    watch: called while nothing arrives; raises FlightError if the program has ended.
     """
 
     def __init__(self) -> None:
@@ -159,7 +171,7 @@ class SimulatorPort:
         self._mav.robust_parsing = True
         self._answers: list[tuple[float, ...]] = []
         self._wait = 0.0
-        # A sleeping laptop is no silence.
+        # A sleeping laptop is not a silent program.
         self._clock = RunningClock()
 
     def close(self) -> None:
@@ -169,8 +181,11 @@ class SimulatorPort:
             self._stream.close()
 
     def connect(self, seconds: float) -> None:
-        """Wait until PX4 has connected.  Raises FlightError for one that ends, or does not within so many seconds."""
-        self._listener.settimeout(_LOOK)
+        """Wait until PX4 has connected.
+
+        Raise FlightError for a program that ends, or does not connect within a time, s.
+        """
+        self._listener.settimeout(_CHECK_INTERVAL_S)
         began = self._clock()
         while self._stream is None:
             try:
@@ -184,7 +199,7 @@ class SimulatorPort:
         self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def packed(self, *messages: Any) -> bytes:
-        """Messages together, as they are sent."""
+        """Return messages packed together for sending."""
         return b"".join(message.pack(self._mav) for message in messages)
 
     def send(self, data: bytes) -> None:
@@ -194,45 +209,48 @@ class SimulatorPort:
         try:
             self._stream.sendall(data)
         except OSError:
-            # Nobody is there any more: the next wait finds out why.
+            # The program is gone: the next wait finds out why.
             return
 
     def answer(self, patience: float) -> tuple[float, ...] | None:
-        """HIL_ACTUATOR_CONTROLS.controls (16,), or None where none comes within so many seconds by the clock.
+        """Return HIL_ACTUATOR_CONTROLS.controls (16,), or None if none arrives in time, s by the clock.
 
-        Raises FlightError for a program that ends.
+        Raise FlightError for a program that ends.
         """
         if not self._answers and not (self._read(patience) and self._answers):
             began = self._clock()
             while not self._answers:
                 if not self._read(patience):
                     self.watch()
-                    if patience <= _LOOK or self._clock() - began > patience:
+                    if patience <= _CHECK_INTERVAL_S or self._clock() - began > patience:
                         return None
         return self._answers.pop(0)
 
     def awaited_answer(self) -> tuple[float, ...]:
-        """The same from a PX4 whose outputs run: every step has its answer.  Raises FlightError for one without."""
+        """Return the answer of a PX4 whose outputs run, which answers every step.
+
+        Raise FlightError if there is no answer.
+        """
         answer = self.answer(SILENCE)
         if answer is None:
             raise FlightError(f"silent for {SILENCE:.0f} s; ended", field="simulator")
         return answer
 
     def _read(self, patience: float) -> bool:
-        """Take in what comes within so many seconds, or `_LOOK` if that is less; whether anything did."""
+        """Read what arrives within a time, s, at most `_CHECK_INTERVAL_S`; return True if anything did."""
         if self._stream is None:
             raise ValueError("PX4 has not connected")
-        wait = min(patience, _LOOK)
+        wait = min(patience, _CHECK_INTERVAL_S)
         if wait != self._wait:
-            # The kernel's own timeout: one system call an answer.
+            # The kernel's own timeout: one system call per answer.
             self._wait = wait
             self._stream.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("@ll", 0, round(wait * 1e6)))
         try:
-            data = self._stream.recv(_LARGEST)
+            data = self._stream.recv(_MAX_RECEIVE_BYTES)
         except (BlockingIOError, ConnectionResetError):
             return False
         if not data:
-            # Closed by the other side: it is ending.
+            # The other side closed it: the program is ending.
             return False
         try:
             messages = self._mav.parse_buffer(data) or []
@@ -245,26 +263,29 @@ class SimulatorPort:
 
 
 def _nothing() -> None:
-    """Watch nothing."""
+    """Do nothing: the default of `watch`."""
 
 
 # ----------------------------------------------------------------------
 # The exchange.
 
-# Frames from one fix of the satellites to the next: a tenth of a second.
+# Frames between two GNSS fixes: a tenth of a second.
 _FIX_FRAMES = 12
-# The outputs, in the order of PWM_MAIN_FUNC1..4.
-AILERON, ELEVATOR, RUDDER, THROTTLE = range(4)
-# Until its estimator runs PX4 answers every fifth step or so; from so many answers in a row on it answers each.
-_IN_A_ROW = 50
-# s by the clock.  Before that, a step without an answer by then is followed by the next.
-_FIRST_ANSWER = 0.01
+# Channels of the outputs, in the order of PWM_MAIN_FUNC1..4.
+AILERON = 0
+ELEVATOR = 1
+RUDDER = 2
+THROTTLE = 3
+# Until its estimator runs PX4 answers about every fifth step; after this many answers in a row it answers each.
+_RUNNING_ANSWER_COUNT = 50
+# Before that, a step without an answer in this time is followed by the next step, s by the clock.
+_EARLY_ANSWER_TIMEOUT_S = 0.01
 
 
 class HilLockstep(Lockstep):
-    """The exchange over that socket: two steps of PX4, which samples its sensors at 250 Hz, in each frame.
+    """Exchange over that socket: two steps of PX4, which samples its sensors at 250 Hz, in each frame.
 
-    servos: which output moves what; the throw of each is PX4's -1..1 (throttle 0..1).  The others as of `Lockstep`.
+    servos: outputs of the controls; the throw of each is PX4's -1..1 (throttle 0..1).  The others as in `Lockstep`.
     """
 
     def __init__(
@@ -281,34 +302,34 @@ class HilLockstep(Lockstep):
         self._sensors = Sensors(home)
         self._before: BodyMotion | None = None
         self._answered = 0
-        # The last answer, and whether a step was taken since.
+        # The last answer, and True while a step has no answer yet.
         self._last: tuple[float, ...] = (0.0,) * 4
         self._flown: tuple[float, ...] = self._last
         self._owes = False
 
     @property
     def _running(self) -> bool:
-        """Whether each step has its answer."""
-        return self._answered >= _IN_A_ROW
+        """True if PX4 answers every step."""
+        return self._answered >= _RUNNING_ANSWER_COUNT
 
     def _outputs(self) -> tuple[float, ...]:
-        """The answer to the last step; zeros where there is none yet."""
+        """Return the answer to the last step; zeros before the first answer."""
         if self._owes:
-            answer = self._port.awaited_answer() if self._running else self._port.answer(_FIRST_ANSWER)
+            answer = self._port.awaited_answer() if self._running else self._port.answer(_EARLY_ANSWER_TIMEOUT_S)
             self._answered = 0 if answer is None else self._answered + 1
             self._last, self._owes = answer or self._last, False
         return self._last
 
     def _send(self, data: bytes) -> None:
-        """Have it step."""
+        """Trigger a step of PX4."""
         self._port.send(data)
         self._owes = True
 
     def boot(self, rail: RailEnd, started: Callable[[], bool], patience: float, seconds: float) -> None:
-        """Have PX4 start with its clock standing still: a step only where it waits for one.
+        """Start PX4 with its clock at rest: it gets a step only where it waits for one.
 
-        started: whether its start-up script has ended.  patience: s by the clock without an answer until a step.
-        Raises FlightError where it does not end within so many seconds by the clock.
+        started: returns True once its start-up script has ended.  patience: s by the clock without an answer before a
+        step.  Raise FlightError if the script does not end within ``seconds`` by the clock.
         """
         clock = RunningClock()
         began = clock()
@@ -318,7 +339,7 @@ class HilLockstep(Lockstep):
             if self._port.answer(patience) is None:
                 self.hold(rail)
 
-    def _take(self) -> Commands:
+    def _receive_commands(self) -> Commands:
         outputs, servos = self._flown, self._servos
         return Commands(
             servos.elevator.at_share(outputs[ELEVATOR]),
@@ -327,12 +348,12 @@ class HilLockstep(Lockstep):
             servos.throttle.at_share(2.0 * outputs[THROTTLE] - 1.0),
         )
 
-    def _tell(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
+    def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
         after = BodyMotion(*motion)
         before = self._before or after._replace(time=after.time - 1.0 / FRAME_HZ)
         self._before = after
         data = self._port.packed(self._sensors.measured(between(before, after)))
-        # Its second step of the frame before, of which it has computed while JSBSim made this one.
+        # PX4's second step of the previous frame, which it has computed while JSBSim made this frame.
         self._outputs()
         self._send(data)
         # Packed while PX4 computes that step.

@@ -1,4 +1,4 @@
-"""What PX4 is told before it flies: parameters, mission, home, arming, and its mission mode on the rail."""
+"""Preparation of PX4 before it flies: parameters, mission, home, arming, and mission mode on the rail."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -11,68 +11,80 @@ from flight.live.mission_server import MissionType
 from flight.mission.items import Command, MissionItem
 from world.errors import FlightError
 
-# PX4's numbers of its modes: the main one, and of AUTO the sub-mode, as a heartbeat packs them.
-_MANUAL, _AUTO, _MISSION = 1, 4, 4
+# PX4's number of the main mode MANUAL.
+_MANUAL = 1
+# PX4's number of the main mode AUTO.
+_AUTO = 4
+# PX4's number of the sub-mode MISSION of AUTO.
+_MISSION = 4
+# Mission mode as in a heartbeat: main mode and sub-mode.
 MISSION_MODE = _AUTO << 16 | _MISSION << 24
-# Messages that are wanted, and how often, microseconds.
-_WANTED = {mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 200_000, mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 100_000}
+# Requested messages, with their intervals in microseconds.
+_MESSAGE_INTERVALS_US = {
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 200_000,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 100_000,
+}
 # Forces disarming in the air.
-_FORCE = 21196
-# Of a version that is no release, FIRMWARE_VERSION_TYPE in its last byte.
-_KINDS = {0: " (development)", 64: " (alpha)", 128: " (beta)", 192: " (release candidate)"}
+_FORCE_DISARMING = 21196
+# FIRMWARE_VERSION_TYPE in the last byte of a version that is not a release.
+_VERSION_TYPES = {0: " (development)", 64: " (alpha)", 128: " (beta)", 192: " (release candidate)"}
 
 
 class Px4Preflight(Conversation):
     """The conversation with one PX4."""
 
     def meet(self, parameters: Iterable[str]) -> Talk:
-        """Learn who it is and which of these parameters it has; raises FlightError for what is no PX4."""
-        yield from self._introduce("PX4", _WANTED, parameters)
+        """Identify it, and read the given parameters as far as it has them.
+
+        Raise FlightError if it is not PX4.
+        """
+        yield from self._identify("PX4", _MESSAGE_INTERVALS_US, parameters)
         if self._news.autopilot != mavlink.MAV_AUTOPILOT_PX4:
-            told, allowed = self._news.autopilot, f"{mavlink.MAV_AUTOPILOT_PX4}, PX4, is expected"
-            message = f"is no PX4: its heartbeat says autopilot {told}; {allowed}"
-            raise FlightError(message, field="autopilot", value=told, allowed=allowed)
+            autopilot, allowed = self._news.autopilot, f"{mavlink.MAV_AUTOPILOT_PX4}, PX4, is expected"
+            message = f"is no PX4: its heartbeat says autopilot {autopilot}; {allowed}"
+            raise FlightError(message, field="autopilot", value=autopilot, allowed=allowed)
 
     def prepare(self, mission: UploadedMission) -> Talk:
-        """Wait until it knows where it is, hand over the mission, and arm it in MANUAL.
+        """Wait until it has a position, upload the mission, and arm it in MANUAL.
 
-        In any other mode its height control would wind up on the rail.  Raises FlightError where it does not come to
-        know, or refuses.
+        In any other mode its TECS would wind up on the rail.  Raise FlightError if it finds no position, or refuses.
         """
         estimator = mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
-        yield from self._knows_its_place(estimator, _WANTED[estimator])
+        yield from self._wait_for_position(estimator, _MESSAGE_INTERVALS_US[estimator])
         yield from self._upload(counted_from_0(mission.items), MissionType.MISSION)
         if mission.rally:
             yield from self._upload(list(mission.rally), MissionType.RALLY)
-        yield from self._obeys(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
-        yield from self._obeys(Command.DO_SET_MODE, lambda: self._set_mode(_MANUAL, 0), "MANUAL")
-        yield from self._obeys(
+        yield from self._send_until_accepted(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
+        yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_MANUAL, 0), "MANUAL")
+        yield from self._send_until_accepted(
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
             lambda: self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1),
             "arming",
         )
 
     def set_out(self) -> Talk:
-        """Set it on its way; raises FlightError where it refuses."""
-        yield from self._obeys(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
+        """Start its mission mode; raise FlightError if it refuses."""
+        yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
         under_way = Awaited("MISSION", ANSWERS, "is not in its mission mode, armed")
-        yield from self._until(lambda: self._news.mode == MISSION_MODE and self._news.armed, under_way)
+        yield from self._wait_until(lambda: self._news.mode == MISSION_MODE and self._news.armed, under_way)
 
     def accompany(self) -> None:
-        """Tell it that a station is there, to which it answers, and of its joystick at rest, throttle closed."""
-        self._say_hello()
+        """Send a heartbeat, to which it answers, and joystick inputs at rest with closed throttle."""
+        self._send_heartbeat()
         self._link.send(mavlink.MAVLink_manual_control_message(SYSTEM, 0, 0, 0, 0, 0))
 
     def disarm(self) -> None:
-        """Have it disarm, which closes its log."""
-        self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE)
+        """Disarm it, which closes its log."""
+        self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE_DISARMING)
 
     def _set_mode(self, main: int, sub: int) -> None:
         self._command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
 
 
 def counted_from_0(items: Iterable[MissionItem]) -> list[MissionItem]:
-    """A mission's items, which ArduPlane counts from 1, as PX4 counts them: it keeps home elsewhere.
+    """Return a mission's items numbered as in PX4: from 0, as PX4 stores home separately.
+
+    ArduPlane numbers them from 1.
 
     >>> jump = MissionItem(3, Command.DO_JUMP, 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
     >>> counted_from_0([jump])[0].seq, counted_from_0([jump])[0].params[:2]
@@ -89,12 +101,12 @@ def counted_from_0(items: Iterable[MissionItem]) -> list[MissionItem]:
 
 
 def version_text(number: int | None) -> str:
-    """What a PX4 calls itself, by AUTOPILOT_VERSION.flight_sw_version.
+    """Return PX4's name and version, from AUTOPILOT_VERSION.flight_sw_version.
 
     >>> version_text(0x011000FF), version_text(0x01110080), version_text(None)
     ('PX4 1.16.0', 'PX4 1.17.0 (beta)', 'PX4, version unknown')
     """
     if number is None:
         return "PX4, version unknown"
-    kind = "" if number & 255 == 255 else _KINDS.get(number & 192, "")
+    kind = "" if number & 255 == 255 else _VERSION_TYPES.get(number & 192, "")
     return f"PX4 {number >> 24 & 255}.{number >> 16 & 255}.{number >> 8 & 255}{kind}"

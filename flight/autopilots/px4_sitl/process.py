@@ -1,4 +1,4 @@
-"""PX4's program: what stands in the folder that it starts in, and how it is started there."""
+"""Start of PX4's program: the files in its folder, and its command line."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -11,32 +11,34 @@ from world.errors import FlightError
 # Folder of the start-up files, next to the program or one folder above it, as a build leaves it.
 STARTUP = "etc"
 # The script in that folder that starts the program.
-_SCRIPT = Path("init.d-posix", "rcS")
-# Of our airframe, among PX4's own.
-_AIRFRAME = 22000
-# Its start-up script's last words.
+_STARTUP_SCRIPT = Path("init.d-posix", "rcS")
+# Number of planfly's airframe, among PX4's own.
+_AIRFRAME_ID = 22000
+# Last line of its start-up script.
 STARTED = "Startup script returned successfully"
-# What it puts into the system's folder of temporary files, whichever is set, named by its instance.
-_TEMPORARY, _LEFT = Path("/tmp"), ("px4_lock-", "px4-sock-")
+# Folder in which it creates temporary files, whatever the system's setting.
+_TEMPORARY_FOLDER = Path("/tmp")
+# Prefixes of these files, before the number of its instance.
+_TEMPORARY_PREFIXES = ("px4_lock-", "px4-sock-")
 
 
 def startup_files(program: Path) -> Path | None:
     """Return the folder of a program's start-up files, or None if there is none."""
     folder = program.resolve().parent
     places = (folder / STARTUP, folder.parent / STARTUP)
-    return next((place for place in places if (place / _SCRIPT).is_file()), None)
+    return next((place for place in places if (place / _STARTUP_SCRIPT).is_file()), None)
 
 
 def px4_launch(
     binary: Path, parameters: Mapping[str, float], simulator_port: int, own_port: int, link_port: int
 ) -> Callable[[Path], Launch]:
-    """How PX4's program is started in a folder.
+    """Return a function that prepares a folder for PX4's program and returns its command line.
 
     parameters: by name.
-    simulator_port: on this machine, where it finds the physics (TCP).
-    own_port, link_port: where it listens for MAVLink, and where it sends it to (UDP).
+    simulator_port: port on this machine of the physics (TCP).
+    own_port, link_port: ports on which it receives MAVLink, and to which it sends it (UDP).
 
-    Raises FlightError for a program without its start-up files.
+    Raise FlightError for a program without its start-up files.
     """
     source = startup_files(binary)
     if source is None:
@@ -46,7 +48,7 @@ def px4_launch(
     def prepare(folder: Path) -> Launch:
         scripts = Path(shutil.copytree(source, folder / STARTUP)) / "init.d-posix"
         lines = [". ${R}etc/init.d/rc.fw_defaults", *(f"param set {k} {v:.9g}" for k, v in parameters.items())]
-        _write(scripts / "airframes" / f"{_AIRFRAME}_planfly", *lines)
+        _write(scripts / "airframes" / f"{_AIRFRAME_ID}_planfly", *lines)
         _write(
             scripts / "px4-rc.simulator",
             "param set MAV_SYS_ID 1",
@@ -54,9 +56,9 @@ def px4_launch(
             f"simulator_mavlink start -c {simulator_port}",
         )
         _write(scripts / "px4-rc.mavlink", f"mavlink start -x -u {own_port} -o {link_port} -t {LOOPBACK} -r 4000000 -f")
-        # Of several instances on a machine each has a number; a port is nobody else's.
-        environment = {"PX4_SYS_AUTOSTART": str(_AIRFRAME), "PX4_SIM_MODEL": "planfly"}
-        leaves = tuple(_TEMPORARY / f"{name}{simulator_port}" for name in _LEFT)
+        # Each instance on a machine needs a number of its own; a port number is unique.
+        environment = {"PX4_SYS_AUTOSTART": str(_AIRFRAME_ID), "PX4_SIM_MODEL": "planfly"}
+        leaves = tuple(_TEMPORARY_FOLDER / f"{name}{simulator_port}" for name in _TEMPORARY_PREFIXES)
         return Launch(("-d", "-i", str(simulator_port), "-w", str(folder)), environment, "log/**/*.ulg", leaves)
 
     return prepare

@@ -1,7 +1,7 @@
-"""What an autopilot is told before it flies, in order, while the physics holds the aircraft on its rail.
+"""Conversation with a SITL autopilot before it flies, with the aircraft held on its rail.
 
-A conversation is a generator: each time it is resumed a little more of the autopilot's time has passed, and it takes
-what has been told meanwhile.
+A conversation is a generator.  Each time it is resumed, some more of the autopilot's time has passed, and the link has
+taken in what the autopilot has sent.
 """
 
 import time
@@ -18,15 +18,21 @@ from world.errors import FlightError
 Talk = Generator[None, None, None]
 
 SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
-# How long (s of its own time) an autopilot may take: to speak, to know where it is, to answer, to take a mission.
-SPEAKS, KNOWS, ANSWERS, TAKES = 30.0, 60.0, 5.0, 30.0
-# Asked for again after so long, s.
+# Timeout for the first heartbeat, s of the autopilot's time.
+SPEAKS = 30.0
+# Timeout for the position estimate, s of the autopilot's time.
+KNOWS = 60.0
+# Timeout for a reply, s of the autopilot's time.
+ANSWERS = 5.0
+# Timeout for the upload of a mission, s of the autopilot's time.
+TAKES = 30.0
+# Interval between repeated requests, s of the autopilot's time.
 AGAIN = 1.0
-# Messages take their time by the clock, however fast the autopilot's goes: at least so long is waited, s.
-_BY_THE_CLOCK = 0.5
-# Parameters that are asked for at a time: ArduPilot keeps no more than some twenty questions.
-_AT_ONCE = 10
-_EKF_NEEDED = (
+# Minimum wait by the clock, s: messages take real time, however fast the autopilot's time runs.
+_MIN_REAL_TIME_S = 0.5
+# Number of parameters in one request: ArduPilot queues no more than some twenty requests.
+_PARAMETERS_PER_REQUEST = 10
+_REQUIRED_EKF_FLAGS = (
     mavlink.ESTIMATOR_ATTITUDE
     | mavlink.ESTIMATOR_VELOCITY_HORIZ
     | mavlink.ESTIMATOR_VELOCITY_VERT
@@ -36,23 +42,23 @@ _EKF_NEEDED = (
 _MISSION_RESULTS = {number: entry.name for number, entry in mavlink.enums["MAV_MISSION_RESULT"].items()}
 
 
-class _Since:
-    """Time since a moment, of the autopilot and by the clock."""
+class _Stopwatch:
+    """Time since a moment, in the autopilot's time and by the clock."""
 
     def __init__(self, now: Callable[[], float], clock: Callable[[], float]) -> None:
         self._now, self._clock = now, clock
         self._moments = now(), clock()
 
     def longer_than(self, seconds: float) -> bool:
-        """Whether more of the autopilot's time has passed, and enough by the clock."""
+        """Return True if more of the autopilot's time has passed, and enough by the clock."""
         began, by_clock = self._moments
-        return self._now() - began > seconds and self._clock() - by_clock > min(seconds, _BY_THE_CLOCK)
+        return self._now() - began > seconds and self._clock() - by_clock > min(seconds, _MIN_REAL_TIME_S)
 
 
 class Awaited(NamedTuple):
-    """Something that an autopilot has to come to.
+    """A state that an autopilot has to reach.
 
-    field: its name.  seconds: within so many.  failed: what is said where it does not.
+    field: its name.  seconds: timeout.  failed: message after the timeout.
     """
 
     field: str
@@ -63,7 +69,7 @@ class Awaited(NamedTuple):
 class Conversation:
     """The conversation with one autopilot.
 
-    link: to it.  now: its own time, s.  clock: anybody's, s.
+    link: to the autopilot.  now: the autopilot's time, s.  clock: real time, s.
     """
 
     def __init__(
@@ -72,14 +78,15 @@ class Conversation:
         self._link, self._now, self._clock = link, now, clock
         self._news = link.news
 
-    def _introduce(self, kind: str, wanted: dict[int, int], parameters: Iterable[str]) -> Talk:
-        """Learn which of these parameters it has, and have it tell what is wanted; FlightError for no fixed wing.
+    def _identify(self, kind: str, wanted: dict[int, int], parameters: Iterable[str]) -> Talk:
+        """Identify the autopilot, request messages, and read the given parameters, as far as it has them.
 
-        kind: what it should be, in words.  wanted: intervals in microseconds by the number of the message.
+        Raise FlightError if it is not a fixed wing.
+        kind: expected autopilot, in words.  wanted: intervals in microseconds by the number of the message.
         """
         news = self._news
         heard = Awaited("heartbeat", SPEAKS, "said nothing over MAVLink")
-        yield from self._until(lambda: news.vehicle is not None, heard, self._say_hello)
+        yield from self._wait_until(lambda: news.vehicle is not None, heard, self._send_heartbeat)
         if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
                 f"is no {kind}: its heartbeat says vehicle type {news.vehicle}; 1, a fixed wing, flies",
@@ -90,40 +97,40 @@ class Conversation:
         self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
         self._command(mavlink.MAV_CMD_DO_SEND_BANNER)
         names = list(parameters)
-        for k in range(0, len(names), _AT_ONCE):
-            yield from self._ask_for(names[k : k + _AT_ONCE])
+        for k in range(0, len(names), _PARAMETERS_PER_REQUEST):
+            yield from self._read_parameters(names[k : k + _PARAMETERS_PER_REQUEST])
 
-    def _knows_its_place(self, message: int, interval: int, lost: int = 0) -> Talk:
-        """Wait until its estimator has a place.
+    def _wait_for_position(self, message: int, interval: int, lost: int = 0) -> Talk:
+        """Wait until its estimator has a position.
 
-        message: the number of the one that tells, every ``interval`` us.  lost: flags of one that has none.
+        message: number of the message that reports it, every ``interval`` us.  lost: flags that exclude a position.
         """
         news = self._news
-        yield from self._until(
-            lambda: news.ekf & _EKF_NEEDED == _EKF_NEEDED and not news.ekf & lost,
+        yield from self._wait_until(
+            lambda: news.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not news.ekf & lost,
             Awaited("EKF", KNOWS, "did not come to know where it is (EKF)"),
             lambda: self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval),
         )
 
-    def _until(self, done: Callable[[], bool], awaited: Awaited, again: Callable[[], None] | None = None) -> Talk:
-        """Wait until something holds, asking for it each second; raise FlightError where it does not come to."""
-        started, asked = self._since(), None
+    def _wait_until(self, done: Callable[[], bool], awaited: Awaited, again: Callable[[], None] | None = None) -> Talk:
+        """Wait until a condition holds, repeating a request each second; raise FlightError after a timeout."""
+        started, asked = self._start_stopwatch(), None
         while not done():
             if started.longer_than(awaited.seconds):
                 message = f"{awaited.failed} within {awaited.seconds:.0f} s{self._last_text()}"
                 raise FlightError(message, field=awaited.field)
             if again is not None and (asked is None or asked.longer_than(AGAIN)):
-                asked = self._since()
+                asked = self._start_stopwatch()
                 again()
             yield
 
-    def _since(self) -> _Since:
-        return _Since(self._now, self._clock)
+    def _start_stopwatch(self) -> _Stopwatch:
+        return _Stopwatch(self._now, self._clock)
 
     def _last_text(self) -> str:
         return f"; it last said: {self._news.texts[-1]}" if self._news.texts else ""
 
-    def _say_hello(self) -> None:
+    def _send_heartbeat(self) -> None:
         self._link.send(
             mavlink.MAVLink_heartbeat_message(
                 mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
@@ -143,29 +150,29 @@ class Conversation:
             )
         )  # fmt: skip
 
-    def _obeys(self, command: int, ask: Callable[[], None], what: str) -> Talk:
+    def _send_until_accepted(self, command: int, ask: Callable[[], None], what: str) -> Talk:
         acknowledged = self._news.acknowledged
         acknowledged.pop(int(command), None)
-        yield from self._until(
+        yield from self._wait_until(
             lambda: acknowledged.get(int(command)) == mavlink.MAV_RESULT_ACCEPTED,
             Awaited(what, ANSWERS, f"refused {what} ({command_name(int(command))})"),
             ask,
         )
 
-    def _ask_for(self, names: list[str]) -> Talk:
-        """Read parameters; those that it does not have are not answered."""
+    def _read_parameters(self, names: list[str]) -> Talk:
+        """Read parameters; the autopilot does not answer for parameters that it does not have."""
         for name in names:
             self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
-        started, known = self._since(), self._news.parameters
+        started, known = self._start_stopwatch(), self._news.parameters
         while not (known.keys() >= set(names) or started.longer_than(AGAIN)):
             yield
 
     def _upload(self, items: list[MissionItem], kind: MissionType) -> Talk:
-        """Hand over a list (MAVLink mission protocol), again while there is no space for it yet."""
-        started = self._since()
+        """Upload a list (MAVLink mission protocol), and retry while the autopilot has no space for it yet."""
+        started = self._start_stopwatch()
         what = "mission" if kind == MissionType.MISSION else "rally points"
         while True:
-            yield from self._offer(items, kind)
+            yield from self._send_items(items, kind)
             result = self._news.mission_result
             if result == mavlink.MAV_MISSION_ACCEPTED:
                 return
@@ -181,15 +188,15 @@ class Conversation:
                 raise FlightError(message, field=what, value=name)
             yield from self._wait(AGAIN)
 
-    def _offer(self, items: list[MissionItem], kind: MissionType) -> Talk:
-        """Count, then each item that is asked for, until the upload is acknowledged or nothing more comes."""
+    def _send_items(self, items: list[MissionItem], kind: MissionType) -> Talk:
+        """Send the count and each requested item, until the upload is acknowledged or requests cease."""
         news, link = self._news, self._link
         news.requested = news.mission_result = None
         link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
-        last, answered = None, self._since()
+        last, answered = None, self._start_stopwatch()
         while news.mission_result is None and not answered.longer_than(ANSWERS):
             if news.requested is not None and (news.requested != last or answered.longer_than(AGAIN)):
-                last, answered = news.requested, self._since()
+                last, answered = news.requested, self._start_stopwatch()
                 if last < len(items):
                     link.send(to_message(items[last], target_component=COMPONENT, seq=last))
             yield

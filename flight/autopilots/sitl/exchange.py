@@ -1,4 +1,4 @@
-"""The exchange with an autopilot in lockstep: its outputs move the controls, and it is told what came of it."""
+"""Lockstep exchange with an autopilot: its outputs move the controls, and its sensors get the result."""
 
 import math
 import struct
@@ -15,16 +15,16 @@ from flight.simulation.tick import READ_FIELDS, Workspace
 from world.kernels import Record
 
 LOOPBACK = "127.0.0.1"
-# An autopilot that sends nothing new for so long (s, by the clock) has failed.
+# Timeout for new data from an autopilot, s by the clock.
 SILENCE = 10.0
 
-# Metres that ArduPilot counts for a degree of latitude: it knows the Earth as a sphere.
+# Metres per degree of latitude in ArduPilot, which uses a spherical Earth.
 METRES_A_DEGREE = 111318.845
-_METRES_A_RADIAN = math.degrees(METRES_A_DEGREE)
+_METRES_PER_RADIAN = math.degrees(METRES_A_DEGREE)
 
 
 class BodyMotion(NamedTuple):
-    """The aircraft as the autopilot's sensors are to measure it.
+    """Motion of the aircraft as the autopilot's sensors are to measure it.
 
     time: s.  roll_rate..yaw_rate: rad/s about the body's axes.
     force_x..force_z: specific force along the body's axes, m/s^2; at rest 0, 0, -9.81.
@@ -53,46 +53,47 @@ class BodyMotion(NamedTuple):
 
 
 def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -> tuple[float, float]:
-    """North and east (m) of a position from another, all in rad, as ArduPilot takes it back to degrees.
+    """Return north and east (m) of a position from another (rad), with ArduPilot's conversion.
 
     >>> north, east = offset_on_sphere(math.radians(36.01), -1.5, math.radians(36.0), -1.5)
     >>> round(north, 3), east
     (1113.188, 0.0)
     """
     east = math.remainder(lon - from_lon, 2.0 * math.pi) * math.cos(0.5 * (lat + from_lat))
-    return (lat - from_lat) * _METRES_A_RADIAN, east * _METRES_A_RADIAN
+    return (lat - from_lat) * _METRES_PER_RADIAN, east * _METRES_PER_RADIAN
 
 
 def place_on_sphere(north: float, east: float, from_lat: float, from_lon: float) -> tuple[float, float]:
-    """The position (rad) that `offset_on_sphere` gives this offset (m) from another (rad).
+    """Return the position (rad) for which `offset_on_sphere` gives this offset (m) from another (rad).
 
     >>> place = place_on_sphere(*offset_on_sphere(0.63, -1.49, 0.62, -1.5), 0.62, -1.5)
     >>> [round(angle, 12) for angle in place]
     [0.63, -1.49]
     """
-    lat = from_lat + north / _METRES_A_RADIAN
-    return lat, from_lon + east / (_METRES_A_RADIAN * math.cos(0.5 * (lat + from_lat)))
+    lat = from_lat + north / _METRES_PER_RADIAN
+    return lat, from_lon + east / (_METRES_PER_RADIAN * math.cos(0.5 * (lat + from_lat)))
 
 
 # ----------------------------------------------------------------------
-# The rail that an autopilot's flight starts on, before the aircraft flies by itself: in the air, or a launch's.
+# The rail on which an autopilot's flight starts: in the air, or the rail of a launch.
 #
-# The autopilot's estimator has to settle with the aircraft at rest, and no aircraft rests in the air.  So it stands on
-# a rail, level, at the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along the rail
-# to the speed of that flight, and let go.  From the ground the rail is that of the catapult or the throwing hand, as
-# steep and as quick as it is; on a runway the aircraft stands where it begins.
+# The autopilot's estimator has to settle with the aircraft at rest, and an aircraft in the air is not at rest.  So it
+# stands on a level rail, at the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along
+# the rail to the speed of that flight, and let go.  For a take-off the rail is the catapult or the throwing hand, with
+# its incline and acceleration; on a runway the aircraft stands where it begins.
 
-# Along the rail, m/s^2.
+# Acceleration along the rail, m/s^2.
 PUSH = 5.0
-_EARTH = 6_371_000.0
+# Mean radius of the Earth.
+_EARTH_RADIUS_M = 6_371_000.0
 
 
 @dataclass(frozen=True, slots=True)
 class RailEnd:
-    """Where the rail ends, and how the aircraft leaves it: in a trimmed flight, level over the ground, or launched.
+    """End of the rail, and the aircraft's motion there: trimmed level flight, or a launch.
 
     lat, lon: rad.  amsl: m.  roll, pitch, yaw: rad.  course: of the rail, rad.  ground_speed: m/s.
-    wind_north, wind_east: m/s.  incline: of the rail above level, rad.  push: along it, m/s^2.
+    wind_north, wind_east: m/s.  incline: of the rail above level, rad.  push: acceleration along it, m/s^2.
     """
 
     lat: float
@@ -110,12 +111,15 @@ class RailEnd:
 
     @property
     def push_time(self) -> float:
-        """How long the push takes, s."""
+        """Duration of the push, s."""
         return self.ground_speed / (math.cos(self.incline) * self.push)
 
 
 def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
-    """Rail to a trimmed flight; state: a record of `flight.dynamics.state.STATE`.  wind: north, east, down, m/s."""
+    """Return the rail to a trimmed flight.
+
+    state: a record of `flight.dynamics.state.STATE`.  wind: north, east, down, m/s.
+    """
     return RailEnd(
         lat=float(state.latitude),
         lon=float(state.longitude),
@@ -131,31 +135,33 @@ def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
 
 
 def motion_on_rail(end: RailEnd, time: float, pushed: float, origin: tuple[float, float, float]) -> BodyMotion:
-    """How the aircraft moves, ``pushed`` s after the push began (0 or less: at rest), at ``time`` s of the exchange.
+    """Return the motion ``pushed`` s after the start of the push, at ``time`` s of the exchange.
 
-    origin: latitude and longitude (rad) and height (m) that positions count from.
+    The aircraft is at rest if ``pushed`` is 0 or less.
+
+    origin: latitude and longitude (rad) and altitude (m) from which positions are measured.
     """
     pushed = min(max(0.0, pushed), end.push_time)
-    level, steep = math.cos(end.incline), math.sin(end.incline)
+    level, rise = math.cos(end.incline), math.sin(end.incline)
     along_north, along_east = level * math.cos(end.course), level * math.sin(end.course)
     push = end.push if 0.0 < pushed < end.push_time else 0.0
     speed = end.push * pushed
-    left = 0.5 * end.push * (end.push_time**2 - pushed**2)
-    lat = end.lat - left * along_north / _EARTH
-    lon = end.lon - left * along_east / (_EARTH * math.cos(end.lat))
+    remaining = 0.5 * end.push * (end.push_time**2 - pushed**2)
+    lat = end.lat - remaining * along_north / _EARTH_RADIUS_M
+    lon = end.lon - remaining * along_east / (_EARTH_RADIUS_M * math.cos(end.lat))
     north, east = offset_on_sphere(lat, lon, origin[0], origin[1])
-    velocity_north, velocity_east, velocity_down = speed * along_north, speed * along_east, -speed * steep
-    felt = (push * along_north, push * along_east, -push * steep - GRAVITY)
-    force = to_body((end.roll, end.pitch, end.yaw), felt)
+    velocity_north, velocity_east, velocity_down = speed * along_north, speed * along_east, -speed * rise
+    specific_force = (push * along_north, push * along_east, -push * rise - GRAVITY)
+    force = to_body((end.roll, end.pitch, end.yaw), specific_force)
     airspeed = math.hypot(velocity_north - end.wind_north, velocity_east - end.wind_east, velocity_down)
     return BodyMotion(
-        time, 0.0, 0.0, 0.0, *force, north, east, origin[2] - end.amsl + left * steep,
+        time, 0.0, 0.0, 0.0, *force, north, east, origin[2] - end.amsl + remaining * rise,
         end.roll, end.pitch, end.yaw, velocity_north, velocity_east, velocity_down, airspeed,
     )  # fmt: skip
 
 
 def to_body(attitude: tuple[float, float, float], vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """A vector north, east, down in the axes of a body: turned by yaw, then pitch, then roll.
+    """Rotate a vector north, east, down into body axes, by yaw, then pitch, then roll.
 
     attitude: roll, pitch and yaw, rad.
 
@@ -173,11 +179,11 @@ def to_body(attitude: tuple[float, float, float], vector: tuple[float, float, fl
 
 # ----------------------------------------------------------------------
 
-# Of JSBSim and of the autopilot's simulated sensors: one frame is one step.
+# Frame rate of JSBSim and of the autopilot's simulated sensors, Hz: one frame is one step.
 FRAME_HZ = 120.0
-# Frames from one look at the link to the next: a tenth of a second.
+# Frames between two polls of the link: a tenth of a second.
 LOOK_FRAMES = 12
-_MOTION = (
+_MOTION_FIELDS = (
     *("latitude", "longitude", "amsl", "velocity_north", "velocity_east", "velocity_down", "roll", "pitch", "yaw"),
     *("roll_rate", "pitch_rate", "yaw_rate", "airspeed"),
 )
@@ -187,10 +193,10 @@ _NO_ERROR = (0.0,) * 6
 class Lockstep(ABC):
     """One aircraft's exchange with an autopilot, frame by frame.
 
-    home: what positions count from.
+    home: origin of positions.
     look: called every `LOOK_FRAMES` frames.
     time: of the exchange, s.
-    error: what its satellites mistake, m and m/s: north, east, up, and the same of the velocity.
+    error: of its GNSS receiver, m and m/s: north, east, up of the position, then of the velocity.
     """
 
     def __init__(self, fdm: Fdm, workspace: Workspace, home: Home, look: Callable[[], None]) -> None:
@@ -201,10 +207,10 @@ class Lockstep(ABC):
         self.error = _NO_ERROR
         access = fdm.loop_access()
         self._access: LoopAccess = access
-        # An aircraft that burns fuel has no volts.
+        # An aircraft that burns fuel has no battery voltage.
         self._volts = fdm.aircraft.battery_voltage
         self._current = access.getters["current"], float(access.factors["current"][0])
-        self._motion = [(access.getters[name], float(access.factors[name][0])) for name in _MOTION]
+        self._motion = [(access.getters[name], float(access.factors[name][0])) for name in _MOTION_FIELDS]
 
     @property
     def time(self) -> float:
@@ -212,29 +218,32 @@ class Lockstep(ABC):
         return self._frame / FRAME_HZ
 
     @abstractmethod
-    def _take(self) -> Commands:
-        """Wait for what it asks for of the next frame.  Raises FlightError for a program that ends or falls silent."""
+    def _receive_commands(self) -> Commands:
+        """Wait for the commands of the next frame.
+
+        Raise FlightError for a program that ends or falls silent.
+        """
 
     @abstractmethod
-    def _tell(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
-        """Tell it of the aircraft after that frame.
+    def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
+        """Send the motion of the aircraft after that frame.
 
-        motion: the numbers of a `BodyMotion`.  battery: volts and amperes, None for an aircraft without one.
+        motion: the numbers of a `BodyMotion`.  battery: volts and amperes, None for an aircraft without a battery.
         """
 
     def _battery(self) -> tuple[float, float] | None:
-        """Volts and amperes of the battery; its volts stay what they are."""
+        """Return volts and amperes of the battery; the voltage is constant."""
         if not self._volts:
             return None
         current, factor = self._current
         return self._volts, current() * factor
 
     def hold(self, rail: RailEnd, pushed: float = 0.0) -> None:
-        """One frame on the rail, ``pushed`` s after the push began."""
-        self._workspace.commands[:] = self._take()
+        """Run one frame on the rail, ``pushed`` s after the push began."""
+        self._workspace.commands[:] = self._receive_commands()
         motion = motion_on_rail(rail, self._next_time(), pushed, self._home)
         north, east, up, v_north, v_east, v_up = self.error
-        self._tell(
+        self._send_motion(
             motion._replace(
                 north=motion.north + north,
                 east=motion.east + east,
@@ -247,7 +256,7 @@ class Lockstep(ABC):
         )
 
     def step(self) -> None:
-        """One frame of flight on the controls that are set: JSBSim steps, and the autopilot is told."""
+        """Run one frame of flight with the present controls: JSBSim steps, and the autopilot gets the motion."""
         self._access.run()
         lat, lon, amsl, vn, ve, vd, roll, pitch, yaw, p, q, r, airspeed = [
             get() * factor for get, factor in self._motion
@@ -255,7 +264,7 @@ class Lockstep(ABC):
         home_lat, home_lon, home_amsl = self._home
         north, east = offset_on_sphere(lat, lon, home_lat, home_lon)
         dn, de, du, dvn, dve, dvu = self.error
-        self._tell(
+        self._send_motion(
             (
                 *(self._next_time(), p, q, r, *self._fdm.specific_force()),
                 *(north + dn, east + de, home_amsl - amsl - du),
@@ -265,24 +274,25 @@ class Lockstep(ABC):
         )
 
     def make_loop(self, tick: Callable[[], int], steps: int, *, gusts: bool, ground: bool) -> Callable[[int], int]:
-        """Make what flies up to a number of ticks and returns the last status, as `flight.simulation.simulate` does.
+        """Return a function that flies up to a number of ticks and returns the last status.
 
+        It is used like the loop in `flight.simulation.simulate`.
         tick: `flight.autopilots.sitl.flight.autopilot_tick` on the workspace.  steps: frames of a tick.
-        gusts, ground: whether the tick's are set in JSBSim.
+        gusts, ground: True to set the tick's gusts and ground in JSBSim.
         """
-        space, fdm, take, step = self._workspace, self._fdm, self._take, self.step
+        space, fdm, take, step = self._workspace, self._fdm, self._receive_commands, self.step
         read = [self._access.getters[field] for field in READ_FIELDS]
         pack: Callable[..., None] = struct.Struct(f"{len(READ_FIELDS)}d").pack_into
         pack_commands: Callable[..., None] = struct.Struct("4d").pack_into
-        readings, asked, output = space.readings, space.commands, space.output.tolist
+        readings, commands_array, output = space.readings, space.commands, space.output.tolist
         *_, set_north, set_east, set_down, set_ground = self._access.setters
 
         def fly(count: int) -> int:
             for _ in range(count):
-                # Taken while the autopilot computes its answer, which they do not depend on.
+                # Read while the autopilot computes its answer, which does not depend on these values.
                 pack(readings, 0, *[getter() for getter in read])
                 commands = take()
-                pack_commands(asked, 0, *commands)
+                pack_commands(commands_array, 0, *commands)
                 if status := tick():
                     return status
                 *_, north, east, down, under = output()
@@ -302,8 +312,8 @@ class Lockstep(ABC):
         return fly
 
     def serve(self) -> None:
-        """Answer one more frame, with the controls as the autopilot asks."""
-        self._fdm.write(self._take())
+        """Answer one more frame, with the controls that the autopilot commands."""
+        self._fdm.write(self._receive_commands())
         self.step()
 
     def _next_time(self) -> float:

@@ -1,4 +1,4 @@
-"""A flight that an autopilot's program steers in lockstep with our physics."""
+"""Flight of an autopilot's program in lockstep with planfly's physics."""
 
 import contextlib
 import math
@@ -50,20 +50,20 @@ Floats = NDArray[np.float64]
 
 
 # ----------------------------------------------------------------------
-# One tick of a flight that another program steers: place the state on the path, make the wind, fill a row.
+# One tick of a flight under another program's control: find the state on the path, make the wind, fill a row.
 
 
-# Pieces of the path ahead among which the aircraft may be.
-_AHEAD = 4
+# Number of path pieces ahead, the current one included, on which the aircraft may be.
+_SEARCHED_PIECES = 4
 
 
 @compiled
 def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
-    """Do a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
+    """Run a tick on the block of a `flight.simulation.tick.Workspace`, as a law's tick does.
 
-    The commands that stand in it are the other program's.  The flight completes where it passes the end of the path,
-    once the program says that it has nothing before it but that; a return to launch completes in its circle, a loiter
-    without end after `UNLIMITED` on its own, and a mission whose last waypoint is circled about once around that.
+    The commands in the block are the other program's.  The flight completes where it passes the end of the path, once
+    the program reports that only this end lies ahead; an RTL completes in its loiter, a loiter without end after
+    `UNLIMITED`, and a mission whose last waypoint is circled about completes after one lap.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -83,7 +83,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     elif settings.on_last_leg:
         across, beyond = beyond_end(work.true, path.waypoint[: settings.waypoints])
         memory.done = beyond >= 0.0
-        # What circles at a mission's end, as wide as it can, has not missed it.
+        # An aircraft that loiters at the mission's end, however wide, has not missed the route.
         memory.returning = before.circle != 0.0 and before.stop == last.stop
         if memory.done:
             memory.cross_track = across
@@ -92,14 +92,14 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
 
 @inner
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
-    """Fill leg, distance, cross-track and height error of the memory, by the nearest piece from the last one on.
+    """Fill leg, distance, cross-track and altitude error of the memory from the nearest path piece.
 
-    A piece that leads the other way than the aircraft flies is not begun: the way back of an out-and-back leg lies on
-    the way out.
+    The search starts at the last piece.  A piece against the direction of flight is not begun: the way back of an
+    out-and-back leg lies on the way out.
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
-    k, nearest, distance, aside = memory.piece, math.inf, 0.0, 0.0
-    for i in range(memory.piece, min(memory.piece + _AHEAD, pieces.shape[0])):
+    k, nearest, distance, cross_track = memory.piece, math.inf, 0.0, 0.0
+    for i in range(memory.piece, min(memory.piece + _SEARCHED_PIECES, pieces.shape[0])):
         piece = pieces[i]
         along, cross, course = project(piece, true.east, true.north)
         if i > memory.piece and true.velocity_east * math.sin(course) + true.velocity_north * math.cos(course) < 0.0:
@@ -107,40 +107,40 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
         outside = max(0.0, -along, along - piece.length)
         if math.hypot(cross, outside) < nearest:
             k, nearest = i, math.hypot(cross, outside)
-            distance, aside = piece.start + along, cross
+            distance, cross_track = piece.start + along, cross
     memory.piece = k
     memory.distance = distance
-    memory.cross_track = aside
+    memory.cross_track = cross_track
     memory.leg = pieces[k].leg + (1 if distance > pieces[k].leg_change else 0)
     memory.height_error = true.up - profile(nodes, distance)[0]
 
 
 @inner
 def end_circling(true: Record, b: Record, memory: Record, dt: float) -> None:  # pragma: no cover - compiled
-    """Count how long a loiter without end was circled, and end the flight after `UNLIMITED`.
+    """Update the time on a loiter without end, and end the flight after `UNLIMITED`.
 
-    Seconds count from where the aircraft, near the circle, first flies around its middle in its direction more than to
-    it or from it; from then on they count however wide the circle is flown.
+    The time runs from where the aircraft, near the circle, first flies around its center in its direction faster than
+    towards it or away from it; from then on it runs however wide the circle is flown.
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     b: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` are the seconds.
+    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` is the time in s.
     """
     out_e, out_n = true.east - b.centre_east, true.north - b.centre_north
-    away = max(0.1, math.hypot(out_e, out_n))
-    outwards = (true.velocity_east * out_e + true.velocity_north * out_n) / away
-    clockwise = (true.velocity_east * out_n - true.velocity_north * out_e) / away
+    distance = max(0.1, math.hypot(out_e, out_n))
+    outwards = (true.velocity_east * out_e + true.velocity_north * out_n) / distance
+    clockwise = (true.velocity_east * out_n - true.velocity_north * out_e) / distance
     around = math.copysign(1.0, b.circle) * clockwise
-    if memory.circled > 0.0 or (away < max(NEAR, WIDER * abs(b.circle)) and around > abs(outwards)):
+    if memory.circled > 0.0 or (distance < max(NEAR, WIDER * abs(b.circle)) and around > abs(outwards)):
         memory.circled += dt
-    # As wide as it is flown it has not missed the mission's end.
+    # However wide it flies, it has not missed the mission's end.
     memory.returning = True
     memory.done = memory.circled > UNLIMITED
 
 
 @inner
 def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:  # pragma: no cover - compiled
-    """How far right of the last leg (m), and how far past its end, the aircraft is."""
+    """Return the distance to the right of the last leg, and the distance past its end, m."""
     a, b = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
     length = math.hypot(b.east - a.east, b.north - a.north)
     east, north = (b.east - a.east) / length, (b.north - a.north) / length
@@ -148,16 +148,18 @@ def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:  # prag
     return de * north - dn * east, de * east + dn * north
 
 
-# From where the aircraft flies by itself to the first waypoint: at least so far (m), and for so long (s).  Let go, it
-# rises by 4 m and sinks by 6, for TECS was wound up on the rail; after 20 s the kept flights came to the first waypoint
-# up to 2.2 m low or high (the higher and the windier the more), and were within 0.5 m of their law another 5 s later.
-RUN_IN, RUN_IN_SECONDS = 500.0, 40.0
-# An aircraft that has not passed the first waypoint after so much longer (s) is judged from where it is.
-_LOST = 40.0
+# Minimum distance from the release to the first waypoint, m.
+RUN_IN = 500.0
+# Minimum time from the release to the first waypoint, s.  After the release the aircraft rises by 4 m and sinks by 6 m,
+# as TECS was wound up on the rail; after 20 s the stored flights reached the first waypoint up to 2.2 m low or high
+# (the higher and the windier the more), and were within 0.5 m of their law another 5 s later.
+RUN_IN_SECONDS = 40.0
+# Timeout of the run-in, s beyond twice that time: then the flight is judged from where the aircraft is.
+_RUN_IN_TIMEOUT_S = 40.0
 
 
 def launch_rail(begin: Release, take_off: TakeOff) -> RailEnd:
-    """The rail of a launch, or of none where the aircraft stands on its runway."""
+    """Return the rail of a launch, or a rail of no length on a runway."""
     north, east, _ = begin.velocity
     roll, pitch, yaw = begin.attitude
     lat, lon = (math.radians(value) for value in begin.place[:2])
@@ -169,17 +171,17 @@ def launch_rail(begin: Release, take_off: TakeOff) -> RailEnd:
 
 
 class SitlFlight(ProgramFlight):
-    """One flight of an autopilot's program; a context manager, after which the program and its files are gone.
+    """One flight of an autopilot's program; a context manager that ends it and removes its files.
 
     binary: the program.
 
-    The track begins where the aircraft passes the first waypoint, and the turbulence with it, as in our own flights.
-    Before that it flies `RUN_IN` m straight and level in the mean wind, and before that it stands on a rail.  From the
-    ground it begins where the launch ends, or where it stands on its runway, and the mission goes up as it is.
-    It takes its place from satellites with the error of the setup's navigation.
+    The track begins where the aircraft passes the first waypoint, and the turbulence with it, as in planfly's own
+    flights.  Before that it flies `RUN_IN` m straight and level in the mean wind, and before that it stands on a
+    rail.  A flight from the ground begins at the end of the launch, or at rest on the runway, and the mission is
+    uploaded unchanged.  Its GNSS position has the error of the setup's navigation.
 
-    Raises FlightError, in one line that names the program, for one that does not start, does not understand us, does
-    not know where it is, refuses the mission, or ends.
+    Raise FlightError, in one line that names the program, for a program that does not start, does not understand the
+    exchange, finds no position, refuses the mission, or ends.
     """
 
     _link: AutopilotLink
@@ -200,7 +202,7 @@ class SitlFlight(ProgramFlight):
         if self._ways:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
             self._from_ground.begin(self.memory, self._workspace.own)
-        # Compiled here, where no autopilot waits for it.
+        # Compiled here, while no autopilot waits for it.
         tick = self._ground_tick if self._ways else autopilot_tick
         tick(self._workspace.block.copy(), self._ground.heights)
 
@@ -209,63 +211,65 @@ class SitlFlight(ProgramFlight):
 
     @property
     def _ground_tick(self) -> Tick:
-        """One tick of a flight from the ground to the ground; only of a program that flies one."""
+        """Compiled function for one tick of a flight from the ground; only if the program flies one."""
         raise ValueError(f"{self.setup.autopilot.title} is put into the air on a rail")
 
     @property
     @abstractmethod
     def last_item(self) -> int:
-        """The number by which the program knows the mission's last item."""
+        """Number of the mission's last item in the program."""
 
     @property
     def _is_ending(self) -> bool:
-        """Whether by the program's own account nothing but the end of its mission lies before it."""
+        """True if by the program's own account only the end of its mission lies ahead."""
         return self._link.news.mission_item >= self.last_item
 
     @abstractmethod
-    def _get_ready(self) -> None:
-        """Have the program settle and take the mission; the aircraft is on the rail, and at its end at last."""
+    def _prepare_program(self) -> None:
+        """Make the program settle and accept the mission; the aircraft is on the rail, and finally at its end."""
 
     def __enter__(self) -> Self:
         """Return the flight itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """End the program, and remove what it has left."""
+        """End the program, and remove its files."""
         self._stack.close()
 
     @property
     def exchanged(self) -> float:
-        """Seconds of the autopilot's time that have passed since its boot."""
+        """Autopilot time since its boot, s."""
         return self._lockstep.time
 
     def prepare(self) -> None:
-        """Have the autopilot settle, take the mission and fly to the first waypoint.  Raises as the class does.
+        """Make the autopilot settle, accept the mission and fly to the first waypoint.
 
-        From the ground it is launched instead, or left to roll.
+        Raise FlightError as the class does.
+
+        For a take-off it is launched instead, or left to roll.
         """
-        with self._named():
-            self._get_ready()
-        with self._named(CrashError):
+        with self._name_program():
+            self._prepare_program()
+        with self._name_program(CrashError):
             if self._release is None:
                 self._run_in()
             else:
-                self._let_go(self._release)
+                self._begin_at_release(self._release)
 
     def _push(self, first: float = 0.0, last: float = 1.0) -> None:
-        """Push the aircraft along the rail, from one share of the time that takes to another."""
+        """Push the aircraft along the rail, from one fraction of the push time to another."""
         frames = math.ceil(self._rail.push_time * FRAME_HZ)
         for k in range(math.ceil(first * frames) + 1, math.ceil(last * frames) + 1):
             self._lockstep.hold(self._rail, k / FRAME_HZ)
 
     def keep_log(self, target: Path) -> bool:
-        """End the program in order, and move its own log to a file; whether there was one."""
-        self._process.end(self._serve)
+        """End the program in order, and move its own log to a file; return True if there was a log."""
+        self._process.end(self._answer_frame)
         return self._process.keep_log(target)
 
     @contextlib.contextmanager
-    def _named(self, kind: type[FlightError] = FlightError) -> Iterator[None]:
-        """Name the program in what goes wrong with it, as an error of this kind."""
+    def _name_program(self, kind: type[FlightError] = FlightError) -> Iterator[None]:
+        """Name the program in its errors, and raise them as an error of this kind."""
         try:
             yield
         except FlightError as error:
@@ -273,9 +277,9 @@ class SitlFlight(ProgramFlight):
             raise kind.from_error(error, "" if named else self._binary) from error
 
     def _make_rail(self, setup: FlightSetup) -> RailEnd:
-        """Trim the aircraft where it is let go: before the first waypoint, straight and level, over no ground.
+        """Trim the aircraft at its release: before the first waypoint, straight and level, without ground.
 
-        From the ground the rail is the launch's.
+        For a take-off the rail is the launch's rail.
         """
         start, points = self._start(setup), setup.route.waypoints
         if self._ways.take_off is not None:
@@ -290,8 +294,8 @@ class SitlFlight(ProgramFlight):
         self._trim(setup.mission.source, begin)
         return rail_end(self.fdm.read(), start.wind)
 
-    def _converse(self, talk: Talk) -> None:
-        """Hold the aircraft at rest while a conversation lasts."""
+    def _hold_during(self, talk: Talk) -> None:
+        """Hold the aircraft at rest during a conversation."""
         while True:
             for _ in range(LOOK_FRAMES):
                 self._lockstep.hold(self._rail)
@@ -300,20 +304,20 @@ class SitlFlight(ProgramFlight):
             except StopIteration:
                 return
 
-    def _look(self) -> None:
-        """Take in what the autopilot tells, above all which item it flies."""
+    def _poll_link(self) -> None:
+        """Read the autopilot's messages, above all the item that it flies."""
         self._link.poll()
         self._workspace.on_last_leg[0] = self._is_ending
 
     def _apply_gnss_error(self) -> None:
-        """Have the satellites mistake the place by as much as they do at the start."""
+        """Set the GNSS position error of the start."""
         settings, navigation = self._work.settings, self._work.navigation
         scale = settings.navigation_sigma * math.sqrt(2.0)
         east, north, up = (scale * navigation.second).tolist()
         self._lockstep.error = (north, east, up, 0.0, 0.0, 0.0)
 
-    def _let_go(self, begin: Release) -> None:
-        """Begin where rail or hand let go, with the controls as the program has set them, or at rest on a runway."""
+    def _begin_at_release(self, begin: Release) -> None:
+        """Begin at the end of the rail or the throw, with the program's controls, or at rest on a runway."""
         self._scale()
         commands = tuple(float(one) for one in self._workspace.commands)
         self._work.commands = release(self.fdm, begin, (commands[0], commands[1], commands[2], commands[3]))
@@ -326,20 +330,20 @@ class SitlFlight(ProgramFlight):
         self._work.scale_above, self._work.scale_below = (tuple(one) for one in zip(*access.scales, strict=True))
 
     def _make_loop(self, tick: Tick) -> None:
-        """Have the flight go on by a tick that is recorded, over its ground."""
+        """Continue the flight with a tick that is recorded, over the terrain."""
         made = partial(tick, self._workspace.block, self._ground.heights)
         own = partial(self._tick, made, bool(self._work.settings.navigation_sigma))
         self._loop = self._lockstep.make_loop(own, self._steps, gusts=self._windy, ground=self._ground.known)
 
     def _run_in(self) -> None:
-        """Fly to the first waypoint in the mean wind, over no ground; what goes wrong on the way ends it early."""
+        """Fly to the first waypoint in the mean wind, without ground; an error on the way ends it early."""
         work, timing, steps = self._work, self._work.timing, self._steps
         self._scale()
         tick = partial(autopilot_tick, self._workspace.block, Ground(None).heights)
         loop = self._lockstep.make_loop(tick, steps, gusts=self._windy, ground=False)
         kept = work.wind.w20, work.settings.navigation_sigma
         work.wind.w20 = work.settings.navigation_sigma = 0.0
-        for _ in range(round((2.0 * RUN_IN_SECONDS + _LOST) / self.dt)):
+        for _ in range(round((2.0 * RUN_IN_SECONDS + _RUN_IN_TIMEOUT_S) / self.dt)):
             timing.row = 0
             if loop(1) or self.memory.distance >= 0.0:
                 break
@@ -350,7 +354,7 @@ class SitlFlight(ProgramFlight):
         self._make_loop(autopilot_tick)
 
     def _tick(self, tick: "partial[int]", mistaken: bool) -> int:
-        """A tick, and what the satellites mistake by then."""
+        """Run a tick, and set the GNSS error after it."""
         status = tick()
         if mistaken:
             east, north, up, v_east, v_north, v_up = self._workspace.navigation_error()
@@ -358,11 +362,11 @@ class SitlFlight(ProgramFlight):
         return status
 
     def _fly(self, count: int) -> int:
-        with self._named(CrashError):
+        with self._name_program(CrashError):
             return self._loop(count)
 
-    def _serve(self) -> bool:
-        """Answer one more frame of a program that is about to end; false where it has ended."""
+    def _answer_frame(self) -> bool:
+        """Answer one more frame of a program that is about to end; return False if it has ended."""
         try:
             self._lockstep.serve()
         except FlightError:

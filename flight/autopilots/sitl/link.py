@@ -1,4 +1,4 @@
-"""The MAVLink connection to an autopilot's program: messages sent, and what its messages have told so far."""
+"""MAVLink connection to an autopilot's program: messages to it, and the state from its messages."""
 
 import socket
 import struct
@@ -10,18 +10,18 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.autopilots.sitl.exchange import LOOPBACK
 
-# We are a ground station.
+# MAVLink ids of planfly, which acts as a ground station.
 _SYSTEM, _COMPONENT = 255, mavlink.MAV_COMP_ID_MISSIONPLANNER
-_LARGEST = 65536
+_MAX_RECEIVE_BYTES = 65536
 
 
 @dataclass(slots=True)
 class AutopilotNews:
-    """What an autopilot's messages have told; None and empty for what it has not.
+    """State of an autopilot from its messages; None or empty for what it has not sent.
 
     vehicle: MAV_TYPE.  autopilot: MAV_AUTOPILOT.  mode: its own number.
     ekf: flags of EKF_STATUS_REPORT or ESTIMATOR_STATUS.
-    mission_item: the number of the item that it flies.  reached: of the last one that it has reached.
+    mission_item: number of the item that it flies.  reached: number of the last item that it reached.
     texts: STATUSTEXT, in order.
     parameters: by name, as it has them.
     acknowledged: the result by command, MAV_RESULT.
@@ -44,8 +44,8 @@ class AutopilotNews:
     version: int | None = None
 
 
-# How a parameter is told that is no float: PX4 sends the bytes of the integer, ArduPilot the float of the same value.
-_INTEGERS = {
+# Formats of integer parameters: PX4 sends the bytes of the integer, ArduPilot a float of the same value.
+_INTEGER_FORMATS = {
     mavlink.MAV_PARAM_TYPE_UINT8: "<B3x", mavlink.MAV_PARAM_TYPE_INT8: "<b3x",
     mavlink.MAV_PARAM_TYPE_UINT16: "<H2x", mavlink.MAV_PARAM_TYPE_INT16: "<h2x",
     mavlink.MAV_PARAM_TYPE_UINT32: "<I", mavlink.MAV_PARAM_TYPE_INT32: "<i",
@@ -55,7 +55,7 @@ _INTEGERS = {
 class AutopilotLink(ABC):
     """A connection to the autopilot's program, on this machine.
 
-    port: ours.  news: what has been told.
+    port: of this end.  news: state from the messages so far.
     """
 
     port: int
@@ -85,14 +85,14 @@ class AutopilotLink(ABC):
 
     @abstractmethod
     def _receive(self) -> bytes:
-        """What has come, without waiting."""
+        """Return the received bytes, without waiting."""
 
     @abstractmethod
     def _transmit(self, data: bytes) -> None:
-        """Send bytes; what the program no longer takes is lost."""
+        """Send bytes; bytes that the program no longer accepts are lost."""
 
     def poll(self) -> None:
-        """Take in what has come, without waiting."""
+        """Process the received messages, without waiting."""
         while data := self._receive():
             try:
                 messages = self._mav.parse_buffer(data) or []
@@ -104,7 +104,7 @@ class AutopilotLink(ABC):
                     handler(message)
 
     def send(self, message: Any) -> None:
-        """Send a message; what the program no longer takes is lost."""
+        """Send a message; it is lost if the program no longer accepts it."""
         data = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         self._transmit(data)
@@ -129,7 +129,7 @@ class AutopilotLink(ABC):
         self.news.reached = int(message.seq)
 
     def _parameter(self, message: Any) -> None:
-        value, form = float(message.param_value), _INTEGERS.get(message.param_type)
+        value, form = float(message.param_value), _INTEGER_FORMATS.get(message.param_type)
         if form is not None and self.news.autopilot == mavlink.MAV_AUTOPILOT_PX4:
             (value,) = struct.unpack(form, struct.pack("<f", value))
         self.news.parameters[str(message.param_id)] = float(value)
@@ -175,8 +175,8 @@ class TcpLink(AutopilotLink):
             self._stream.setblocking(False)
             self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         try:
-            # Closed by the other side, it is empty; the physics tells why.
-            return self._stream.recv(_LARGEST)
+            # Empty if the other side closed it; the physics exchange reports the reason.
+            return self._stream.recv(_MAX_RECEIVE_BYTES)
         except (BlockingIOError, ConnectionResetError):
             return b""
 
@@ -190,9 +190,9 @@ class TcpLink(AutopilotLink):
 
 
 class UdpLink(AutopilotLink):
-    """A socket that the program sends to.
+    """A socket to which the program sends.
 
-    theirs: the port that it listens on; free now.
+    theirs: the port on which it listens; free now.
     """
 
     def __init__(self) -> None:
@@ -209,10 +209,10 @@ class UdpLink(AutopilotLink):
 
     def _receive(self) -> bytes:
         try:
-            data, sender = self._socket.recvfrom(_LARGEST)
+            data, sender = self._socket.recvfrom(_MAX_RECEIVE_BYTES)
         except (BlockingIOError, ConnectionRefusedError):
             return b""
-        # What anybody else sends is nobody's.
+        # Datagrams from other senders are ignored.
         return data if sender == (LOOPBACK, self.theirs) else b""
 
     def _transmit(self, data: bytes) -> None:
@@ -223,7 +223,7 @@ class UdpLink(AutopilotLink):
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports that nobody has now, for what the program opens and nobody uses."""
+    """Return ports that are free now, for what the program opens without anything connecting to it."""
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
         for opened in sockets:

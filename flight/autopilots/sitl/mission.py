@@ -1,11 +1,11 @@
-"""The mission that an autopilot is given to fly: the items that the route is made of, and one place more.
+"""Mission that an autopilot is given to fly: the items of the route, and one extra waypoint.
 
-What a flight from air to air cannot hold is made a waypoint where the route has it: a take-off, a landing.  A place
-more, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it takes a waypoint as
-reached a radius early, and returns to launch after the last.  A mission that ends with a return to launch has that at
-its end, or before the landing sequence that it goes on to, and its rally points go with it; one that ends with a loiter
-without end has that, of which the flight's own clock counts a minute.  An autopilot that circles about the last
-waypoint without end has no place more, either.
+Items that a flight from air to air cannot contain, a take-off or a landing, become waypoints where the route has them.
+An extra waypoint, 1 km straight on after the last, keeps the autopilot on its course to the route's end: it accepts a
+waypoint a radius early, and returns to launch after the last one.  A mission that ends with an RTL has the RTL at its
+end, or before the landing sequence that follows it, and its rally points are uploaded too.  A mission that ends with a
+loiter without end has that loiter, of which the flight's own clock flies a minute.  An autopilot that loiters without
+end about the last waypoint gets no extra waypoint either.
 """
 
 import math
@@ -23,22 +23,24 @@ from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]
 
-# From the end of the route to the place more, m.
+# Distance from the end of the route to the extra waypoint, m.
 STRAIGHT_ON = 1000.0
-# Home stands this far (m) below the start where the mission has none, and where its own is nearer than `_NEAR` (m) to
-# the start's height: within 10 m of home ArduPlane holds the throttle back, as before a take-off.
-_BELOW, _NEAR = 100.0, 15.0
-_KEPT = (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG, Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)
+# Height of the start above home, m, if the mission has no home, or a home near the start's altitude.
+_HOME_BELOW_START_M = 100.0
+# Minimum distance of the start's altitude from home's, m: within 10 m of home ArduPlane limits the throttle, as before
+# a take-off.
+_MIN_HOME_DISTANCE_M = 15.0
+_KEPT_COMMANDS = (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG, Command.DO_CHANGE_SPEED, Command.DO_SET_HOME)
 
 
 @dataclass(frozen=True, slots=True)
 class UploadedMission:
-    """What goes to the autopilot.
+    """Mission as uploaded to the autopilot.
 
     home: its home; alt is AMSL.
-    items: numbered from 1; the last is the place more, or what the autopilot ends its mission with.
-    rally: the points that a return may go to, numbered from 0; none without a return.
-    last: number of the item with which the last leg begins; 0 for the last of them.
+    items: numbered from 1; the last is the extra waypoint, or the item with which the autopilot ends its mission.
+    rally: rally points for an RTL, numbered from 0; empty without an RTL.
+    last: number of the item at which the last leg begins; 0 for the last item.
     """
 
     home: Home
@@ -48,12 +50,12 @@ class UploadedMission:
 
 
 def uploaded_mission(setup: FlightSetup) -> UploadedMission:
-    """The mission of a setup as the autopilot gets it, all heights above mean sea level but those of rally points.
+    """Return the mission of a setup for the autopilot; altitudes are AMSL except for rally points.
 
-    From the ground to the ground it is the mission itself.
+    A flight from the ground to the ground uses the mission itself.
     """
     if setup.ground_ways:
-        return _itself(setup, setup.ground_ways)
+        return _unchanged_mission(setup, setup.ground_ways)
     route, origin = setup.route, setup.scenario.origin
     kept: list[MissionItem] = []
     lands = route.return_from >= 0 and route.return_until <= route.legs
@@ -62,23 +64,23 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
             kept += [item] if rows.size else []
         elif rows.size:
-            kept.append(_place(item, route, rows, origin, kept))
-        elif item.command in _KEPT or (lands and item.command == Command.DO_LAND_START):
+            kept.append(_place_item(item, route, rows, origin, kept))
+        elif item.command in _KEPT_COMMANDS or (lands and item.command == Command.DO_LAND_START):
             kept.append(item)
     if not any(item.has_position for item in kept):
-        kept = _of_route(route, origin)
+        kept = _route_items(route, origin)
     elif route.items[-1] == -1 and kept[-1].command != Command.NAV_LOITER_UNLIM:
         kept.append(_waypoint(kept[-1].seq + 1, route.waypoints[-1], 0.0, origin))
     if (route.return_from >= 0 and not lands) or kept[-1].command == Command.NAV_LOITER_UNLIM:
-        return UploadedMission(_home(setup), _renumbered(kept), setup.mission.rally)
+        return UploadedMission(_home(setup), _renumber(kept), setup.mission.rally)
     if setup.autopilot.loiter_rules.ends_in_circle and goes_no_further(route, setup.mission):
-        return UploadedMission(_home(setup), _renumbered(kept))
-    kept.append(_waypoint(kept[-1].seq + 1, _straight_on(route), 0.0, origin))
-    return UploadedMission(_home(setup), _renumbered(kept), setup.mission.rally if lands else ())
+        return UploadedMission(_home(setup), _renumber(kept))
+    kept.append(_waypoint(kept[-1].seq + 1, _extra_point(route), 0.0, origin))
+    return UploadedMission(_home(setup), _renumber(kept), setup.mission.rally if lands else ())
 
 
-def _itself(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
-    """The mission as its file has it, from its home; without a height that is the ground's there."""
+def _unchanged_mission(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
+    """Return the mission as in its file, with its home; without an altitude home is on the ground."""
     home, mission = setup.mission.home, setup.mission
     if home is None or ways.take_off is None or ways.approach is None:
         raise ValueError("a mission from the ground to the ground has a home, a take-off and a landing")
@@ -89,13 +91,13 @@ def _itself(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
         p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
         known.append(replace(item, params=(p1, p2, p3, p4)))
     last = next(k for k, item in enumerate(known, 1) if item.seq == ways.approach.item)
-    return UploadedMission(home, _renumbered(known), mission.rally, last)
+    return UploadedMission(home, _renumber(known), mission.rally, last)
 
 
-def _place(
+def _place_item(
     item: MissionItem, route: Route, rows: NDArray[np.intp], origin: GeoOrigin, before: list[MissionItem]
 ) -> MissionItem:
-    """A place of the mission: a loiter about its own centre, anything else as a waypoint where the route has it."""
+    """Return the item of a place: a loiter about its own center, or a waypoint where the route has it."""
     last = route.waypoints[rows[-1]]
     loiter = loiter_of(item)
     if loiter is None:
@@ -108,8 +110,8 @@ def _place(
     return MissionItem(item.seq, int(item.command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(last[2]))
 
 
-def _of_route(route: Route, origin: GeoOrigin) -> list[MissionItem]:
-    """Items of a route that was made without a mission: its waypoints, and its speeds where they change."""
+def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
+    """Return items for a route without a mission: its waypoints, and its speeds where they change."""
     items: list[MissionItem] = []
     speed = math.nan
     for k, point in enumerate(route.waypoints):
@@ -129,15 +131,15 @@ def _waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin) -> 
     return MissionItem(seq, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0, acceptance, 0.0, 0.0), *place)
 
 
-def _straight_on(route: Route) -> Floats:
+def _extra_point(route: Route) -> Floats:
     east, north, _ = route.waypoints[-1] - route.waypoints[-2]
     step = STRAIGHT_ON / math.hypot(east, north)
     further: Floats = route.waypoints[-1] + np.array([step * east, step * north, 0.0])
     return further
 
 
-def _renumbered(kept: list[MissionItem]) -> tuple[MissionItem, ...]:
-    """Items numbered from 1, jumps to the first that was kept from their target on."""
+def _renumber(kept: list[MissionItem]) -> tuple[MissionItem, ...]:
+    """Return items numbered from 1; a jump goes to the first remaining item from its target on."""
     items = []
     for number, item in enumerate(kept, 1):
         params = item.params
@@ -149,9 +151,9 @@ def _renumbered(kept: list[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def _home(setup: FlightSetup) -> Home:
-    """The mission's home, or the start's place; at a height that lets the motor run from the start.
+    """Return the mission's home, or the start's position, at an altitude that lets the motor run.
 
-    A return to launch counts its heights from home: there it is the mission's.
+    An RTL measures its altitudes from home: there home is the mission's.
     """
     start = setup.route.waypoints[0]
     home = setup.mission.home
@@ -160,5 +162,5 @@ def _home(setup: FlightSetup) -> Home:
         home = Home(on_grid(float(lat)), on_grid(float(lon)), math.nan)
     if setup.route.return_to is not None and not math.isnan(home.alt):
         return home
-    near = math.isnan(home.alt) or abs(home.alt - start[2]) < _NEAR
-    return replace(home, alt=float(start[2]) - _BELOW) if near else home
+    near = math.isnan(home.alt) or abs(home.alt - start[2]) < _MIN_HOME_DISTANCE_M
+    return replace(home, alt=float(start[2]) - _HOME_BELOW_START_M) if near else home

@@ -1,4 +1,4 @@
-"""An autopilot's program: started in a folder of its own, ended with the flight."""
+"""Process of an autopilot's program: started in a folder of its own, ended with the flight."""
 
 import contextlib
 import ctypes
@@ -19,17 +19,17 @@ from world.errors import FlightError
 from world.files import temporary_folder
 from world.interruption import uninterrupted
 
-_OUTPUT = "output.txt"
-# Given to end by itself (s), so that its log is whole, before it is killed.
-_GRACE = 2.0
-_PANIC = "PANIC:"
+_OUTPUT_FILE = "output.txt"
+# Time to end by itself, so that its log is complete, before it is killed, s.
+_GRACE_S = 2.0
+_PANIC_MARK = "PANIC:"
 _PR_SET_PDEATHSIG = 1
 
 
 def check_binary(binary: Path, kind: str) -> str:
-    """SHA-256, as hex, of an autopilot's program.  Raises FlightError, in one line, for what cannot be run.
+    """Return the SHA-256, as hex, of an autopilot's program.
 
-    kind: which autopilot it is to be.
+    Raise FlightError, in one line, for a file that cannot be run.  kind: expected autopilot.
 
     >>> try:
     ...     check_binary(Path("nobody/arduplane"), "ArduPlane")
@@ -53,12 +53,12 @@ def check_binary(binary: Path, kind: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Launch:
-    """How a program is started.
+    """Command line and environment of a program.
 
     arguments: after its name.
-    environment: over that of this process.
-    logs: pattern below its folder of its own log.
-    leaves: files outside of that folder that it makes and leaves.
+    environment: in addition to this process's environment.
+    logs: pattern of its own log below its folder.
+    leaves: files outside of that folder that it leaves behind.
     """
 
     arguments: tuple[str, ...]
@@ -68,14 +68,14 @@ class Launch:
 
 
 class AutopilotProcess:
-    """The running program; a context manager, after which neither it, nor what it started, nor its folder is left.
+    """The running program; a context manager, after which it, its children and its folder are gone.
 
-    Where we are killed, a guard sees to the same.
+    A guard does the same if planfly is killed.
 
     binary: its file, checked by `check_binary`.
-    prepare: puts what the program needs into its folder, and says how it is started there.
+    prepare: puts what the program needs into its folder, and returns the command line.
 
-    Raises FlightError where it cannot be started.
+    Raise FlightError if it cannot be started.
     """
 
     def __init__(self, binary: Path, prepare: Callable[[Path], Launch]) -> None:
@@ -97,15 +97,18 @@ class AutopilotProcess:
 
     def _spawn(self, guard: Guard) -> "subprocess.Popen[bytes]":
         def begin() -> None:
-            """Have the group guarded before the program runs: told afterwards, we may be killed in between."""
-            # Before this Python gives the signal its default, by which a guard that is gone would end us here.
+            """Register the process group with the guard before the program runs.
+
+            Registered afterwards, it would be left over if planfly were killed in between.
+            """
+            # Before Python restores the default of the signal, with which a dead guard would end this process here.
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)
             guard.keep_group(os.getpid())
             signal.signal(signal.SIGPIPE, signal.SIG_DFL)
             if sys.platform == "linux":
                 _die_with_parent()
 
-        with (self._folder / _OUTPUT).open("wb") as output:
+        with (self._folder / _OUTPUT_FILE).open("wb") as output:
             try:
                 return subprocess.Popen(
                     [str(self.binary.resolve()), *self._launch.arguments],
@@ -114,7 +117,7 @@ class AutopilotProcess:
                     stdout=output,
                     stderr=subprocess.STDOUT,
                     env=os.environ | self._launch.environment,
-                    # Ctrl-C is ours: we end it in order, and what it started: they are a group of their own.
+                    # Its own session: Ctrl-C reaches planfly alone, which ends the program and its children in order.
                     start_new_session=True,
                     preexec_fn=begin,
                 )
@@ -133,7 +136,7 @@ class AutopilotProcess:
         self._place.close()
 
     def watch(self) -> None:
-        """Raise FlightError where the program has panicked or ended, with its last words."""
+        """Raise FlightError if the program has panicked or ended, with its last output."""
         panic = self._panic()
         if panic:
             raise FlightError(f"panicked: {panic}", file=self.binary)
@@ -145,19 +148,19 @@ class AutopilotProcess:
         raise FlightError(how + (f": {words[-1]}" if words else ""), file=self.binary, field="exit code", value=code)
 
     def end(self, answer: Callable[[], bool]) -> None:
-        """Ask the program to end, so that it closes its log; kill it where it does not.
+        """Ask the program to end, so that it closes its log; kill it if it does not.
 
-        answer: serves it a frame of physics meanwhile; false where none was asked for.
+        answer: answers it a frame of physics meanwhile; returns False if there was no request.
         """
         if self._signal(signal.SIGTERM):
-            until = time.monotonic() + _GRACE
+            until = time.monotonic() + _GRACE_S
             while self._lives() and time.monotonic() < until:
                 if not answer():
                     time.sleep(0.001)
         self._kill()
 
     def keep_log(self, target: Path) -> bool:
-        """Move the program's own log to a file; whether there was one."""
+        """Move the program's own log to a file; return True if there was a log."""
         logs = sorted(self._folder.glob(self._launch.logs))
         if not logs:
             return False
@@ -166,9 +169,9 @@ class AutopilotProcess:
         return True
 
     def _signal(self, number: int) -> bool:
-        """Send the program and what it started a signal, 0 for none; whether any of them is there.
+        """Send a signal to the program and its children, 0 for none; return True if any of them exists.
 
-        A group that is gone is sent none again: its number may be another's by then.
+        No signal is sent to a group that is gone: its number may belong to another group by then.
         """
         if not self._ended:
             try:
@@ -178,7 +181,7 @@ class AutopilotProcess:
         return not self._ended
 
     def _lives(self) -> bool:
-        """Whether the program, or what it started, goes on; one that has ended but was not waited for does not."""
+        """Return True if the program or its children run; an ended program that was not waited for does not."""
         self._process.poll()
         return self._signal(0)
 
@@ -188,17 +191,17 @@ class AutopilotProcess:
         self._process.wait()
 
     def lines(self) -> list[str]:
-        """What it has printed, without what is blank."""
+        """Return the lines of its output, without blank ones."""
         try:
-            text = (self._folder / _OUTPUT).read_text(encoding="utf-8", errors="replace")
+            text = (self._folder / _OUTPUT_FILE).read_text(encoding="utf-8", errors="replace")
         except OSError:
             return []
         return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
 
     def _panic(self) -> str:
-        return next((line.partition(_PANIC)[2].strip() for line in self.lines() if _PANIC in line), "")
+        return next((line.partition(_PANIC_MARK)[2].strip() for line in self.lines() if _PANIC_MARK in line), "")
 
 
 def _die_with_parent() -> None:
-    """Have the kernel kill the program when we are killed."""
+    """Ask the kernel to kill the program if planfly is killed."""
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

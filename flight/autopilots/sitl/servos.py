@@ -1,4 +1,4 @@
-"""Which servo output of an autopilot moves what on an aircraft, and how far: its folder's `ardupilot.toml`."""
+"""Servo outputs of an autopilot and the controls that they move, from the aircraft's `ardupilot.toml`."""
 
 import math
 from collections.abc import Sequence
@@ -12,20 +12,20 @@ from world.errors import FlightError
 from world.files import read_toml
 
 SERVO_FILE = "ardupilot.toml"
-# What each control is to ArduPilot: SERVOn_FUNCTION (its parameter reference).
+# SERVOn_FUNCTION of each control (ArduPilot's parameter reference).
 FUNCTIONS = {"elevator": 19, "aileron": 4, "rudder": 21, "throttle": 70}
-# Its values carry this unit, and this takes them to SI.
+# Unit of each control's values in the file; "" for a fraction.
 _UNITS = {"elevator": "deg", "aileron": "deg", "rudder": "deg", "throttle": ""}
-_SERVO_OUTPUTS = 32
+_MAX_OUTPUT = 32
 
 
 @dataclass(frozen=True, slots=True)
 class ServoOutput:
-    """One control's servo: the value is linear in the pulse between its knots, and stays beyond them.
+    """One control's servo: the value is linear in the pulse between its knots, and constant beyond them.
 
     number: of the output, from 1.
     pulses: (k,) microseconds, increasing.
-    values: (k,) the control at these pulses: rad as `flight.dynamics.state.Commands` has them, or 0..1 of the throttle.
+    values: (k,) the control at these pulses: rad as in `flight.dynamics.state.Commands`, or 0..1 of the throttle.
     """
 
     number: int
@@ -34,11 +34,11 @@ class ServoOutput:
 
     @property
     def rest(self) -> float:
-        """Pulse in the middle of the throw: of the knot whose value is nearest to zero."""
+        """Pulse at the center of the throw: the knot whose value is nearest to zero."""
         return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
 
     def value(self, pulse: float) -> float:
-        """The control at a pulse, microseconds; at rest where there is none (0).
+        """Return the control at a pulse, microseconds; the rest value if there is no pulse (0).
 
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).value(1700)
         -0.25
@@ -55,7 +55,7 @@ class ServoOutput:
         return values[-1]
 
     def at_share(self, share: float) -> float:
-        """The control at a share of the throw, -1..1: 0 is the middle, and each end is as far as its pulse goes.
+        """Return the control at a fraction of the throw, -1..1: 0 is the center, each end its end pulse.
 
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).at_share(0.5)
         -0.25
@@ -74,7 +74,7 @@ class ServoMap:
     throttle: ServoOutput
 
     def commands(self, pulses: Sequence[int]) -> Commands:
-        """The controls that an autopilot's pulses (outputs,) ask for, microseconds."""
+        """Return the controls for an autopilot's pulses (outputs,), microseconds."""
         elevator, aileron, rudder, throttle = self.elevator, self.aileron, self.rudder, self.throttle
         return Commands(
             elevator.value(pulses[elevator.number - 1]),
@@ -84,7 +84,7 @@ class ServoMap:
         )
 
     def parameters(self) -> dict[str, float]:
-        """ArduPilot's parameters that make its outputs these."""
+        """Return ArduPilot's parameters for these outputs."""
         found: dict[str, float] = {}
         for name, function in FUNCTIONS.items():
             output: ServoOutput = getattr(self, name)
@@ -96,7 +96,9 @@ class ServoMap:
 
 
 def load_servo_map(aircraft: Aircraft) -> ServoMap:
-    """Read an aircraft's servos.  Raises FlightError, in one line, for a missing, unknown or bad entry.
+    """Read an aircraft's servos.
+
+    Raise FlightError, in one line, for a missing, unknown or bad entry.
 
     >>> from aircraft.catalog import load_aircraft
     >>> servos = load_servo_map(load_aircraft("aerosonde"))
@@ -128,8 +130,8 @@ def _output(name: str, entry: Any) -> ServoOutput:
     if not isinstance(entry, dict) or set(entry) != {"output", "pulse_us", key}:
         raise ValueError(f"{name}: keys output, pulse_us and {key} are expected")
     number, pulses, values = entry["output"], entry["pulse_us"], entry[key]
-    if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _SERVO_OUTPUTS:
-        raise ValueError(f"{name}.output = {number!r}: allowed 1..{_SERVO_OUTPUTS}")
+    if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= _MAX_OUTPUT:
+        raise ValueError(f"{name}.output = {number!r}: allowed 1..{_MAX_OUTPUT}")
     for label, numbers in (("pulse_us", pulses), (key, values)):
         if not (isinstance(numbers, list) and len(numbers) >= 2 and all(map(_is_number, numbers))):
             raise ValueError(f"{name}.{label} = {numbers!r}: two finite numbers or more are expected")
