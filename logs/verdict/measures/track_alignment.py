@@ -69,7 +69,7 @@ class AlignedTrack:
         return slice(int(self.rows[leg]), int(self.rows[leg + 1]) + 1)
 
     def leg_ends(self) -> tuple[float, ...]:
-        """Return the end time of each leg but the last, s: at the row nearest to its waypoint's apex; inf if not reached."""
+        """Return the end time of each leg but the last, s; inf for a leg whose waypoint was not reached."""
         ends = np.where(self.passed, self.track.time[self.rows], math.inf)[1:-1]
         return tuple(ends.tolist())
 
@@ -247,7 +247,7 @@ def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tupl
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
     step = max(1, int(CHORD_TIME / tick), -(-len(track) * count // _MAX_CELLS))
     first, until = read_only(progress.first // step), read_only(progress.last // step)
-    chords, capped = _assign_chords(read_only(position), apexes, first, until, step, CAPTURE_RADIUS)
+    chords, capped = _align(read_only(position), apexes, first, until, step, CAPTURE_RADIUS)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
     # Missed waypoints lie between their neighbours; waypoints after the last one that was met lie at the end.
@@ -272,7 +272,7 @@ def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tupl
 
 
 @compiled
-def _assign_chords(
+def _align(
     position: Floats, marks: Floats, first: RowNumbers, until: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:  # pragma: no cover - compiled
     """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, capture)^2.
