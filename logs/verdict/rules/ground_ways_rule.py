@@ -77,7 +77,7 @@ class _Obstacles(NamedTuple):
         """True if the path hits neither ground nor sphere nor zone; False if the ground is unknown."""
         return self.clearance >= 0.0 and not self.entered
 
-    def told(self, subject: str, where: str) -> Message:
+    def obstacle_message(self, subject: str, where: str) -> Message:
         """Return the obstacle in words.  where: the origin of its runs."""
         if self.entered:
             return message(f"{subject} enters {self.entered}")
@@ -212,7 +212,7 @@ def _unflown_start_finding(place: Place, met: _Obstacles) -> Finding:
     elif met.free:
         reason, check, ok = f"straight from home: {_room_text(met)}; not flown: the flight begins in the air", "", True
     else:
-        fault = met.told(subject, "from home, at the steepest climb")
+        fault = met.obstacle_message(subject, "from home, at the steepest climb")
         return _finding("climbout", place, met, None, fault, GROUND_WAY)
     return _finding("climbout", place, met, ok, message(reason), check)
 
@@ -240,7 +240,7 @@ def _launch_finding(
         reason = message(f"the ground below {subject} is not known")
         return _finding("climbout", place, met, None, reason)
     if not met.free:
-        fault = met.told(subject, "from home, at the steepest climb")
+        fault = met.obstacle_message(subject, "from home, at the steepest climb")
         other = _other_courses(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other)
         return _finding("climbout", place, met, False if is_known else None, fault, "" if is_known else GROUND_WAY)
@@ -248,7 +248,7 @@ def _launch_finding(
     if math.isnan(least.clearance) and not least.entered:
         return _finding("climbout", place, met, None, message(f"{at_least} leads to where the ground is not known"))
     if not least.free:
-        return _finding("climbout", place, met, None, least.told(at_least, "from home"), GROUND_WAY)
+        return _finding("climbout", place, met, None, least.obstacle_message(at_least, "from home"), GROUND_WAY)
     return _finding(
         "climbout", place, met, True, message(f"{subject.removeprefix('the climb from home ')}: {_room_text(met)}")
     )
@@ -311,12 +311,14 @@ def approach_findings(
     subject = f"the glide to {item}"
     if math.isnan(met.clearance) and not met.entered:
         return [_finding("approach", place, met, None, message(f"the ground below {subject} is not known"))]
-    told = met.told(subject, "before the landing point")
+    obstacle_message = met.obstacle_message(subject, "before the landing point")
     # With a landing point below the ground the glide hits the ground early: the elevation file may be some metres off.
     if met.entered or met.clearance + min(POINT_ERROR, max(0.0, under - low)) < 0.0:
-        return [_finding("approach", place, met, False, told)]
+        return [_finding("approach", place, met, False, obstacle_message)]
     if met.clearance < 0.0:
-        fault = message(f"the landing point of {item} is {under - low:.0f} m below the ground", f": {told.text}")
+        fault = message(
+            f"the landing point of {item} is {under - low:.0f} m below the ground", f": {obstacle_message.text}"
+        )
         return [_finding("approach", place, met, None, fault, GROUND_WAY)]
     if low - under > POINT_ERROR:
         fault = message(f"the landing point of {item} is {low - under:.0f} m above the ground")
