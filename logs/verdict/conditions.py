@@ -125,7 +125,7 @@ def setup_conditions(setup: FlightSetup) -> Conditions:
 
 
 def condition_lines(conditions: Conditions) -> list[str]:
-    """Return lines on the aircraft, its speed and whether it was named, and on weather, navigation and ground."""
+    """Return lines on the aircraft and its speed, and on weather, navigation and ground."""
     return [_aircraft_line(conditions), _world_line(conditions)]
 
 
@@ -175,10 +175,10 @@ _SAME_LINE_DISTANCE_M = 1.0
 
 
 def corridor_line(setup: FlightSetup) -> str:
-    """Return a line on an unstated corridor's width and origin, with a warning if it exceeds the gap between legs.
+    """Return a line on the width and origin of an unstated corridor.
 
-    A flight within so wide a corridor may have been off its lines all along.  "" if the corridor is stated, or if a
-    survey's cross-track errors are judged line by line.
+    Warns if it is wider than the gap between legs.  A flight within so wide a corridor may have been off its lines all
+    along.  "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
     """
     half, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or surveys_of(setup):
@@ -198,7 +198,9 @@ def corridor_line(setup: FlightSetup) -> str:
 
 
 def least_gap(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
-    """Return the least distance (m) between a leg and the next but one alongside it, and the first leg's number.
+    """Return the least distance (m) between a leg and the next but one, and the first leg's number.
+
+    Only legs that are side by side are compared.
 
     waypoints: (w, 3) m.  None if no two legs are side by side.
 

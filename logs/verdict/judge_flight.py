@@ -1,6 +1,7 @@
-"""Judge whether a flight shows that its plan is flyable.  Every number is computed again from the track.
+"""Judge whether a flight shows that its plan is flyable.
 
-Records of guidance (leg, cross-track, height error, clearance) and recorded verdicts are not read.
+Every number is computed again from the track.  Records of guidance (leg, cross-track, height error, clearance) and
+recorded verdicts are not read.
 """
 
 from collections.abc import Mapping
@@ -95,9 +96,10 @@ def judge_flight(
 def _levels(
     requirements: RouteRequirements, flown: tuple[Finding, ...], flyable: bool, reference: ReferenceFlights | None
 ) -> tuple[LevelAnswer, ...]:
-    """Return the answers of geometry and the airframe's reference flight, with differences, and the flight's own.
+    """Return the answers of geometry and of the reference flight, and the flight's own answer.
 
-    Without the envelope there is the flight's own answer alone.
+    The first two come with their disagreements with the flight.  Without the envelope there is the flight's own answer
+    alone.
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:

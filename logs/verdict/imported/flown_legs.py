@@ -1,4 +1,4 @@
-"""Find the legs of a route on which each stretch of a flight was flown; an imported log may hold only some."""
+"""Find the legs of a route that each stretch of a flight flew; an imported log may hold only some."""
 
 from dataclasses import dataclass, replace
 
@@ -42,10 +42,11 @@ class FlownLegs:
 
 
 def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> FlownLegs | None:
-    """Find the legs of a stretch; return None if it reached at most one waypoint, or has fewer than two rows.
+    """Find the legs of a stretch, or None if there are none.
 
-    A flight begins with the first waypoint that it passed: the path to that waypoint is no leg.  It ends with the last
-    waypoint that it passed, or on the leg from there, which was then flown in part.
+    There are none if it reached at most one waypoint, or has fewer than two rows.  A flight begins with the first
+    waypoint that it passed: the path to that waypoint is no leg.  It ends with the last waypoint that it passed, or on
+    the leg from there, which was then flown in part.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()

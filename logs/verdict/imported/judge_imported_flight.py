@@ -1,7 +1,7 @@
-"""Judge an imported flight: its stretches that followed the mission, by the same rules, as far as its log permits.
+"""Judge an imported flight: its stretches that followed the mission, as far as its log permits.
 
-A log may lack what a rule needs, have pauses, and end before the flight does.  What it cannot show is not judged, with
-the reason; a violation that it shows is a violation all the same.
+The rules are the same as for planfly's own flights.  A log may lack what a rule needs, have pauses, and end before the
+flight does.  What it cannot show is not judged, with the reason; a violation that it shows is a violation all the same.
 """
 
 from collections.abc import Sequence
@@ -99,7 +99,7 @@ def _judged_lines(source: ImportedLog, flown: Sequence[FlownLegs], numbers: Sequ
 
 
 def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return a line for each rule that was not judged, with the reason and, if some were judged, the count."""
+    """Return a line for each rule that was not judged, with the reason and, if partial, the numbers."""
     lines = []
     for rule in RULE_WORDS.values():
         mine = [item for item in findings if item.rule == rule.name]
@@ -395,7 +395,7 @@ def _at_route_place(item: Finding, first: int, setup: FlightSetup) -> Finding:
 
 
 def _merge_findings(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
-    """Merge the findings of all stretches, one per rule, place and check: a failure takes precedence over a pass."""
+    """Merge the findings of all stretches: one per rule, place and check, a failure before a pass."""
     found: dict[tuple[str, Place, str], Finding] = {}
     for findings in stretches:
         for item in findings:

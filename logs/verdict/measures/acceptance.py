@@ -47,10 +47,11 @@ class Reach:
 
 
 def reach(requirements: RouteRequirements, i: int) -> Reach:
-    """Return the condition for having reached waypoint i: the mission's own radius, otherwise the autopilot's.
+    """Return the condition for having reached waypoint i.
 
-    ArduPlane turns to the next leg at WP_RADIUS for a right angle or a sharper corner and at a fraction of it for a
-    gentler corner.  At the mission's end, and where a return to launch begins, it uses all of WP_RADIUS.
+    The mission's own radius applies, otherwise the autopilot's radius.  ArduPlane turns to the next leg at WP_RADIUS
+    for a right angle or a sharper corner and at a fraction of it for a gentler corner.  At the mission's end, and where
+    a return to launch begins, it uses all of WP_RADIUS.
     """
     setup, own = requirements.setup, float(requirements.fly_by_offset[i]) + PASS
     stated = float(setup.route.acceptance[i])
@@ -65,7 +66,7 @@ def reach(requirements: RouteRequirements, i: int) -> Reach:
 
 
 def position_error(setup: FlightSetup) -> float:
-    """Return how far (m) the aircraft may be from the position its autopilot assumes: three sigmas of one axis."""
+    """Return the distance (m) by which the navigation may be off: three sigmas of one axis."""
     return NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
 
 
@@ -114,7 +115,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
-    """Return the greatest horizontal distance of points from the nearest of some legs, m, and that point's row.
+    """Return the greatest horizontal distance of points from their nearest leg, m, and that point's row.
 
     points: (n, 3).  legs: (k + 1, 3), the ends of k legs in a row.
 
@@ -140,7 +141,7 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
-    """Return how near (m) a flyable path without the corner passes the waypoint, or None if there is no such path.
+    """Return how near (m) a flyable path without the corner passes the waypoint, or None without one.
 
     The path leaves out the waypoint and up to `KINK_WAYPOINTS` - 1 of its neighbours, passes each of them within
     """
@@ -157,7 +158,7 @@ def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
 
 
 def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
-    """Return True if the route without the waypoints first..last has room for the turns where it leaves them out."""
+    """Return True if the route without the waypoints first..last has room for the turns at the gap."""
     # Include two waypoints beyond the ends of the gap: their turns use part of the legs.
     start, stop = max(0, first - 4), min(len(requirements.points), last + 5)
     near = _reduced_route(requirements.setup.route, np.r_[start:first, last + 1 : stop])
@@ -172,16 +173,19 @@ def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
 
 
 def _reduced_route(route: Route, kept: NDArray[np.int64]) -> Route:
-    """Return the route reduced to some waypoints, each leg at the speed of the old leg that begins at the same one."""
+    """Return the route reduced to some waypoints.
+
+    Each leg has the speed of the old leg that begins at the same waypoint.
+    """
     names = ("waypoints", "acceptance", "fly_over", "items", "arcs", "above_ground")
     return replace(route, airspeed=route.airspeed[kept[:-1]], **{name: getattr(route, name)[kept] for name in names})
 
 
 def step(requirements: RouteRequirements, leg: int) -> float | None:
-    """Return the height (m, positive) of the step that a too steep leg is part of, or None if it exceeds `STEP`.
+    """Return the height (m, positive) of the step that a leg is part of, or None above `STEP`.
 
-    A sequence of legs that is too steep overall, including this leg, is one step: the height of a staircase is the
-    total height of its stairs.
+    The leg is beyond its slope limit.  A sequence of legs that is too steep overall, including this leg, is one step:
+    the height of a staircase is the total height of its stairs.
     """
     limit, _ = slope_limit(requirements, leg)
     sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0

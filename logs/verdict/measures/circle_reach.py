@@ -119,7 +119,7 @@ def _edges(requirements: RouteRequirements, middle: Floats, reach: float) -> lis
 
 
 def _rings(middle: Floats, reach: float, spacing: float) -> Floats:
-    """Return points (n, 2) m on rings about a center out to the reach, at most a raster step apart if possible."""
+    """Return points (n, 2) m on rings about a center out to the reach, about a raster step apart."""
     count = min(_MAX_RINGS, max(_MIN_RINGS, math.ceil(reach / spacing) if spacing > 0.0 else _MIN_RINGS))
     # A polygon circumscribed about its circle leaves no gap between the last ring and the reach.
     last = Cylinder(float(middle[0]), float(middle[1]), reach / math.cos(math.pi / CIRCLE_CORNERS))

@@ -45,7 +45,7 @@ def flown_phases(whole: RouteRequirements, track: Track) -> tuple[RouteRequireme
 
 
 def _takeoff_end_row(track: Track, ways: GroundWays) -> int:
-    """Return the row where the take-off ended: 0 without a take-off, the last row if it never reached its altitude."""
+    """Return the row where the take-off ended: 0 without a take-off, the last row if it did not end."""
     if ways.take_off is None:
         return 0
     above = track.position[:, 2] > ways.take_off.top
@@ -66,7 +66,10 @@ def by_the_ground(track: Track, ways: GroundWays) -> Flags:
 
 
 def leg_ends(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[float, ...]:
-    """Return the end time of each leg of the whole route but the last, s, including the start of the landing."""
+    """Return the end time of each leg of the whole route but the last, s.
+
+    Includes the start of the landing.
+    """
     ground, ends = requirements.ground, aligned.leg_ends()
     if ground is None or ground.ways.approach is None:
         return ends

@@ -1,4 +1,4 @@
-"""Represent a path as moves: straight pieces and arcs of one curvature, whose altitude is a parabola over the run.
+"""Represent a path as moves: straight pieces and arcs whose altitude is a parabola over the run.
 
 The moves of a planned path are its pieces themselves, not chords of them; the moves of a flown track are the straight
 lines from row to row.  Code that judges moves judges both.
@@ -55,7 +55,9 @@ def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pra
 
 
 def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | None = None) -> Records:
-    """Return the moves of a route's fly-by path, flown at each leg's ground speed, or its airspeed if it has none.
+    """Return the moves of a route's fly-by path, flown at each leg's ground speed.
+
+    Without a ground speed the airspeed is used.
 
     first, last: range of legs to return, all by default.
     """
@@ -98,9 +100,10 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
 
 
 def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) -> Records:
-    """Return the moves of a flown track, one from each row to the next; first, last: range of legs, all by default.
+    """Return the moves of a flown track, one from each row to the next.
 
-    Rows before the first leg belong to the first leg, and rows after the last leg to the last.
+    first, last: range of legs, all by default.  Rows before the first leg belong to the first leg, and rows after the
+    last leg to the last.
     """
     legs = len(aligned.rows) - 1
     last = legs - 1 if last is None else last
@@ -168,7 +171,10 @@ def move_blocks(
 def _steepest(
     block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: float
 ) -> float:  # pragma: no cover - compiled
-    """Return the steepest slope that the bilinear ground can have under a block, m per m; NaN adds nothing."""
+    """Return the steepest slope that the bilinear ground can have under a block, m per m.
+
+    NaN adds nothing.
+    """
     rows, cols = heights.shape
     west, south = polymap(to_pixel, block.west, block.south)
     east, north = polymap(to_pixel, block.east, block.north)

@@ -27,7 +27,7 @@ _JOINED_SEGMENTS = 16
 
 
 def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return the smallest height above ground on each segment and the fraction at which it occurs, (n - 1,) each.
+    """Return the smallest height above ground on each segment and its fraction there, (n - 1,) each.
 
     NaN if a segment leaves the raster or its data.
     """
@@ -202,7 +202,10 @@ def _inside(
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """One stay inside a sphere: from, to (s); closest: m from its center; whole: left again before the track's end."""
+    """One stay inside a sphere.
+
+    start, end: s.  closest: m from its center.  whole: True if it was left again before the track's end.
+    """
 
     start: float
     end: float
@@ -212,7 +215,7 @@ class Passage:
 
 
 def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floats]:
-    """Return the smallest height above ground on each segment of a track, m, and the fraction at which it occurs.
+    """Return the smallest height above ground on each segment of a track, m, and its fraction there.
 
     position: (t, 3).  Returns (t - 1,) twice; NaN if the segment leaves the terrain's data or is not a number.
     """

@@ -1,4 +1,4 @@
-"""Measure how much of a survey's photo line was flown as photos need it, and how much its photos overlap."""
+"""Measure how much of a photo line was flown as photos need it, and how much its photos overlap."""
 
 import math
 from collections.abc import Sequence
@@ -170,10 +170,10 @@ def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
 def _camera_on(
     requirements: RouteRequirements, line: PhotoLine, position: Floats, along: Floats, ahead: Flags, length: float
 ) -> Flags:
-    """Return True for each row with the camera on: from reaching the line's first waypoint to reaching its last.
+    """Return True for each row with the camera on.
 
-    The camera is always on if the mission does not switch it there.  ahead: True for each row that flies along the
-    line.
+    It is on from reaching the line's first waypoint to reaching its last.  The camera is always on if the mission does
+    not switch it there.  ahead: True for each row that flies along the line.
     """
     follows, rows = requirements.setup.autopilot.follows_path, np.arange(len(along))
 

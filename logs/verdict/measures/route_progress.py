@@ -137,7 +137,7 @@ def _samples(route: Route, spacing: float) -> _Samples:
 
 
 def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
-    """Return the center of a loiter's corners, and the distance from it, m, within which the loiter is flown."""
+    """Return the center of a loiter's corners, and the distance from it within which it is flown, m."""
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     wide = float(np.hypot(*(corners - middle).T).max()) + _LOITER_MARGIN_M
     if 0 <= route.return_from < first < route.return_until:

@@ -1,4 +1,4 @@
-"""Work out what a route requires of the aircraft, and the aircraft's limits: the planned side of every finding."""
+"""Work out what a route requires and the aircraft's limits: the planned side of every finding."""
 
 import functools
 import math
@@ -66,7 +66,7 @@ class Airspace:
         return Place(zone.kind, index, name=zone.name)
 
     def about(self, points: Floats) -> NDArray[np.int64]:
-        """Return the zones that a path (n, 3) m may violate: inclusions, and exclusions near a straight piece of it.
+        """Return the zones that a path (n, 3) m may violate: inclusions, and exclusions near a segment.
 
         >>> from world.airspace.zones import Cylinder
         >>> zones = tuple(Zone(str(k), "exclusion", Cylinder(1000.0 * k, 0.0, 50.0)) for k in range(4))
@@ -107,7 +107,10 @@ _last_records: list[tuple[tuple[Zone, ...], ZoneRecords]] = []
 
 
 def _records_of(zones: tuple[Zone, ...]) -> ZoneRecords:
-    """Return the records of zones; for the same tuple as last time, the same records, which must not be changed."""
+    """Return the records of zones.
+
+    For the same tuple as last time these are the same records, which must not be changed.
+    """
     for known, records in _last_records:
         if known is zones:
             return records
@@ -177,7 +180,10 @@ def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> Tu
 
 
 def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
-    """Return the length of leg (m) that a turn (rad) uses before and after its waypoint; a fly-over only after it."""
+    """Return the length of leg (m) that a turn (rad) uses before and after its waypoint.
+
+    A fly-over uses only the leg after it.
+    """
     if turn < 1e-9:
         return 0.0, 0.0
     if fly_over:
@@ -191,7 +197,10 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
 def _reversals(
     route: Route, tables: dict[float, PerformanceTable], courses: Floats, turns: Floats, radius: Floats, up: Floats
 ) -> Floats:
-    """Return the length of each leg used by the roll between opposite banks, (w - 1,) m; 0 between equal sides."""
+    """Return the length of each leg used by the roll between opposite banks, (w - 1,) m.
+
+    0 between turns to the same side.
+    """
     out = np.zeros(len(courses))
     for leg in range(1, len(courses) - 1):
         flown_by = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
@@ -218,7 +227,7 @@ def available_lengths(runs: Floats, before: Floats, after: Floats, reversal: Flo
 def _sharpest_turns(
     route: Route, runs: Floats, tightest: Floats, before: Floats, after: Floats, reversal: Floats
 ) -> Floats:
-    """Return the sharpest turn at each waypoint that fits its legs next to the neighbouring turns, (w,) rad."""
+    """Return the sharpest turn at each waypoint that fits between the neighbouring turns, (w,) rad."""
     out = np.full(len(tightest), math.pi)
     for i in range(1, len(tightest) - 1):
         if not math.isfinite(tightest[i]):
@@ -369,7 +378,10 @@ class RouteRequirements:
         return None if item < 0 else item
 
     def turns_around(self, waypoint: int) -> bool:
-        """Return True if a waypoint is part of a survey's turn-around, ends included, which the autopilot decides."""
+        """Return True if a waypoint is part of a survey's turn-around, ends included.
+
+        The autopilot decides its path.
+        """
         return waypoint in _turned_around(self.surveys)[0]
 
     def leads_around(self, leg: int) -> bool:
@@ -439,9 +451,10 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
 
 
 def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
-    """Return the surveys of a setup's mission that are judged by their lines; none for a plan made by planfly.
+    """Return the surveys of a setup's mission that are judged by their lines.
 
-    Surveys whose camera is switched, or, if the scenario asks for "lines", all legs with the form of a survey.
+    A plan made by planfly has none.  Surveys whose camera is switched, or, if the scenario asks for "lines", all legs
+    with the form of a survey.
     """
     asked = setup.scenario.limits.surveys
     if setup.plan is not None or asked == "path":
@@ -457,7 +470,10 @@ def surveys_of(setup: FlightSetup) -> tuple[Survey, ...]:
 
 @functools.lru_cache(maxsize=8)
 def _turned_around(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
-    """Return waypoints and legs of all turn-arounds, including the paths onto the first line and off the last."""
+    """Return the waypoints and legs of all turn-arounds.
+
+    Includes the paths onto the first line and off the last.
+    """
     ends = [pair for survey in surveys for pair in survey.ways_onto_lines()]
     return (
         frozenset(i for first, last in ends for i in range(first, last + 1)),
@@ -466,7 +482,9 @@ def _turned_around(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozens
 
 
 def true_route(setup: FlightSetup) -> Route:
-    """Return a setup's route with true airspeeds; ArduPlane's are equivalent: convert at each leg's mean altitude.
+    """Return a setup's route with true airspeeds.
+
+    ArduPlane's airspeeds are equivalent: they are converted at each leg's mean altitude.
 
     >>> from flight.autopilots.arduplane.autopilot import ArduPlane
     >>> from flight.autopilots.arduplane.parameters import default_parameters
@@ -559,7 +577,10 @@ def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
 
 
 def tighter_turn(requirements: RouteRequirements, i: int, aircraft: float) -> tuple[float, str]:
-    """Return the tighter of the scenario's limit at a waypoint and this aircraft limit, rad, and its source."""
+    """Return the tighter of the scenario's limit and this aircraft limit at a waypoint, rad.
+
+    And the source of the limit.
+    """
     fixed = requirements.limits.max_turn
     # A loiter has no angle: planfly made its corners.
     if fixed is not None and fixed <= aircraft and requirements.setup.route.arcs[i] == 0.0:
@@ -568,7 +589,10 @@ def tighter_turn(requirements: RouteRequirements, i: int, aircraft: float) -> tu
 
 
 def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
-    """Return the tighter limit on a leg's climb or, for a falling leg, its dive: rad, positive, and its source."""
+    """Return the tighter limit on a leg's climb or dive, rad, positive, and its source.
+
+    The dive applies to a falling leg.
+    """
     rising = requirements.slopes[leg] >= 0.0
     fixed = requirements.limits.max_climb if rising else requirements.limits.max_dive
     aircraft = float((requirements.climb if rising else requirements.dive)[leg])

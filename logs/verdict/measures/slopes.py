@@ -1,4 +1,4 @@
-"""Measure how each leg was climbed or descended: slope, height, throttle, and the steepest flight shown."""
+"""Measure how each leg was climbed or descended: slope, height, throttle, and the ability shown."""
 
 import math
 from dataclasses import dataclass
@@ -74,7 +74,9 @@ def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
 def straight_span(
     requirements: RouteRequirements, leg: int, clear: float, *, level: bool = False
 ) -> tuple[float, float]:
-    """Return the span of a leg (m from its start) that lies ``clear`` metres clear of the turns at its ends.
+    """Return the span of a leg (m from its start) that lies clear of the turns at its ends.
+
+    clear: distance kept from the turns, m.
 
     level: exclude the blends of slope too.
     """
@@ -141,7 +143,7 @@ def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) 
 
 
 def _angle_tolerance(floor: float, rest: float, run: float) -> float:
-    """Return the tolerance of a fitted angle: residuals at the ends of the run rotate the line by this much."""
+    """Return the tolerance of a fitted angle: residuals at the ends of the run rotate the line."""
     return min(floor + math.atan2(2.0 * rest, run), MAX_UNSTEADY)
 
 
@@ -210,7 +212,7 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Return the largest signed distance from the leg's line clear of blends, m, and whether no part is clear."""
+    """Return the largest signed distance from the leg's line, m, and whether no part is clear of blends."""
     along, _ = along_across(requirements, leg, position)
     low, high = straight_span(requirements, leg, CLEAR_OF_TURN, level=True)
     inside = (along >= low) & (along <= high)
@@ -226,7 +228,7 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg after the time the aircraft needs to take up its commanded speed; may be empty."""
+    """Return the rows of a leg after the time for taking up its commanded speed; may be empty."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.airspeed
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
@@ -235,7 +237,7 @@ def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 
 
 def _saturation(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float, float]:
-    """Return seconds at full and idle throttle, and the speed lost and gained meanwhile, as in `SlopeMeasure`."""
+    """Return seconds at full and idle throttle, and the speed lost and gained, as in `SlopeMeasure`."""
     rows = steady_rows(requirements, aligned, leg)
     track = aligned.track
     if rows.stop - rows.start < 2:
@@ -313,7 +315,7 @@ def _rows_after(mask: Flags, count: int) -> Flags:
 
 
 def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) -> tuple[float, float] | None:
-    """Return the least-squares plane's value at x = y = 0 and its standard error, or None if it is not determined."""
+    """Return the least-squares plane's value at x = y = 0 and its standard error, or None if singular."""
     columns = [np.ones_like(x), x] + ([y] if np.ptp(y) > 1e-3 else [])
     table = np.column_stack(columns)
     moments = table.T @ table / len(x)
@@ -335,7 +337,10 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 @compiled
 def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:  # pragma: no cover - compiled
-    """Return the airspeed gained from rising air (m/s) in rows 0..stop, as it fades, for an aircraft on a held path."""
+    """Return the airspeed gained from rising air (m/s) in rows 0..stop, as it fades.
+
+    For an aircraft that holds its path.
+    """
     out = np.zeros(stop)
     for k in range(1, stop):
         step = time[k] - time[k - 1]
@@ -345,7 +350,7 @@ def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) ->
 
 
 def _largest_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
-    """Return the largest mean of ``value`` over ``width`` rows that are mostly in ``mask``; 0 if there are none."""
+    """Return the largest mean of ``value`` over ``width`` rows mostly in ``mask``, or 0 without any."""
     if mask.size < width:
         return 0.0
     total = np.concatenate([[0.0], np.cumsum(value)])

@@ -1,7 +1,8 @@
-"""Align a track with a route: its usable rows, and the rows that belong to each leg; the flown side of every finding.
+"""Align a track with a route: its usable rows, and the rows of each leg.
 
-Only time, position, velocity, attitude, airspeed, throttle, wind, current and energy are read.  The columns that
-guidance records about itself (leg, cross-track, height error, clearance) are not: a verdict must not depend on them.
+This is the flown side of every finding.  Only time, position, velocity, attitude, airspeed, throttle, wind, current and
+energy are read.  The columns that guidance records about itself (leg, cross-track, height error, clearance) are not: a
+verdict must not depend on them.
 """
 
 import math
@@ -69,7 +70,7 @@ class AlignedTrack:
         return slice(int(self.rows[leg]), int(self.rows[leg + 1]) + 1)
 
     def leg_ends(self) -> tuple[float, ...]:
-        """Return the end time of each leg but the last, s; inf for a leg whose waypoint was not reached."""
+        """Return the end time of each leg but the last, s; inf if its waypoint was not reached."""
         ends = np.where(self.passed, self.track.time[self.rows], math.inf)[1:-1]
         return tuple(ends.tolist())
 
@@ -180,9 +181,10 @@ def _with_arrivals(
 def _begin_last_leg(
     requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrived: Floats
 ) -> None:
-    """Begin the leg on which a track ends at the row that came within reach of its first waypoint; changes ``rows``.
+    """Begin the track's last leg at the row that came within reach of its first waypoint.
 
-    Only if the track ends within that reach, before the waypoint: the autopilot is on the next leg by then.
+    Changes ``rows``.  Only if the track ends within that reach, before the waypoint: the autopilot is on the next leg
+    by then.
     """
     k = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if not 0 < k < len(rows) - 1 or rows[k] < len(track) - 1 or requirements.setup.route.arcs[k] > 0.0:
@@ -193,14 +195,14 @@ def _begin_last_leg(
 
 
 def along_across(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
-    """Return the distances along a leg from its start and to the right of its line, m, of positions (n, 3)."""
+    """Return distances along a leg from its start and to the right of its line, m, of positions (n, 3)."""
     east, north = position[:, 0] - requirements.points[leg, 0], position[:, 1] - requirements.points[leg, 1]
     ux, uy = math.sin(requirements.courses[leg]), math.cos(requirements.courses[leg])
     return east * ux + north * uy, east * uy - north * ux
 
 
 def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Return each track segment's least horizontal distance from a target, m, and the fraction at which it occurs.
+    """Return each track segment's least horizontal distance from a target, m, and its fraction there.
 
     position: (n, 3).  target: (2,) or (3,).  Returns (n - 1,) twice.
     """
@@ -239,9 +241,10 @@ def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
 
 
 def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
-    """Return the row of each waypoint's passage: the time-ordered assignment with the least sum of squared distances.
+    """Return the row of each waypoint's passage, and its distance, m.
 
-    Only rows along each waypoint's legs are considered.
+    The assignment in time order with the least sum of squared distances.  Only rows along each waypoint's legs are
+    considered.
     """
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
@@ -275,10 +278,10 @@ def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tupl
 def _align(
     position: Floats, marks: Floats, first: RowNumbers, until: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:  # pragma: no cover - compiled
-    """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, capture)^2.
+    """Find the chord (of ``step`` rows) of each mark, in time order.
 
-    By dynamic programming; among equal assignments the earliest.  Also return which marks no row of their chord
-    captures; only chords first..until can capture a mark.
+    The sum of min(distance, capture)^2 is the least.  By dynamic programming; among equal assignments the earliest.
+    Also return which marks no row of their chord captures; only chords first..until can capture a mark.
     """
     last = position.shape[0] - 1
     chords = -(-last // step)
@@ -333,9 +336,10 @@ _IGNORED_COLUMNS = ("velocity", "attitude", "airspeed", "controls", "wind", "cur
 
 
 def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
-    """Return the end of each leg but the last, s, for a track without a verdict; inf if its waypoint was not reached.
+    """Return the end of each leg but the last, s, for a track without a verdict.
 
-    Only time and position are used.  Empty for a track with fewer than two usable rows.
+    inf if its waypoint was not reached.  Only time and position are used.  Empty for a track with fewer than two usable
+    rows.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()

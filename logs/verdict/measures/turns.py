@@ -91,7 +91,7 @@ def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Flo
 def _measure_overshoot_of_next_leg(
     requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Return overshoot (m, or None) of the corner at a waypoint, and how far past the leg's end it began (m)."""
+    """Return the overshoot (m, or None) at a waypoint, and how far past the leg's end it began (m)."""
     run = float(requirements.runs[k])
     along, across = along_across(requirements, k, _track_between(aligned, start, end)[1])
     if along[0] > run:
@@ -203,7 +203,7 @@ def _angle(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> tu
 
 
 def _second_by_second(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Return the largest mean bank over a second (rad) and the least radius over a second (m; inf for no turn)."""
+    """Return the largest mean bank (rad) and the least radius (m; inf for no turn), each over a second."""
     time = aligned.track.time[rows]
     bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
     ticks = int(np.searchsorted(time, time[0] + 1.0))
@@ -241,7 +241,10 @@ def _overshoot(
 def _settled(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int, first: int, end: int, along: Floats, across: Floats
 ) -> float:
-    """Return the mean distance from the next leg's line in the last second before the next turn, or at its end, m."""
+    """Return the mean distance from the next leg's line in its last second before the next turn, m.
+
+    If the turn takes all of the leg, the distance at its end.
+    """
     time = aligned.track.time[first : first + end + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))
     rows = np.arange(start, end + 1)

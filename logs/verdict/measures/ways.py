@@ -112,7 +112,7 @@ def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None
 
 
 def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
-    """Return the waypoint at which a mission lands by a glide and its item, or None if it has no such landing."""
+    """Return the waypoint at which a mission lands by a glide and its item, or None without one."""
     lands = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
     found = [(k, lands[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in lands]
     return found[-1] if found else None

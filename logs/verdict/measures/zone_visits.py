@@ -1,4 +1,4 @@
-"""Find where a path violates airspace zones, compiled: how deep, for how long, where it enters and leaves.
+"""Find where a path violates airspace zones, compiled: depth, duration, entry and exit.
 
 The distance of a place beyond a zone's limit changes no faster along a path than the path itself moves, or than its
 height above ground changes.  A path is bisected until each part is certain to be on one side of the limit, and no part
@@ -50,9 +50,9 @@ PART = record_dtype(
 def look_at_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:  # pragma: no cover - compiled
-    """Return a place's distances outside zone z's shape and outside its band, m, negative inside, and the nearest edge.
+    """Return a place's distances outside zone z's shape and band, m, and its nearest edge.
 
-    NaN for a band given above ground if the ground there is not known.
+    Negative inside.  NaN for a band given above ground if the ground there is not known.
     """
     zone = records.zones[z]
     away, edge = nearest_edge(records, z, east, north)
@@ -64,7 +64,9 @@ def look_at_zone(
 
 @inlined
 def beyond_limit(exclusion: bool, away: float, off: float) -> float:  # pragma: no cover - compiled
-    """Return how far beyond a zone's limit a place is, m: the shortest move, level or vertical, to comply again.
+    """Return how far beyond a zone's limit a place is, m.
+
+    This is the shortest move, level or vertical, to comply again.
 
     Negative for a place that complies: the shortest move to the limit.  away, off: from `look_at_zone`.  NaN if the
     answer depends on ground that is not known.
@@ -91,7 +93,7 @@ def copy_part(source: Record, target: Record) -> None:  # pragma: no cover - com
 def between_ends(
     exclusion: bool, part: Record, run: float, rise: float, farthest: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Return the least and greatest distance beyond a zone's limit that a part can have between its ends, m.
+    """Return the least and greatest distance beyond a zone's limit between a part's ends, m.
 
     run: length of the part, m.  rise: the largest change of its height in the band.  farthest: upper bound of its
     distance beyond the zone's outline, m.
@@ -113,10 +115,11 @@ def between_ends(
 def farthest_from_outline(
     records: ZoneRecords, z: int, move: Record, part: Record, run: float
 ) -> float:  # pragma: no cover - compiled
-    """Return an upper bound, m, of a part's distance beyond zone z's outline, by the edges nearest to its ends.
+    """Return an upper bound, m, of a part's distance beyond zone z's outline.
 
-    The distance from one edge, or from a center, is greatest at an end of a straight line.  An arc of less than a
-    radian leaves its chord by no more than an eighth of its curvature times its length squared.
+    It follows from the edges nearest to the part's ends.  The distance from one edge, or from a center, is greatest at
+    an end of a straight line.  An arc of less than a radian leaves its chord by no more than an eighth of its curvature
+    times its length squared.
     """
     zone = records.zones[z]
     bow: float = 0.125 * abs(move.curvature) * run * run
