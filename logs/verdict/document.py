@@ -1,4 +1,4 @@
-"""Define the data classes of ``verdict.json``: a verdict with its texts, the source of its JSON schema.
+"""Define the data classes of ``verdict.json``: a verdict with its texts; its JSON schema is made of them.
 
 `logs.verdict.verdict.Verdict.document` fills them.
 """

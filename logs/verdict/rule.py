@@ -42,7 +42,7 @@ Suggest = Callable[[RouteRequirements, AlignedTrack | None, Finding], tuple[Sugg
 
 @dataclass(frozen=True, slots=True)
 class LogNeeds:
-    """Data that the log of an imported flight needs for a rule to judge it, in addition to times and positions.
+    """Data that an imported log needs for a rule to judge it, in addition to times and positions.
 
     quantities: quantities without which the rule is not judged.
     planned_heights: the plan states altitudes.

@@ -1,4 +1,4 @@
-"""Suggest the smallest change that makes a failed finding pass: a gentler slope, a longer leg, a lower speed.
+"""Suggest the smallest change that makes a finding pass: gentler slope, longer leg, lower speed.
 
 Each function takes the route's requirements, the aligned track (None if nothing was flown) and the failed finding; a
 rule names the function that suggests for it.  All suggestions are alternatives, the smallest relative change first.
@@ -94,10 +94,11 @@ def pass_zone(requirements: RouteRequirements, aligned: AlignedTrack | None, ite
 def _least_shift(
     moves: Records, record: ZoneRecords, terrain: Terrain | None, axis: str, sign: float, most: float
 ) -> float | None:
-    """Return the least shift (m) in one direction that ends a violation, or None above ``most`` or if not found.
+    """Return the least shift (m) in one direction that ends a violation, or None.
 
-    A path at some depth beyond a limit needs a shift of at least that depth, so shifting by the depth at each step
-    misses no smaller shift.  Ground that rises faster than the step may be missed.
+    None if it is above ``most``, or was not found.  A path at some depth beyond a limit needs a shift of at least that
+    depth, so shifting by the depth at each step misses no smaller shift.  Ground that rises faster than the step may be
+    missed.
     """
     shift, shifted = 0.0, np.array(moves)
     for _ in range(ZONE_TRIES):
@@ -182,7 +183,7 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
 
 
 def ease_turn(requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
-    """Suggest a gentler turn, longer legs or a lower speed for one waypoint; the least relative change first."""
+    """Suggest a gentler turn, longer legs or a lower speed; the least relative change first."""
     i = item.place.index
     if i is None:
         return ()
@@ -260,7 +261,7 @@ def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
 
 
 def _level_speeds(requirements: RouteRequirements, amsl: float, now: float, factor: float) -> list[float]:
-    """Return speeds to command for level flight at this altitude in the envelope, the nearest to ``now`` first.
+    """Return speeds to command for level flight at an altitude, the nearest to ``now`` first.
 
     factor: ratio of true airspeed to commanded airspeed.
     """
@@ -382,7 +383,10 @@ def fly_faster(requirements: RouteRequirements, _aligned: AlignedTrack | None, i
 def fly_level_speed(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, item: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest an airspeed of level flight at the leg's altitude; a certain one if the maximum is uncertain."""
+    """Suggest an airspeed of level flight at the leg's altitude.
+
+    A certain one if the maximum is uncertain.
+    """
     leg = item.place.index
     if leg is None or item.limit is None or item.margin is None:
         return ()

@@ -40,7 +40,9 @@ def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> st
 
 
 def undecided_text(findings: Sequence[Finding]) -> str:
-    """Return what is undecided: by an uncertain aircraft, by paths only a flight shows, by hazards; "" for nothing.
+    """Return what is undecided, "" for nothing.
+
+    By an uncertain aircraft, by paths that only a flight shows, or by hazards.
 
     >>> from logs.verdict.findings import UNKNOWN_AIRCRAFT, make_finding
     >>> from logs.verdict.places import Place
@@ -101,7 +103,7 @@ def first_failed(findings: Sequence[Finding]) -> Finding | None:
 
 
 def _sorted_failures(findings: Sequence[Finding]) -> list[Finding]:
-    """Return failed findings: those that end a flight first, then those a change of plan can fix, then the rest."""
+    """Return failed findings: first those that end a flight, then those a change of plan can fix."""
     order = {name: k for k, name in enumerate(RULE_WORDS)}
     failed = (item for item in findings if item.ok is False)
     return sorted(failed, key=lambda item: (-RULE_WORDS[item.rule].urgency, order[item.rule]))
@@ -152,7 +154,7 @@ def summary_lines(
     conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Return the lines of the summary: answer, airframe or autopilot, start, conditions, not judged, levels.
+    """Return the summary: answer, airframe or autopilot, start, conditions, not judged, levels.
 
     levels: the verdict's own level last, with the headline.
     """
@@ -197,7 +199,7 @@ def summary_lines(
 def _airframe_or_autopilot_lines(
     levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup
 ) -> list[str]:
-    """If the airframe can fly the mission but the autopilot cannot, say so and name the limiting parameter."""
+    """If the airframe can fly the mission but the autopilot cannot, name the limiting parameter."""
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []

@@ -131,7 +131,7 @@ class Verdict:
         return {name: finding for name, finding in closest.items() if finding is not None}
 
     def to_pandas(self) -> Any:
-        """Return a `pandas.DataFrame`: a row for each finding, in the verdict's order, NaN for missing numbers.
+        """Return a `pandas.DataFrame`: a row for each finding, in verdict order, NaN for missing numbers.
 
         Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
         tolerance, margin, unit, limit_source, method, ok (None if it was not judged) and reason.

@@ -159,7 +159,10 @@ def _height_errors(
 
 
 def over_ground(requirements: RouteRequirements, places: Floats) -> Floats:
-    """Return heights (n,) m of places (n, 3) above ground; without terrain above home or the route's lowest waypoint."""
+    """Return heights (n,) m of places (n, 3) above ground.
+
+    Without terrain, above home or the route's lowest waypoint.
+    """
     ground, home = requirements.setup.scenario.terrain, requirements.setup.mission.home
     if ground is not None:
         heights: Floats = places[:, 2] - ground.height(places[:, 0], places[:, 1])

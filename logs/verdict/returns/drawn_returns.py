@@ -1,4 +1,4 @@
-"""Prepare returns for drawing: the paths of the worst, and the least altitude from which a return is safe.
+"""Prepare returns for drawing: the worst paths, and the least altitude from which a return is safe.
 
 Neither is needed to judge returns, and both take as long as judging: they are computed only if a picture is wanted.
 """
@@ -190,7 +190,10 @@ def least_heights(world: ReturnWorld, starts: ReturnStarts) -> LeastHeights:
 
 
 def _safe_from(world: ReturnWorld, starts: ReturnStarts, above: Floats, asked: Flags) -> Flags:
-    """Return True for each return that is safe from an offset altitude, m; only those in ``asked`` are flown."""
+    """Return True for each return that is safe from an offset altitude, m.
+
+    Only the returns in ``asked`` are flown.
+    """
     found = np.zeros(len(starts), dtype=np.bool_)
     if asked.any():
         rows = starts.rows[asked].copy()

@@ -1,6 +1,8 @@
-"""Compute the altitude an aircraft needs to glide to a place, for every cell: backward shortest paths over terrain.
+"""Compute for every cell the altitude that an aircraft needs to glide to a place.
 
-One search begins at the places to be reached and runs against the direction of flight.  A cell's label is the least
+The shortest paths over terrain are searched backwards.  One search begins at the places to be reached and runs against
+the direction of flight.  A cell's label is the least
+
 altitude from which the glide gets there: the label of the next cell plus the height lost on the step to it, and no less
 than the ground with its margin, there and between them.  So the labels include the terrain, and one search serves every
 second of a flight.  A step costs its length times sink by ground speed on its course in the wind at that altitude,
@@ -109,7 +111,10 @@ def glide_map(
 
 
 def _add_sphere(made: GlideMap, centre: Floats, radius: float) -> None:
-    """Widen the altitude range in which cells lie in kill spheres, each at its point nearest to the sphere's center."""
+    """Widen the altitude range in which cells lie in a kill sphere.
+
+    Each cell at its point nearest to the sphere's center.
+    """
     row, column = made.cell_of(float(centre[0]), float(centre[1]))
     steps = math.ceil(radius / made.cell) + 1
     rows = slice(max(0, row - steps), max(0, row + steps + 1))
@@ -377,7 +382,7 @@ def _lifted(
     floor: Floats, low: Floats, high: Floats, between: Records, move: Record, row: int, column: int, here: float,
     loss: float,
 ) -> float:  # pragma: no cover - compiled  # fmt: skip
-    """Return the least start altitude of a step that ends in a cell, above all cells between; NaN if impossible."""
+    """Return the least start altitude of a step that ends in a cell, above all cells between, or NaN."""
     wanted = here + loss
     for k in range(move.first, move.last):
         cell = between[k]

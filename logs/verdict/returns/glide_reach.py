@@ -1,6 +1,8 @@
-"""Compute what a flying aircraft can glide to: it flies on for a moment, turns to the path there, and glides.
+"""Compute what a flying aircraft can glide to.
 
-The path comes from a backward search (`logs.verdict.returns.glide_map`) that ignores turns.  So the turn is flown
+It flies on for a moment, turns to the path there, and glides.  The path comes from a backward search
+(`logs.verdict.returns.glide_map`) that ignores turns.  So the turn is flown
+
 first, to either side, in the mean wind: at the bank that the autopilot commands and the airspeed allows, at the higher
 speed and sink that the load factor of that bank causes.  Neither the altitude that the excess speed over the glide
 speed would give back nor the altitude needed to reach the speed of the turn is included.
@@ -126,7 +128,7 @@ def _look_ahead(
 def _is_clear(
     here: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record
 ) -> bool:  # pragma: no cover - compiled
-    """Return True if a place is above the margin over the ground, on the map, and outside every kill sphere."""
+    """Return True if a place is on the map, above the ground's margin, and outside every kill sphere."""
     i, j = round((here.north - glider.south) / glider.cell), round((here.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not here.up >= floor[i, j]:
         return False
@@ -141,7 +143,7 @@ def _is_clear(
 def _best_cell(
     here: Record, need: Floats, worst: float, glider: Record
 ) -> tuple[float, int, int]:  # pragma: no cover - compiled
-    """Return the best of a place's cell and its neighbours by altitude left: altitude left, row and column.
+    """Return the best of a place's cell and its neighbours: altitude left, row and column.
 
     A cell's center may lie in a sphere that the place itself is outside of.  worst: height lost per metre to a center.
     """

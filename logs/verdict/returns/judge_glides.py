@@ -162,7 +162,7 @@ class Glides:
         return None if not self.each or self.count("unknown") else True
 
     def best_site(self, one: Glide) -> int:
-        """Return home if it is in reach, otherwise the site with most altitude left over; -1 if none is in reach."""
+        """Return home if it is in reach, otherwise the site with most altitude left, or -1 if none is."""
         if one.reach == "home":
             return 0
         return int(np.argmax(one.left)) if one.reach == "site" else -1
@@ -179,7 +179,10 @@ class Glides:
         return tuple(found)
 
     def spare(self, one: Glide) -> float:
-        """Return the altitude left at the best destination, m; below 0 if none is in reach, -inf without a path."""
+        """Return the altitude left at the best destination, m.
+
+        Below 0 if none is in reach, -inf without a path.
+        """
         if one.reach in ("home", "site"):
             return one.left[self.best_site(one)]
         return one.flat if one.reach == "flat" else max((*one.left, one.flat))
@@ -254,7 +257,7 @@ def _sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
 
 
 def _flat_ground(world: ReturnWorld, made: GlideMap) -> Flags:
-    """Return cells (n, e) suitable for landing: flat, and in no exclusion zone that reaches down to the ground."""
+    """Return cells (n, e) for landing: flat, and in no exclusion zone that reaches down to the ground."""
     flat = landable(made)
     bar_zones(made, flat, world.airspace.records, MARGIN)
     return flat
@@ -265,7 +268,10 @@ def _flat_ground(world: ReturnWorld, made: GlideMap) -> Flags:
 
 
 def _own_glides(world: ReturnWorld, starts: ReturnStarts) -> list[OwnGlide]:
-    """Simulate ArduPlane's returns without thrust; a return that goes on to land is flown as far as its loiter."""
+    """Simulate ArduPlane's returns without thrust.
+
+    A return that goes on to land is flown as far as its loiter.
+    """
     targets = [world.target(row) for row in starts.rows]
     if "terrain" in world.open:
         return [OwnGlide(one, "not flown", math.nan, math.nan, _NOWHERE, math.nan) for one in targets]

@@ -218,7 +218,7 @@ class Returns:
 
     @property
     def point_of_no_return(self) -> PointOfNoReturn:
-        """Point of no return by energy, for the returns that RTL flies; returns that do not arrive are left out."""
+        """Point of no return by energy, for RTL returns; returns that do not arrive are left out."""
         last, least, skipped = math.nan, math.inf, 0
         if not self.each or all(math.isnan(one.left) for one in self.each):
             return PointOfNoReturn("battery")
@@ -458,7 +458,9 @@ def judge_returns(
 
 
 def sinks_down(one: ReturnFlown, height: float) -> bool:
-    """Return True if a return from low in a take-off or a landing sinks to the ground, which is not a path fault.
+    """Return True if a return from a low start in a take-off or landing just sinks to the ground.
+
+    That is no fault of its path.
 
     height: its starting height above ground, m.  Below `TOUCHING` this is any return that hits the ground or gets low
     near its start; higher up, one that loses half of its height by then.  A return that flies into rising ground, or
@@ -480,7 +482,9 @@ def fly_home(
     *,
     keep: bool = False,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their paths if there are zones.
+    """Simulate returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their paths.
+
+    The paths are returned if there are zones.
 
     least: as in `flight.autopilots.arduplane.swift_return.fly_returns`.  keep: True to return all paths.
     """
@@ -635,7 +639,7 @@ def is_steady(world: ReturnWorld, row: Record) -> bool:
 
 
 def doubt(one: ReturnFlown) -> float:
-    """Return a return's distance from what decides it, m: the ground, its required height, or a kill sphere."""
+    """Return a return's distance, m, from what decides it: ground, required height, or a kill sphere."""
     if one.kind in ("zone", "unknown"):
         # Neither depends on a distance.
         return math.inf

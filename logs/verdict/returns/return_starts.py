@@ -151,7 +151,10 @@ def planned_starts(setup: FlightSetup, every: float) -> ReturnStarts:
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:
-    """Return the ground speed on each leg in the mean wind, m/s; the airspeed if the wind leaves no ground speed."""
+    """Return the ground speed on each leg in the mean wind, m/s.
+
+    The airspeed if the wind leaves no ground speed.
+    """
     route, found = setup.route, []
     courses = leg_courses(route.waypoints)
     for leg, speed in enumerate(route.airspeed.tolist()):

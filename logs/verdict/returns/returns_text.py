@@ -138,7 +138,7 @@ def _judged(returns: Returns) -> str:
 
 
 def no_return_text(returns: Returns) -> str:
-    """Return a line on the point from which the battery no longer brings the aircraft back with its reserve.
+    """Return a line on the place from which the battery no longer lasts for a return with reserve.
 
     >>> no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
     'point of no return: not judged, for the energy in the battery is not known'
@@ -190,7 +190,9 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
 
 
 def landing_text(returns: Returns) -> list[str]:
-    """Return lines on how RTL_AUTOLAND ends a return, and on the landing sequence; none for another autopilot.
+    """Return lines on how RTL_AUTOLAND ends a return, and on the landing sequence.
+
+    Another autopilot has no such lines.
 
     >>> landing_text(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return stays in its circle']
@@ -221,7 +223,7 @@ def landing_text(returns: Returns) -> list[str]:
 
 
 def range_text(found: ReturnRange, returns: Returns, scenario: Scenario) -> str:
-    """Return the text of a time range: the destination of its returns, their outcome, and the worst of them."""
+    """Return the text of a time range: destination and outcome of its returns, and the worst of them."""
     one = found.worst
     when = f"{found.first:.0f} s" if found.count == 1 else f"{found.first:.0f} to {found.last:.0f} s"
     reason = f" ({one.target.reason})" if one.target.reason else ""
@@ -268,7 +270,7 @@ def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
 
 
 def rally_texts(rally: Sequence[ReturnPlace], scenario: Scenario) -> list[str]:
-    """Return latitude, longitude and height above home of rally points, in the form that a ground station takes."""
+    """Return latitude, longitude and height above home of rally points, as a ground station takes them."""
     out = []
     for point in rally:
         lat, lon = (float(value) for value in to_geo(scenario.origin, point.east, point.north))

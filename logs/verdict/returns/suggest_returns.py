@@ -1,8 +1,8 @@
-"""Suggest changes that make every return safe: least RTL_ALTITUDE, climb before the turn, or fewest rally points.
+"""Suggest what makes every return safe: RTL_ALTITUDE, a climb before the turn, or rally points.
 
-Each is simulated from all places, like judged returns.  Plain set cover does not work for rally points: the autopilot
-goes to the nearest point and not to the best, so a set is rated by the autopilot's choice, and an added point may take
-returns away from a point that was good for them.
+The least altitude, and the fewest points.  Each is simulated from all places, like judged returns.  Plain set cover
+does not work for rally points: the autopilot goes to the nearest point and not to the best, so a set is rated by the
+autopilot's choice, and an added point may take returns away from a point that was good for them.
 """
 
 import math
@@ -58,7 +58,7 @@ class Remedy:
 
 
 def helps(before: Returns, after: Returns) -> bool:
-    """Return True if a suggestion improves the returns: fewer fail, and no kind of failure gets more frequent.
+    """Return True if fewer returns fail with a suggestion, and no kind of failure gets more frequent.
 
     Only the returns that get low, and the safe returns, may become more.
     """
@@ -107,7 +107,10 @@ def _keeps_ground(_world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:
 
 
 def _keeps_all(world: ReturnWorld, flown: Records, needs: _Needs) -> Flags:
-    """Return True for each return that also stays outside spheres; zones and energy are checked for the whole set."""
+    """Return True for each return that also stays outside spheres.
+
+    Zones and energy are checked for the whole set.
+    """
     return np.asarray(_keeps_ground(world, flown, needs) & (flown["outside"] >= needs.outside))
 
 
@@ -153,7 +156,7 @@ class _Trial:
 
 
 def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]:
-    """Return the least RTL_ALTITUDE that keeps all returns above ground, and one that is safe; or a climb first.
+    """Return the least RTL_ALTITUDE that clears the ground, the least safe one, or a climb first.
 
     Altitudes are tried one by one: a higher one is not certain to be safer, because it may lead through a sphere.
     """
@@ -321,7 +324,10 @@ def _sphere_clearance(world: ReturnWorld, place: tuple[float, float, float]) -> 
 
 
 class _Search:
-    """Search for rally points by which returns to each candidate are good; these are simulated when first needed."""
+    """Search for rally points by which returns to each candidate are good.
+
+    These are simulated when first needed.
+    """
 
     def __init__(
         self, world: ReturnWorld, starts: ReturnStarts, needs: _Needs, places: list[ReturnPlace], home: Flags

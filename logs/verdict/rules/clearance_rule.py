@@ -50,7 +50,10 @@ def clearance_findings(
 
 
 def _below_home(requirements: RouteRequirements) -> list[Finding]:
-    """Report a lowest point below home as undecided: without terrain the ground is assumed at home's altitude."""
+    """Report a lowest point below home as undecided.
+
+    Without terrain the ground is assumed at home's altitude.
+    """
     home = requirements.setup.mission.home
     if home is None:
         return []
@@ -65,7 +68,9 @@ def _below_home(requirements: RouteRequirements) -> list[Finding]:
 
 
 def _home_above_ground(requirements: RouteRequirements, ground: Terrain, legs: list[Finding]) -> list[Finding]:
-    """Report a route over home as undecided if it is too low once home is on the ground, where an autopilot sets it.
+    """Report a route over home as undecided if it is too low once home is on the ground.
+
+    An autopilot sets home on the ground when it is armed there.
 
     legs: the findings of the legs.
     """
@@ -146,7 +151,10 @@ def _near_ground(requirements: RouteRequirements) -> dict[int, tuple[tuple[float
 
 
 def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
-    """Return the last waypoint up to the final's start that meets the limit above ground, or that start if none."""
+    """Return the last waypoint up to the final's start that meets the limit above ground.
+
+    The final's start if none does.
+    """
     terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.waypoints[: final + 1]
     if terrain is None:
         return final

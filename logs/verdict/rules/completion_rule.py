@@ -1,4 +1,4 @@
-"""The completion rule: planned feasibly, flown to the last waypoint, recorded in full and without contradiction."""
+"""The completion rule: planned feasibly, flown to the last waypoint, recorded whole and consistently."""
 
 from collections.abc import Iterable, Sequence
 
@@ -19,7 +19,7 @@ from logs.verdict.wording import place_text_within
 def completion_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge completion: planned feasibly, flown to the last waypoint, recorded whole and without contradiction."""
+    """Judge completion: planned feasibly, flown to the last waypoint, recorded whole and consistently."""
     plan = requirements.setup.plan
     faults = []
     if plan is not None and not plan.feasible:
@@ -196,7 +196,7 @@ def _absent_text(missing: MissingItems) -> str:
 
 
 def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:
-    """Return True if a stretch ended in the autopilot's return mode and the mission's next item is that return."""
+    """Return True if a stretch ended in the return mode and the mission's next item is that return."""
     item = int(setup.route.items[_next_waypoint(setup, legs)])
     commands = {one.seq: one.command for one in setup.mission.items}
     return legs.stretch.next_mode == _RETURN_MODE and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH

@@ -1,4 +1,4 @@
-"""The energy rule: energy from the battery or the tank, predicted and flown, against the usable energy."""
+"""The energy rule: energy from battery or tank, predicted and flown, against the usable energy."""
 
 import math
 
@@ -18,10 +18,10 @@ from logs.verdict.tolerances import RESERVE, UNDECIDED
 def energy_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the energy used against the battery less its reserve; an endless jump needs more than any battery.
+    """Judge the energy used against the battery less its reserve.
 
-    A guessed battery is not judged, and energy that is not certainly within the limit is undecided if the aircraft's
-    power is uncertain; an imported log has it measured.
+    An endless jump needs more than any battery.  A guessed battery is not judged, and energy that is not certainly
+    within the limit is undecided if the aircraft's power is uncertain; an imported log has it measured.
     """
     setup = requirements.setup
     usable = (1.0 - RESERVE) * setup.battery
@@ -101,10 +101,10 @@ def _used_text(requirements: RouteRequirements, used: float, current: float) -> 
 
 
 def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
-    """Return energy (Wh) and peak current (A) of steady flight along a route, NaN if the envelope has no power.
+    """Return energy (Wh) and peak current (A) of steady flight along a route.
 
-    Each leg at its commanded airspeed, its slope over the ground in the mean wind, and its mean altitude; turns and
-    gusts take a few per cent more.
+    NaN if the envelope has no power.  Each leg at its commanded airspeed, its slope over the ground in the mean wind,
+    and its mean altitude; turns and gusts take a few per cent more.
     """
     volts = requirements.setup.envelope.volts
     energies, most = leg_energies(requirements)
@@ -122,7 +122,10 @@ def needed_energy(setup: FlightSetup) -> float:
 
 
 def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
-    """Return energy (Wh) of steady flight on each leg, and the highest power (W); NaN if the envelope has none."""
+    """Return energy (Wh) of steady flight on each leg, and the highest power (W).
+
+    NaN if the envelope has no power.
+    """
     envelope, route = requirements.setup.envelope, requirements.route
     if not np.isfinite(requirements.ground_speed).all():
         return [math.nan] * requirements.legs, math.nan
@@ -142,7 +145,10 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
 
 
 def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float) -> float:
-    """Return the path angle through the air for a leg's slope over ground in the mean wind at an altitude (m), rad."""
+    """Return the path angle through the air, rad, for a leg's slope over ground.
+
+    In the mean wind at an altitude (m).
+    """
     tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), up)
     rise, angle = math.tan(float(requirements.slopes[leg])), 0.0
     for _ in range(4):

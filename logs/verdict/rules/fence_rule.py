@@ -167,7 +167,10 @@ def _facts(visit: Record) -> list[Fact]:
 
 
 def _source(requirements: RouteRequirements, z: int) -> str:
-    """Return the source of a zone; for a mission without a scenario, zones given on the command line are "fence"."""
+    """Return the source of a zone.
+
+    For a mission without a scenario, "fence" is a zone given with the command.
+    """
     if z >= requirements.airspace.of_scenario:
         return "mission"
     return "fence" if requirements.setup.scenario.external else "scenario"

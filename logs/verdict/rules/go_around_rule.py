@@ -124,7 +124,7 @@ class _Aborted(NamedTuple):
 def go_around_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the go-around, for a mission that lands and has a home: one finding, a warning if it is too low.
+    """Judge the go-around of a mission that lands and has a home; warn if it is too low.
 
     If the scenario requires that a landing may be aborted, a low go-around fails, and an unjudged one is undecided.
     """
@@ -326,14 +326,20 @@ def _judge_go_around(
 
 
 def _unknown_part_text(ended: int, *, climbs: bool) -> str:
-    """Return the unknown part of a go-around, by how it ended and whether it climbs to its height; "" for none."""
+    """Return the unknown part of a go-around, "" for none.
+
+    It follows from how it ended, and whether it climbs to its height.
+    """
     if ended != OFF_GROUND:
         return ""
     return "it leads to where the ground is not known" if climbs else "it does not reach its height on known ground"
 
 
 def _required_heights(ground: Terrain, goal: LandingStart, points: Floats) -> Floats:
-    """Return the required height above ground (n,) at points (n, 3) of the path back, m: less near lower goals."""
+    """Return the required height above ground (n,) at points (n, 3) of the path back, m.
+
+    Less near lower goals.
+    """
     asked = np.full(len(points), GO_AROUND_ROOM)
     for east, north, up in (one.place for one in (goal, *goal.onward)):
         high = up - float(ground.height(east, north))
@@ -346,7 +352,10 @@ def _required_heights(ground: Terrain, goal: LandingStart, points: Floats) -> Fl
 def _next_sufficient_height(
     requirements: RouteRequirements, ground: Terrain, world: ReturnWorld, landing: _Landing, worst: float
 ) -> float:
-    """Return the next height above home (m) that is enough, in steps; NaN if none is.  worst: place tried first."""
+    """Return the next height above home (m) that is enough, in steps; NaN if none is.
+
+    worst: the place that is tried first, m before the landing point.
+    """
     first = _HEIGHT_STEP_M * math.ceil(landing.height / _HEIGHT_STEP_M + 1e-9)
     order = [worst, *_abort_places(landing).tolist()]
     for up in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():

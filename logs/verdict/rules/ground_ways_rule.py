@@ -151,7 +151,10 @@ def _unjudged(rule: str, place: Place, reason: str, *, opens: bool) -> Finding:
 
 
 class _Launch(NamedTuple):
-    """Launch: its course (rad), the run flown on it (m), the slope of its leg (m per m), and its description."""
+    """Launch and its description.
+
+    course: rad.  run: flown on it, m.  slope: of its leg, m per m.
+    """
 
     course: float
     run: float
@@ -160,7 +163,10 @@ class _Launch(NamedTuple):
 
 
 def _launch(requirements: RouteRequirements) -> _Launch:
-    """Return the launch along the first leg, or on the scenario's course; the leg applies if it is on that course."""
+    """Return the launch along the first leg, or on the scenario's course.
+
+    The leg's run and slope apply if the leg is on that course.
+    """
     stated = requirements.setup.scenario.launch
     along = _Launch(
         float(requirements.courses[0]), float(requirements.runs[0]), math.tan(float(requirements.slopes[0]))
@@ -174,7 +180,10 @@ def _launch(requirements: RouteRequirements) -> _Launch:
 
 
 def _climb_profile(low: float, up: float, run: float, climb: float) -> Profile:
-    """Return the profile from the ground (m AMSL) to a place (m AMSL, m away): climb first, then straight on."""
+    """Return the climb profile from the ground to a place: climb first, then straight on.
+
+    low: ground, up: place, m AMSL.  run: distance of the place, m.
+    """
     top = max(up, low + FIRST_CLIMB)
     reached = (top - low) / climb
     if reached >= run:
@@ -226,7 +235,7 @@ def _launch_finding(
     launch: tuple[tuple[float, float], float, float],
     is_known: bool,
 ) -> Finding:
-    """Return the finding for a mission that takes off: the climb to its next place, or on its launch course.
+    """Return the finding for a mission that takes off: the climb to its next place, or on a course.
 
     way: the launch course in words, "" along the first leg.
     met, least: obstacles at the steepest climb, and at the least climb.
@@ -255,7 +264,10 @@ def _launch_finding(
 
 
 def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], low: float, up: float) -> str:
-    """Return courses on which a launch climbs to the take-off's altitude without obstacles, in words; "" for none."""
+    """Return courses on which a launch climbs to the take-off's altitude without obstacles, in words.
+
+    "" if all are unsuitable for a climb.
+    """
 
     def is_free(course: float) -> bool:
         climb, _ = _climb(requirements, 0, course, low)

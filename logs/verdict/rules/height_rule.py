@@ -1,4 +1,4 @@
-"""The height rule: the greatest height above ground on each leg, and the scenario's ceiling, planned and flown.
+"""The height rule: greatest height above ground on each leg, and the ceiling, planned and flown.
 
 It applies if the scenario has a `max_height_m`; a ceiling alone is judged by the bounds rule.
 """
@@ -59,10 +59,10 @@ def height_findings(
 
 
 def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return the greatest height above ground on each segment of points (n, 3), m, and its fraction; (n - 1,) each.
+    """Return the greatest height above ground on each segment, m, and its fraction; (n - 1,) each.
 
-    Exact for the bilinear ground, like the least height: it is the least height of the same world upside down.  NaN if
-    a segment leaves the raster or its data.
+    points: (n, 3).  Exact for the bilinear ground, like the least height: it is the least height of the same world
+    upside down.  NaN if a segment leaves the raster or its data.
     """
     upside_down = points * np.array([1.0, 1.0, -1.0])
     low, at = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
@@ -71,7 +71,7 @@ def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, slots=True)
 class _Path:
-    """Points (n, 3) m with times (n,) s; the greatest height above ground on each segment, and where it occurs."""
+    """Points (n, 3) m with times (n,) s; each segment's greatest height above ground, and its fraction."""
 
     points: Floats
     times: Floats
@@ -108,7 +108,7 @@ def _highest(way: _Path, segments: NDArray[np.intp]) -> _Highest | None:
 
 
 def _segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
-    """Return the track's segments on a leg: the first and last legs include what came before and after them."""
+    """Return the track's segments on a leg; the first and last legs include what is before and after."""
     first = 0 if leg == 0 else int(aligned.rows[leg])
     last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
     return np.arange(first, last)

@@ -72,7 +72,7 @@ def _center(requirements: RouteRequirements, i: int) -> Floats:
 def fold_loiters(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Merge the findings at a loiter's corners into one, and reduce those on its legs to the worst of each rule."""
+    """Merge the findings at a loiter's corners into one, and keep the worst of each rule on its legs."""
     at_once = requirements.setup.autopilot.loiter_rules.at_middle
     kept: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
@@ -114,7 +114,7 @@ def fold_loiters(
 def end_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge before a flight the hazards near the end of a mission where its autopilot loiters; a flight shows them.
+    """Judge before a flight the hazards near the end of a mission where its autopilot loiters.
 
     aligned: not read.
     """
@@ -203,7 +203,10 @@ def _loiter_finding(
 
 
 def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
-    """Return distances from a loiter's center from first to last corner, (n,) m; empty if not flown to its end."""
+    """Return distances from a loiter's center from first to last corner, (n,) m.
+
+    Empty if not flown to its end.
+    """
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
         return np.zeros(0)
@@ -212,7 +215,10 @@ def _flown_radii(aligned: AlignedTrack, circle: Circle) -> Floats:
 
 
 def _uses_parameter_radius(requirements: RouteRequirements, circle: Circle) -> bool:
-    """Return True if a loiter's radius is the autopilot's parameter because the item states none that it reads."""
+    """Return True if a loiter's radius is the autopilot's parameter.
+
+    The item then states none that the autopilot reads.
+    """
     rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
     asked = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     return rules.lines_up and rules.radius != 0.0 and asked is not None and rules.radius_of(asked) == 0.0
@@ -231,7 +237,7 @@ def _bank_held(requirements: RouteRequirements, circle: Circle, tightest: float,
 
 
 def _hazards_text(requirements: RouteRequirements, circle: Circle, tightest: float) -> str:
-    """Return the hazards that a loiter flown wider than drawn could come too close to, in words; "" for none."""
+    """Return the hazards too close to a loiter that is flown wider than drawn, in words; "" for none."""
     heights = requirements.points[circle.first : circle.last + 1, 2]
     reach = SWING * tightest
     found = within_reach(requirements, circle.middle, float(heights.min()), float(heights.max()), reach)
@@ -242,7 +248,10 @@ def _hazards_text(requirements: RouteRequirements, circle: Circle, tightest: flo
 
 
 def _reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: Circle) -> bool:
-    """Return True if the flight reached a loiter: one that leaves it when its time is over may miss all corners."""
+    """Return True if the flight reached a loiter.
+
+    A flight that leaves it when its time is over may miss all corners.
+    """
     away, _ = approaches(aligned.track.position, circle.middle)
     early = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
     return bool(away.min() <= circle.radius + early + PASS)

@@ -1,4 +1,4 @@
-"""The rule on loss of control, `departure`: invalid numbers, extreme bank, too slow to fly, or ground contact."""
+"""The `departure` rule on loss of control: bad numbers, extreme bank, low airspeed, ground contact."""
 
 import math
 
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flight for invalid numbers, extreme bank, too low airspeed, or ground contact, with one finding."""
+    """Judge a flight for bad numbers, extreme bank, too low airspeed, or ground contact."""
     if geometric:
         return []
     if aligned is None:

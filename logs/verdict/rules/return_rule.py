@@ -42,7 +42,7 @@ _LEG_RULES = frozenset({"turn", "waypoint", "corridor", "slope", "loiter"})
 def return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge where a planned return to launch goes and how, and whether an imported flight completed its return.
+    """Judge where a planned return to launch goes, and whether an imported flight completed its return.
 
     The end of planfly's own flights is known from outside their track: `flown_return_findings` judges them.
     """
@@ -73,7 +73,7 @@ def flown_return_findings(
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:
-    """Judge the scenario's requirements on returns and glides from all of the path; empty without requirements.
+    """Judge the scenario's requirements on returns and glides from all of the path; may be empty.
 
     starts: makes the starts of returns, at an interval in s.
     """

@@ -103,7 +103,7 @@ def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | No
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
-    """Return why a slope within every limit is undecided due to an uncertain aircraft; "" if it is decided.
+    """Return why a slope within all limits is undecided by an uncertain aircraft, "" if it is decided.
 
     A tighter limit of the scenario says nothing about the aircraft's ability.
     """
@@ -183,7 +183,7 @@ def _distance(metres: float) -> str:
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
-    """Return for either throttle limit: its name, s at it, m/s off the command meanwhile, and the direction."""
+    """Return for either throttle limit: name, s at it, m/s off the command meanwhile, and direction."""
     return (("full", measure.at_full, measure.slow, "slow"), ("idle", measure.at_idle, measure.fast, "fast"))
 
 
@@ -214,7 +214,10 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, weak: list[Message]
 ) -> list[Message]:
-    """Return how the flown leg differs from the planned leg.  weak: faults that show a lack of performance."""
+    """Return how the flown leg differs from the planned leg.
+
+    weak: faults that show a lack of performance.
+    """
     faults = []
     planned = float(requirements.slopes[leg])
     sign = 1.0 if planned >= 0.0 else -1.0

@@ -1,4 +1,4 @@
-"""The speed rule: each leg's commanded airspeed in the envelope, room to take it up, and the flown airspeed."""
+"""The speed rule: commanded airspeed in the envelope, room to take it up, and the flown airspeed."""
 
 import math
 from typing import NamedTuple
@@ -132,10 +132,11 @@ class _HeldSpeed(NamedTuple):
 def _find_held_speed(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int, commanded: float
 ) -> _HeldSpeed | None:
-    """Return the airspeed over the second half of a leg's steady rows if it is far from its command; None if not.
+    """Return the airspeed that a leg settled at if it is far from its command, or None.
 
-    In the first half an autopilot may still take up its speed.  If the leg is too steep for the aircraft, the slope
-    rule names the cause.  For an imported flight it is a fact only: its airspeed sensor may have the same error.
+    The mean over the second half of its steady rows.  In the first half an autopilot may still take up its speed.  If
+    the leg is too steep for the aircraft, the slope rule names the cause.  For an imported flight it is a fact only:
+    its airspeed sensor may have the same error.
     """
     if abs(float(requirements.slopes[leg])) > slope_limit(requirements, leg)[0] + PLAN_TOLERANCE:
         return None
@@ -243,7 +244,10 @@ def _level_flight_range(
 
 
 def _measure_leg(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float] | None:
-    """Return a leg's mean airspeed, its tolerance for gusts and a new slope, and its least second mean, m/s."""
+    """Return a leg's mean airspeed, its tolerance, and its least mean over a second, m/s.
+
+    The tolerance is for gusts and a new slope.
+    """
     rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]
     if time.size < 2 or time[-1] - time[0] < min(SATURATED, MEASURED_SHARE * float(requirements.runs[leg]) / SLOWEST):

@@ -45,7 +45,7 @@ class _Margin:
 def stall_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the least margin of airspeed over the stall in a bank, with one finding; none for a route without a turn.
+    """Judge the least margin of airspeed over the stall in a bank; empty for a route without a turn.
 
     A route that needs a bank in which its speed is below the stall fails in flight too, at whatever speed it was flown:
     an autopilot that did not accept the speed, or banked less, does not make the route flyable.
@@ -77,7 +77,7 @@ def _planned(requirements: RouteRequirements) -> list[Finding]:
 
 
 def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
-    """Return the bank (rad) that the turn at a waypoint takes at an airspeed (m/s) of its legs, up to the limit.
+    """Return the bank (rad) that a waypoint's turn takes at an airspeed (m/s), up to the limit.
 
     On an arc of radius R it is atan(v^2 / (g R)) at the highest ground speed v on it, and a turn that is over before
     the aircraft has rolled into it takes no more bank than it can roll to.
@@ -95,7 +95,10 @@ def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float
 
 
 def level_stall(requirements: RouteRequirements, up: float) -> float:
-    """Return the slowest level flight at an altitude (m AMSL), m/s true: the elevator is at its stop there."""
+    """Return the slowest level flight at an altitude (m AMSL), m/s true.
+
+    The elevator is at its stop there.
+    """
     return requirements.setup.envelope.level_speeds(up)[0]
 
 

@@ -1,4 +1,4 @@
-"""The survey rule: how much of each photo line is flown so that its photos are usable, and how much they overlap.
+"""The survey rule: how much of each photo line is flown usably, and how much its photos overlap.
 
 The autopilot decides a survey's turn-arounds, as long as they keep clear of ground, threats and zones: the turn, slope
 and waypoint rules ignore them, and so does the corridor rule unless a corridor is stated.
@@ -25,7 +25,10 @@ FRONT, SIDE = "front overlap", "side overlap"
 def survey_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each photo line; ``geometric``: by the part its end turns leave of it, and each turn-around's room."""
+    """Judge each photo line.
+
+    ``geometric``: by the part that its end turns leave of it, and each turn-around's room.
+    """
     out = []
     for survey in requirements.surveys:
         for number, line in enumerate(survey.lines, 1):
@@ -94,9 +97,9 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
 
 
 def _turn_arounds(requirements: RouteRequirements, survey: Survey) -> list[Finding]:
-    """Report turn-arounds too tight to be flown as drawn with hazards in reach: only a flight shows their path.
+    """Report turn-arounds too tight to be flown as drawn with hazards in reach.
 
-    This includes the turns onto the first line and off the last.
+    Only a flight shows their path.  This includes the turns onto the first line and off the last.
     """
     out = []
     ways = survey.ways_onto_lines()

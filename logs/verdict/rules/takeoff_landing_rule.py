@@ -1,4 +1,4 @@
-"""The take-off and landing rules: the climb from the ground to a mission's first place, and its final approach.
+"""The take-off and landing rules: the climb to a mission's first place, and its final approach.
 
 A flight begins and ends in the air, so both are judged by the mission's places alone, whether it was flown or not.
 An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than it can climb
@@ -58,7 +58,10 @@ def takeoff_findings(
 
 
 def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
-    """Return a finding if a launch is too gentle for the autopilot to start its motor; empty without a trigger."""
+    """Return a finding if a launch is too gentle to start the motor.
+
+    Empty if the autopilot needs no acceleration.
+    """
     setup = requirements.setup
     trigger, found = setup.autopilot.launch_trigger, launch.acceleration(setup.slowest_launched)
     if trigger is None or found >= trigger[0]:

@@ -69,7 +69,10 @@ def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True, slots=True)
 class _Visit:
-    """Visit to one sphere: time inside, exposure and time of the nearest point in s, distance in m; NaN if not flown."""
+    """Visit to one sphere; NaN if not flown.
+
+    inside, exposure, closest_time: s.  closest: least distance to its center, m.
+    """
 
     inside: float = math.nan
     exposure: float = math.nan
@@ -87,7 +90,10 @@ def _visit(visits: SphereVisits | None, m: int) -> _Visit:
 def _nearest_place(
     requirements: RouteRequirements, aligned: AlignedTrack | None, visit: _Visit | None, radius: float
 ) -> str:
-    """Return on which leg and where a flight inside a sphere (m) was nearest to its center; "" if not inside."""
+    """Return where a flight inside a sphere was nearest to its center, in words; "" if not inside.
+
+    radius: m.
+    """
     if aligned is None or visit is None or math.isnan(visit.closest_time) or visit.closest > radius:
         return ""
     time = aligned.track.time
@@ -97,7 +103,10 @@ def _nearest_place(
 
 
 def _no_entry_finding(count: int, nearest: float, name: str, error: float, judged: bool) -> Finding:
-    """Report that no sphere is entered.  nearest: m outside the named threat's sphere.  error: of navigation, m."""
+    """Report that no sphere is entered.
+
+    nearest: m outside the named threat's sphere.  error: of navigation, m.
+    """
     reason = f"no missile sphere of {count} threats is entered" if count else "the scenario has no threats"
     facts = []
     if math.isfinite(nearest):

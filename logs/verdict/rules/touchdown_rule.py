@@ -66,7 +66,7 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown landing at its point with one finding; before the flight only a strip that is too short."""
+    """Judge a flown landing at its point; before the flight only a strip that is too short."""
     ground = requirements.ground
     if ground is None or ground.ways.approach is None:
         planned = requirements.setup.ground_ways.approach if geometric else None
@@ -168,7 +168,7 @@ def _pair(values: tuple[Floats, Floats]) -> tuple[float, float]:
 
 
 def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
-    """Return the first row at which the aircraft is as low above ground as at rest, or None if there is none."""
+    """Return the first row at which the aircraft is as low above ground as at rest, or None."""
     if not len(track):
         return None
     position = np.asarray(track.position, dtype=np.float64)
@@ -193,7 +193,7 @@ def _sink_rates(track: Track, terrain: Terrain, approach: Approach, k: int) -> t
 
 
 def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
-    """Return the least height above ground until the flare or touch-down may begin, m, as in `_Landing.room`."""
+    """Return the least height above ground until flare or touch-down, m, as in `_Landing.room`."""
     up = float(approach.point[2])
     glide = requirements.setup.autopilot.landing_glide(approach.begin - up, approach.run, approach.tail_wind, up)
     flares = glide.flare_distance + max(0.0, ABOVE_FLARE - glide.flare_height) / glide.slope

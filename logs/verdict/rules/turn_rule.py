@@ -99,7 +99,10 @@ def _judge(
 
 
 def _unflown_reason(requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None) -> str:
-    """Return why a turn was not flown: the flight ended before it, or the autopilot skipped a neighbouring leg."""
+    """Return why a turn was not flown.
+
+    The flight ended before it, or the autopilot skipped a neighbouring leg.
+    """
     if measure.corner is not None:
         return "its legs were not flown in turn"
     if aligned is None or int(aligned.track.leg.max()) < i:
@@ -192,7 +195,7 @@ def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
 
 
 def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
-    """Return faults that the flown turn shows: angle or bank beyond the limit, a tighter arc, an overshoot."""
+    """Return faults of the flown turn: angle or bank beyond the limit, tighter arc, overshoot."""
     faults = []
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown, most = math.degrees(measure.angle), math.degrees(limit)

@@ -1,4 +1,4 @@
-"""The waypoint rule: whether each waypoint was reached, by the mission's or the autopilot's acceptance radius.
+"""The waypoint rule: whether each waypoint was reached, by the mission's or autopilot's radius.
 
 ArduPlane also considers a waypoint reached, and turns to the next leg, once it is past the line across the leg at its
 end, however far to the side; for ArduPlane's simulated law that is accepted within the corridor.  Altitude has no part
@@ -124,7 +124,7 @@ def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int
 
 
 def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
-    """Return the distance (m) from a waypoint at which the track crossed the line across its leg; inf if never."""
+    """Return the distance (m) from a waypoint where the track crossed the line across its leg, or inf."""
     if i == 0:
         return math.inf
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
@@ -141,7 +141,7 @@ def _acceptance_text(near: Reach) -> str:
 
 
 def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, level: float) -> tuple[float, float]:
-    """Return the closest horizontal approach between the neighbouring waypoints, m, and the height above ``level``."""
+    """Return the closest horizontal approach between the neighbours, m, and the height above ``level``."""
     first = int(aligned.rows[i - 1]) if i else 0
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
     position = aligned.track.position[first : max(last, first + 1) + 1]
