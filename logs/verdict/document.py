@@ -1,4 +1,4 @@
-"""Define the data classes of ``verdict.json``: a verdict with its texts; its JSON schema is made of them.
+"""Define the data classes of ``verdict.json``: a verdict with its texts, for its JSON schema.
 
 `logs.verdict.verdict.Verdict.document` fills them.
 """

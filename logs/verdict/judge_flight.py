@@ -43,8 +43,7 @@ def judge_flight(
     """Judge a flown track: level "flown".
 
     Any track is judged, however short or damaged: missing data makes the verdict incomplete.  A track without a row is
-    a
-    flight that never began: its route is judged, level "geometric".  An imported flight is judged as far as its log
+    a flight that never began: its route is judged, level "geometric".  An imported flight is judged as far as its log
     goes.
 
     ended: how the flight ended, "completed" or the reason for its end.  log_complete: the record has its end.

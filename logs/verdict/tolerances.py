@@ -240,8 +240,8 @@ TURN_AROUND_RADII = 3.25
 
 # Departures from the ground and approaches to it
 
-# m.  Ignore terrain within this distance of home under a climb-out: rail or runway are there, and two pixels of the
-# usual elevation files cannot be told apart over it.
+# m.  Ignore terrain within this distance of home under a climb-out: rail or runway are there, and the usual elevation
+# files do not resolve such a short distance, which is less than two of their pixels.
 LAUNCH_RUN = 50.0
 # m.  Least height above the ground at home to which an aircraft climbs before it descends to its first waypoint: below
 # that ArduPlane flies no slope (`Plane::setup_glide_slope`).

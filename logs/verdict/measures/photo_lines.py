@@ -226,8 +226,7 @@ class OverlapMeasure:
     front: overlap with the next photo on the line; None if the distance between photos is not stated, or none is
     usable.
     line, apart, height, slow: where that is: the line's number from 0, m between photos, m above ground, and True if
-    the
-        camera cannot take them any sooner.
+        the camera cannot take them any sooner.
     side: overlap with the photos of the neighbouring line; None if no two usable lines are next to each other.
     pair, between, heights: where that is: both lines' numbers, m between them, m above ground.
     """
@@ -245,7 +244,9 @@ class OverlapMeasure:
 
 
 class _Strip(NamedTuple):
-    """Points of a line: places (n, 3) m, heights above ground (n,) m, ground speeds (n,) m/s, and a usable flag."""
+    """Points of a photo line, and whether they are usable.
+
+    places: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s."""
 
     places: Floats
     heights: Floats

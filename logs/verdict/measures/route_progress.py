@@ -149,11 +149,11 @@ def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> 
 def _lay(
     track: Floats, places: Floats, radii: Floats, capture: float, anywhere: bool
 ) -> Numbers:  # pragma: no cover - compiled
-    """Lay a track (n, 2) along places (m, 2), both forward only, with the least sum of min(distance, capture)^2.
+    """Lay a track (n, 2) along places (m, 2), both forward only, with the least sum of costs.
 
-    Return the first and the last row at each place, (m, 2); -1 for places before its start and after its end.  Among
-    equal ends take the earliest.  A place without a row of its own costs `_SKIP_FRACTION` of that and
-    `_SKIP_DISTANCE_M`^2.
+    The cost of a row is min(distance, capture)^2; a place without a row of its own costs `_SKIP_FRACTION` of that and
+    `_SKIP_DISTANCE_M`^2.  Return the first and the last row at each place, (m, 2); -1 for places before its start and
+    after its end.  Among equal ends take the earliest.
     """
     rows, count = track.shape[0], places.shape[0]
     moves = np.zeros((rows, count), dtype=np.uint8)

@@ -317,8 +317,7 @@ class RouteRequirements:
     airspace: the zones of scenario and mission.
     surveys: surveys of a user's mission, if the scenario judges surveys by their lines.
     zones_on: first and last leg if zones are checked on these alone, and then only the zones that the planned path
-    violates
-        there, for a quick answer.
+        violates there, for a quick answer.
     ground: for a flight that took off or landed, to whose airborne part the other fields belong; None for any other.
     """
 

@@ -174,8 +174,7 @@ class SlopeMeasure:
     short: True if no part of the leg is clear of the blends.
     at_full, at_idle: s with the throttle at its limits.
     slow, fast: m/s, the largest mean airspeed error below and above the command over `SATURATED` seconds at those
-    limits,
-        without the part that a gust explains; 0 for none.
+        limits, without the part that a gust explains; 0 for none.
     ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
     finished: the leg was flown to its end.
     """

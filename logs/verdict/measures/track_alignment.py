@@ -41,15 +41,13 @@ class AlignedTrack:
     bad_rows: number of rows with non-finite or implausible numbers or a time not later than the row before.
     first_bad: time of the first of them, s; NaN if there is none.
     rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
-    did
-        not reach.
+        did not reach.
     distance: (w,) m from there to the apex.
     passed: (w,) bool, the flight passed the waypoint.
     course: (t,) rad over the ground, unwrapped.
     distance_run: (t,) m along the ground track.
     low, low_at: (t - 1,) least height above ground between a row and the next, m, and the fraction of the segment at
-    which
-        it occurs; NaN off the known terrain, and without terrain.
+        which it occurs; NaN off the known terrain, and without terrain.
     tick: usual time between rows, s.
     """
 

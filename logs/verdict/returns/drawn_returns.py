@@ -64,8 +64,7 @@ class LeastHeights:
 
     time: (n,) s.
     height: (n,) m AMSL: if the return from the flight's own altitude is unsafe, the nearest higher altitude from which
-    it is
-        safe; otherwise the lowest altitude at which it stays safe.  NaN if no altitude was found.
+        it is safe; otherwise the lowest altitude at which it stays safe.  NaN if no altitude was found.
     searched: range of the search above the flight, m.
     """
 

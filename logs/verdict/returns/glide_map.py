@@ -1,14 +1,12 @@
 """Compute for every cell the altitude that an aircraft needs to glide to a place.
 
-The shortest paths over terrain are searched backwards.  One search begins at the places to be reached and runs against
-the direction of flight.  A cell's label is the least
-
-altitude from which the glide gets there: the label of the next cell plus the height lost on the step to it, and no less
-than the ground with its margin, there and between them.  So the labels include the terrain, and one search serves every
-second of a flight.  A step costs its length times sink by ground speed on its course in the wind at that altitude,
-which is exact for each step of a path.  Labels only grow in the backward direction: cells are settled by altitude, in
-bands no higher than the cheapest step (E. W. Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands:
-R. B. Dial, "Algorithm 360", 1969).
+The shortest paths over terrain are searched backwards.  One search begins at the places to be reached and runs
+against the direction of flight.  A cell's label is the least altitude from which the glide gets there: the label of
+the next cell plus the height lost on the step to it, and no less than the ground with its margin, there and between
+them.  So the labels include the terrain, and one search serves every second of a flight.  A step costs its length
+times sink by ground speed on its course in the wind at that altitude, which is exact for each step of a path.  Labels
+only grow in the backward direction: cells are settled by altitude, in bands no higher than the cheapest step (E. W.
+Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands: R. B. Dial, "Algorithm 360", 1969).
 
 A step goes to one of 32 cells, in directions 7 to 14 degrees apart.  On a plane the labels equal the altitudes for the
 straight path, or exceed them: by 1.0 % at the most in still air, and by 1.8 % in 10 m/s for an aircraft that glides at
@@ -83,7 +81,7 @@ class GlideMap:
 def glide_map(
     terrain: Terrain, places: Floats, margin: float, spheres: Floats, radii: Floats, around: float = AROUND
 ) -> GlideMap | None:
-    """Return the map around places (p, 2), m, or None if they are so far apart that its cells would be too coarse.
+    """Return the map around places (p, 2), m, or None if its cells would be too coarse for its extent.
 
     margin: height above ground that a glide keeps, m.  spheres, radii: (m, 3) and (m,) of kill spheres, m.
 

@@ -1,11 +1,10 @@
 """Compute what a flying aircraft can glide to.
 
 It flies on for a moment, turns to the path there, and glides.  The path comes from a backward search
-(`logs.verdict.returns.glide_map`) that ignores turns.  So the turn is flown
-
-first, to either side, in the mean wind: at the bank that the autopilot commands and the airspeed allows, at the higher
-speed and sink that the load factor of that bank causes.  Neither the altitude that the excess speed over the glide
-speed would give back nor the altitude needed to reach the speed of the turn is included.
+(`logs.verdict.returns.glide_map`) that ignores turns.  So the turn is flown first, to either side, in the mean wind:
+at the bank that the autopilot commands and the airspeed allows, at the higher speed and sink that the load factor of
+that bank causes.  Neither the altitude that the excess speed over the glide speed would give back nor the altitude
+needed to reach the speed of the turn is included.
 """
 
 import math

@@ -168,13 +168,12 @@ class Returns:
     reserve: energy that has to be left, Wh.
     flown: True if they begin on a flown track, False for the planned path.
     again: for each return flown again in JSBSim, the clearance there minus the clearance of the point mass, m.
-    stands_in: True if ArduPlane's law replaces that of an autopilot without a return law.
+    stands_in: True if ArduPlane's law stands in for an autopilot without a return law.
     open: parts that are not judged.
     autoland: RTL_AUTOLAND; None for the mission of another autopilot.
     landings: the mission's landing sequences.
     left_out: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing that
-    it
-        sinks to the ground before it can return.
+        it sinks to the ground before it can return.
     """
 
     each: tuple[ReturnFlown, ...]

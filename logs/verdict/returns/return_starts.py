@@ -1,4 +1,4 @@
-"""Sample the places from which an aircraft may be called home: one for each second of a flight or planned path."""
+"""Sample places from which an aircraft may be called home, at intervals along a flight or path."""
 
 from dataclasses import dataclass
 
@@ -31,8 +31,7 @@ class ReturnStarts:
     used: (n,) energy used until then, Wh; NaN if unknown.
     flown: True for a flown track, False for the planned path.
     low: (n,) True for a place in a flown take-off or landing that is lower above ground than the required clearance
-    plus
-        `SINKING`.
+        plus `SINKING`.
     grounded: number of further places where the aircraft is too slow to fly: on its launch, or landed.
     """
 

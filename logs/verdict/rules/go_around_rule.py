@@ -257,7 +257,9 @@ def _simulate(
     height: float,
     places: Sequence[float] | Floats,
 ) -> list[_Aborted]:
-    """Simulate go-arounds to a height above home (m) from places (m before the landing point) above the ground."""
+    """Simulate go-arounds from places on the glide that are above the ground.
+
+    height: above home, m.  places: m before the landing point."""
     top = landing.home + height
     begins = [(float(before), landing.place(float(before))) for before in places]
     over = [up - float(ground.height(east, north)) for _, (east, north, up) in begins]

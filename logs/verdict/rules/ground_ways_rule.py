@@ -264,10 +264,7 @@ def _launch_finding(
 
 
 def _other_courses(requirements: RouteRequirements, begin: tuple[float, float], low: float, up: float) -> str:
-    """Return courses on which a launch climbs to the take-off's altitude without obstacles, in words.
-
-    "" if all are unsuitable for a climb.
-    """
+    """Return courses on which a launch climbs to the take-off's altitude without obstacles, in words."""
 
     def is_free(course: float) -> bool:
         climb, _ = _climb(requirements, 0, course, low)
