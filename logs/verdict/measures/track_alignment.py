@@ -30,7 +30,7 @@ Bytes = NDArray[np.uint8]
 # A waypoint was not passed if the route from the track's end to it is longer than its arrival distance and this, m.
 _STILL_AHEAD_M = 50.0
 # Largest number of cells in the assignment of rows to waypoints; the track is thinned to stay within it.
-_MAX_CELLS = 40_000_000
+_CELLS = 40_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,7 +246,7 @@ def _passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tupl
     """
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
-    step = max(1, int(CHORD_TIME / tick), -(-len(track) * count // _MAX_CELLS))
+    step = max(1, int(CHORD_TIME / tick), -(-len(track) * count // _CELLS))
     first, until = read_only(progress.first // step), read_only(progress.last // step)
     chords, capped = _align(read_only(position), apexes, first, until, step, CAPTURE_RADIUS)
     rows = np.zeros(count, dtype=np.int64)
