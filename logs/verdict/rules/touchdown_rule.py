@@ -88,7 +88,7 @@ def touchdown_findings(
         fault = message("the aircraft did not touch down", f" at {_place_of(approach)}")
         return [make_finding("touchdown", place, ok=False, reason=fault.text, faults=[fault], unit="m")]
     landing = _measure_landing(requirements, track, terrain, approach, k)._replace(over=over)
-    faults = _landing_faults(approach, landing)
+    faults = _detect_faults(approach, landing)
     if entered := entered_by_way(requirements, track_way(track)):
         faults.append(message(f"the final enters {entered}"))
     gusts = requirements.setup.scenario.wind.turbulence != "none"
@@ -205,7 +205,7 @@ def _final_clearance(requirements: RouteRequirements, position: Floats, terrain:
     return float(low.min())
 
 
-def _landing_faults(approach: Approach, landing: _Landing) -> list[Message]:
+def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
     """Return faults: parts of the landing off the strip, or a point off the ground."""
     half, side = 0.5 * approach.strip.length, 0.5 * approach.strip.width
     # On a strip shorter than the error, only a distance beyond the strip by more than the error is known.
