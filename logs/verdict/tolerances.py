@@ -53,9 +53,9 @@ OVERSHOOT = 5.0
 SETTLED = 1.0
 # m, by turbulence.  Increase of that distance by gusts.
 GUST_OFFSET = {"none": 0.0, "light": 0.5, "moderate": 1.0}
-# Fraction of the passing distance.  A turn may pass its waypoint this much closer than the arc at the bank limit.
+# Fraction of the passing distance, and m by turbulence.  A turn may pass its waypoint closer than the arc at the bank
+# limit by the sum of both; the second is the cross-track error of an aircraft with good guidance.
 CLOSER_SHARE = 0.01
-# m, by turbulence.  Added to that tolerance: the cross-track error of an aircraft with good guidance.
 CLOSER = {"none": 0.6, "light": 0.8, "moderate": 1.0}
 # Standard deviations.  Largest navigation error that is allowed for.
 NAVIGATION_SIGMAS = 3.0
